@@ -1,0 +1,46 @@
+"""What can go wrong, told apart."""
+
+from __future__ import annotations
+
+
+class SolverError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class ModelError(SolverError, ValueError):
+    """Bad input: which field, which value, what is allowed.
+
+    Parameters
+    ----------
+    field : name of the offending input, dotted for nested ones (``"material.yield_stress"``)
+    value : what was given
+    allowed : what would have been accepted, in words
+    """
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        super().__init__(f"{field} = {value!r}: {allowed}")
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+
+    def __reduce__(self) -> tuple[type[ModelError], tuple[str, object, str]]:
+        return type(self), (self.field, self.value, self.allowed)
+
+
+class NotConverged(SolverError):
+    """The iteration failed although an equilibrium may exist.
+
+    ``reached`` is the last load factor in equilibrium, ``attempted`` the next one tried.
+    """
+
+    def __init__(self, message: str, reached: float = 0.0, attempted: float = 0.0) -> None:
+        super().__init__(message)
+        self.reached = reached
+        self.attempted = attempted
+
+    def __reduce__(self) -> tuple[type[NotConverged], tuple[str, float, float]]:
+        return type(self), (str(self), self.reached, self.attempted)
+
+
+class LimitLoad(NotConverged):
+    """The structure has no equilibrium above ``reached``: it flows plastically at constant load."""

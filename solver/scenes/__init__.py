@@ -1,0 +1,14 @@
+"""The named scenes: parameters in, records out.
+
+A scene is a parameter class and a function that walks one loading path. Runs that
+differ only in the scene's ``branch`` parameter share one path.
+"""
+
+from __future__ import annotations
+
+from solver.scenes.punch import PUNCH
+from solver.scenes.scene import Monitor, Scene
+
+SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH,)}
+
+__all__ = ["SCENES", "Monitor", "Scene"]
