@@ -1,0 +1,42 @@
+PYTHON ?= $(firstword $(shell command -v python3.11 python3))
+BIN := .venv/bin
+STAMP := .venv/installed
+
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help setup run test serve lint bench clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(STAMP) ## make the environment .venv, or bring it up to date
+
+run: setup ## compute the punch study into out/
+	$(BIN)/residua run data/studies/punch.toml --out out
+
+test: setup ## run the whole test suite
+	$(BIN)/python -m pytest --durations=15
+
+serve: setup ## start the HTTP service
+	$(BIN)/residua serve
+
+lint: setup ## check style and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: setup ## draw CPU time against error
+	$(BIN)/python -m tests.benchmarks
+
+clean: ## remove the environment and caches; results in out/ stay
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	find solver studies service tests -name __pycache__ -prune -exec rm -rf {} +
+
+$(STAMP): pyproject.toml constraints.txt $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+		--constraint constraints.txt --editable '.[dev,mkl]'
+	@touch $@
+
+$(BIN)/python:
+	$(PYTHON) -m venv --clear .venv

@@ -1,0 +1,1 @@
+"""The claims of solver, studies and service, each as a test."""

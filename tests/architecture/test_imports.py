@@ -1,0 +1,47 @@
+"""Imports run one way: service -> studies -> solver."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.architecture.sources import PACKAGES, ROOT, imported, modules
+
+DATA = {"dask", "distributed", "xarray", "h5netcdf", "h5py", "netCDF4", "zarr", "pandas"}
+WEB = {"fastapi", "starlette", "uvicorn", "httpx", "pydantic", "pydantic_settings"}
+FORBIDDEN = {
+    "solver": {"studies", "service", "tests", "matplotlib"} | DATA | WEB,
+    "studies": {"service", "tests", "fastapi", "starlette", "uvicorn"},
+    "service": {"tests", "dask", "distributed", "netCDF4"},
+}
+
+
+def imports(package: str) -> dict[str, set[str]]:
+    """What each module of a package imports."""
+    return {str(m): imported((ROOT / m).read_text(), package) for m in modules(package)}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_module_imports_against_the_direction(package: str) -> None:
+    found = imports(package)
+    assert found, f"{package} has no modules"
+    breaches = {m: names & FORBIDDEN[package] for m, names in found.items()}
+    assert not {m: sorted(names) for m, names in breaches.items() if names}
+
+
+def test_one_module_of_studies_imports_dask() -> None:
+    users = [m for m, names in imports("studies").items() if names & {"dask", "distributed"}]
+    assert len(users) == 1, users
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("import dask.array as da", "dask"),
+        ("from distributed.client import Client", "distributed"),
+        ("def later():\n    from dask import delayed", "dask"),
+        ("if True:\n    import xarray", "xarray"),
+        ("from . import record", "solver"),
+    ],
+)
+def test_an_import_is_seen_wherever_it_stands(line: str, name: str) -> None:
+    assert imported(line, "solver") == {name}
