@@ -1,0 +1,84 @@
+"""Body = mesh + element + kinematics + material + supports + loads, as the user declares it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.discretisation import Discretisation
+from solver.elements import element_type
+from solver.errors import ModelError
+from solver.kinematics import STATES, State
+
+if TYPE_CHECKING:
+    from skfem import Mesh
+
+    from solver.material import Material
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Body:
+    """A deformable body.
+
+    Attributes
+    ----------
+    name : unique in its model
+    mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
+    material : its law
+    state : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
+    element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
+    full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
+    thickness : of plane bodies [mm]
+    supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
+    pressure : boundary name -> pressure at load factor one, positive when pushing [MPa]
+    """
+
+    name: str
+    mesh: Mesh
+    material: Material
+    state: State = "plane_strain"
+    element: str = "quad8"
+    full_integration: bool = False
+    thickness: float = 1.0
+    supports: Mapping[str, str] = field(default_factory=dict)
+    pressure: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.state not in STATES:
+            raise ModelError("state", self.state, "must be one of " + ", ".join(STATES))
+        if not (np.isfinite(self.thickness) and self.thickness > 0):
+            raise ModelError("thickness", self.thickness, "must be positive [mm]")
+        corners = 4 if element_type(self.element).cells == "quad" else 3
+        if self.mesh.t.shape[0] != corners:
+            raise ModelError(
+                "element", self.element, f"needs cells of {corners} corners; the mesh of body "
+                f"{self.name!r} has {self.mesh.t.shape[0]}",
+            )  # fmt: skip
+        if self.state == "axisymmetric" and self.mesh.p[0].min() < 0:
+            raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
+        for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
+            for boundary in names:
+                self.facets(boundary, kind)
+        for boundary, held in self.supports.items():
+            if held not in ("x", "y", "xy"):
+                raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
+        for boundary, value in self.pressure.items():
+            if not np.isfinite(value):
+                raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")
+
+    def facets(self, boundary: str, field: str = "boundary") -> np.ndarray:
+        """Return the facet numbers of a named boundary."""
+        known = self.mesh.boundaries or {}
+        if boundary not in known or len(known[boundary]) == 0:
+            allowed = "must name a boundary of the mesh: " + (", ".join(known) or "it has none")
+            raise ModelError(field, boundary, allowed)
+        return np.asarray(known[boundary])
+
+    @cached_property
+    def discretisation(self) -> Discretisation:
+        """The operators of the body, built once."""
+        return Discretisation(self)

@@ -1,0 +1,196 @@
+"""The operators of a body: strain, internal force, tangent, loads, rigid motions."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg, sparse
+from skfem import CellBasis, FacetBasis
+
+from solver import kinematics
+from solver.constitutive import PlasticState, Response, elastic_stiffness, respond
+from solver.elements import element_type
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.body import Body
+
+
+class Discretisation:
+    """Unknowns, quadrature and constant operators of one body.
+
+    Unknowns are numbered node by node: ``2 * node`` is x, ``2 * node + 1`` is y. Points are
+    numbered element by element.
+
+    Attributes
+    ----------
+    X : (2, n_nodes) node positions [mm]
+    dofs : (n_elements, 2 n_element_nodes)
+    B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
+    weights : (n_elements, n_points) volume of the points, thickness or 2 pi r in it [mm3]
+    load : (n,) nodal forces at load factor one [N]
+    active : unknowns that are neither supported nor pinned
+    rigid : (n, n_rigid) rigid motions the supports leave free
+    """
+
+    def __init__(self, body: Body) -> None:
+        self.body = body
+        kind = element_type(body.element)
+        self.basis = CellBasis(
+            body.mesh,
+            kind.element,
+            intorder=kind.full_order if body.full_integration else kind.order,
+        )
+        self.X = self.basis.doflocs
+        self.n = 2 * self.X.shape[1]
+        nodes = self.basis.element_dofs
+        self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
+        self.dofs = self.dofs.reshape(nodes.shape[1], -1)
+        self.points = np.asarray(self.basis.global_coordinates())
+        values = np.array([np.broadcast_to(b[0].value, self.basis.dx.shape)
+                           for b in self.basis.basis])  # fmt: skip
+        gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
+        self.weights = self.basis.dx * self._measure(self.points)
+        self.B = kinematics.strain_operator(values, gradients, self.points[0], body.state)
+        if kind.mean_dilatation and body.state != "plane_stress":
+            self.B = kinematics.mean_dilatation(self.B, self.weights)
+        self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
+        self.load = self._pressure_forces()
+        self._hold()
+
+    def _measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
+        """Return the depth a plane point stands for [mm]: thickness or 2 pi r."""
+        if self.body.state == "axisymmetric":
+            return np.asarray(2 * np.pi * x[0])
+        return self.body.thickness
+
+    def _pressure_forces(self) -> NDArray[np.float64]:
+        load = np.zeros(self.n)
+        for boundary, pressure in self.body.pressure.items():
+            basis = FacetBasis(
+                self.body.mesh,
+                self.basis.elem,
+                facets=self.body.facets(boundary),
+                intorder=5,
+            )
+            weight = basis.dx * self._measure(np.asarray(basis.global_coordinates()))
+            normal = np.asarray(basis.normals)
+            for shape, nodes in zip(basis.basis, basis.element_dofs, strict=True):
+                force = -pressure * (normal * shape[0].value * weight).sum(axis=-1)
+                np.add.at(load, 2 * nodes, force[0])
+                np.add.at(load, 2 * nodes + 1, force[1])
+        return load
+
+    def boundary_nodes(self, boundary: str) -> NDArray[np.int64]:
+        """Return the nodes on a named boundary."""
+        return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
+
+    def _hold(self) -> None:
+        """Find supported unknowns, the rigid motions left, and as many pins to hold them."""
+        fixed = np.zeros(self.n, dtype=bool)
+        for boundary, held in self.body.supports.items():
+            nodes = self.boundary_nodes(boundary)
+            for axis in held:
+                fixed[2 * nodes + "xy".index(axis)] = True
+        motions = kinematics.rigid_motions(self.X, self.body.state)
+        free = np.flatnonzero(~fixed)
+        if fixed.any():
+            left = linalg.null_space(motions[fixed], rcond=1e-9)
+            motions = motions @ left
+        self.rigid = motions
+        pins = np.zeros(0, dtype=int)
+        if motions.shape[1]:
+            pivots = linalg.qr(motions[free].T, mode="r", pivoting=True)[1]
+            pins = free[pivots[: motions.shape[1]]]
+        self.active = np.setdiff1d(free, pins)
+        self.free = free
+
+    # -- the law at all points ---------------------------------------------------------------
+
+    def virgin(self) -> PlasticState:
+        """Return the state of the body before any load."""
+        return PlasticState.virgin(self.weights.size)
+
+    def strain(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Mandel strain (4, n_points) for displacements (n,)."""
+        flat = np.matmul(self._flat_B, u[self.dofs][:, :, None])
+        return np.asarray(flat.reshape(-1, 4).T)
+
+    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+        """Return stress, tangent and new state at all points."""
+        return respond(self.strain(u), state, self.body.material, self.body.state)
+
+    def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
+        weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)
+        forces = np.matmul(weighted, self._flat_B)[:, 0]
+        return np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
+
+    # -- stiffness ---------------------------------------------------------------------------
+
+    def _element_stiffness(
+        self, elements: NDArray[np.int64] | slice, tangent: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        B = self.B[elements]
+        DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
+        flat = B.reshape(len(B), -1, B.shape[-1])
+        return np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape))
+
+    @cached_property
+    def _pattern(self) -> tuple[sparse.csr_array, NDArray[np.int64]]:
+        """Upper triangle on the active unknowns, and where each element entry goes in it."""
+        number = np.full(self.n, -1)
+        number[self.active] = np.arange(len(self.active))
+        local = number[self.dofs]
+        rows = np.broadcast_to(local[:, :, None], (*local.shape, local.shape[1])).ravel()
+        columns = np.broadcast_to(local[:, None, :], (*local.shape, local.shape[1])).ravel()
+        kept = (rows >= 0) & (columns >= rows)
+        key = rows.astype(np.int64) * len(self.active) + columns
+        unique, slot = np.unique(key[kept], return_inverse=True)
+        m = len(self.active)
+        indptr = np.searchsorted(unique, np.arange(m + 1, dtype=np.int64) * m)
+        upper = sparse.csr_array(
+            (np.zeros(len(unique)), unique % m, indptr), shape=(m, m)
+        )
+        place = np.full(len(key), len(unique))
+        place[kept] = slot
+        return upper, place.reshape(len(local), -1)
+
+    def _scatter(
+        self, elements: NDArray[np.int64] | slice, matrices: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        upper, place = self._pattern
+        size = upper.nnz + 1
+        data = np.bincount(place[elements].ravel(), weights=matrices.ravel(), minlength=size)
+        return data[:-1]
+
+    @property
+    def pattern(self) -> sparse.csr_array:
+        """Upper triangle of the stiffness on the active unknowns, values not set."""
+        return self._pattern[0]
+
+    @cached_property
+    def _elastic_elements(self) -> NDArray[np.float64]:
+        C = elastic_stiffness(self.body.material, self.body.state)
+        return self._element_stiffness(slice(None), np.broadcast_to(C, (1, 1, 4, 4)))
+
+    @cached_property
+    def elastic_data(self) -> NDArray[np.float64]:
+        """Values of the elastic stiffness on `pattern`."""
+        return self._scatter(slice(None), self._elastic_elements)
+
+    def tangent_data(self, response: Response) -> NDArray[np.float64]:
+        """Return the values of the consistent tangent on `pattern`.
+
+        Only elements with a yielding point are integrated; the rest keep their elastic matrix.
+        """
+        shape = self.weights.shape
+        elements = np.flatnonzero(response.yielding.reshape(shape).any(axis=1))
+        if len(elements) == 0:
+            return self.elastic_data
+        tangent = response.tangent.reshape(4, 4, *shape)[:, :, elements].transpose(2, 3, 0, 1)
+        change = self._element_stiffness(elements, tangent) - self._elastic_elements[elements]
+        return self.elastic_data + self._scatter(elements, change)

@@ -1,0 +1,82 @@
+"""Material = linear elasticity + von Mises yield stress + linear hardening."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from solver.errors import ModelError
+
+Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """An isotropic elastic, linearly hardening von Mises material.
+
+    Attributes
+    ----------
+    youngs_modulus : E [MPa]
+    poisson_ratio : nu, 0 <= nu < 0.5
+    yield_stress : uniaxial yield stress [MPa]; ``inf`` (default) means elastic
+    hardening : ``none``, ``isotropic``, ``kinematic`` (Prager) or ``mixed``
+    hardening_ratio : Eu / E, slope of the uniaxial curve beyond yield over Young's modulus
+    isotropic_fraction : part of the plastic modulus that expands the yield surface when
+        ``hardening`` is ``mixed``; the rest moves it
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+    yield_stress: float = math.inf
+    hardening: Hardening = "none"
+    hardening_ratio: float = 0.0
+    isotropic_fraction: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0):
+            raise ModelError("youngs_modulus", self.youngs_modulus, "must be positive [MPa]")
+        if not 0 <= self.poisson_ratio < 0.5:
+            raise ModelError("poisson_ratio", self.poisson_ratio, "must be in [0, 0.5)")
+        if not self.yield_stress > 0:
+            raise ModelError("yield_stress", self.yield_stress, "must be positive [MPa]")
+        if self.hardening not in get_args(Hardening):
+            allowed = "must be one of " + ", ".join(get_args(Hardening))
+            raise ModelError("hardening", self.hardening, allowed)
+        if not 0 <= self.hardening_ratio < 1:
+            raise ModelError("hardening_ratio", self.hardening_ratio, "must be in [0, 1)")
+        if not 0 <= self.isotropic_fraction <= 1:
+            raise ModelError("isotropic_fraction", self.isotropic_fraction, "must be in [0, 1]")
+
+    @property
+    def elastic(self) -> bool:
+        """Whether the material can never yield."""
+        return math.isinf(self.yield_stress)
+
+    @property
+    def shear_modulus(self) -> float:
+        """G [MPa]."""
+        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K [MPa]."""
+        return self.youngs_modulus / (3 * (1 - 2 * self.poisson_ratio))
+
+    @property
+    def plastic_modulus(self) -> float:
+        """H = E Eu / (E - Eu): slope of stress over plastic strain in tension [MPa]."""
+        if self.hardening == "none":
+            return 0.0
+        return self.youngs_modulus * self.hardening_ratio / (1 - self.hardening_ratio)
+
+    @property
+    def isotropic_modulus(self) -> float:
+        """Part of the plastic modulus that expands the yield surface [MPa]."""
+        share = {"isotropic": 1.0, "mixed": self.isotropic_fraction}.get(self.hardening, 0.0)
+        return share * self.plastic_modulus
+
+    @property
+    def kinematic_modulus(self) -> float:
+        """Part of the plastic modulus that moves the yield surface [MPa]."""
+        return self.plastic_modulus - self.isotropic_modulus
