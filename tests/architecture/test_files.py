@@ -39,7 +39,7 @@ def test_a_file_holds_one_idea(package: str) -> None:
     assert not {str(m): n for m, n in lengths.items() if n > MAX_LINES}
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", ["solver", "studies"])
 def test_exported_names_exist_and_say_what_they_are(package: str) -> None:
     module = importlib.import_module(package)
     exported = {name: getattr(module, name) for name in module.__all__}

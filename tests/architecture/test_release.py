@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from pathlib import Path
 
 import pytest
 
@@ -42,7 +43,7 @@ def test_constraints_pin_every_dependency() -> None:
 
 
 @pytest.mark.parametrize("page", [p for p in tracked() if p.suffix == ".md"], ids=str)
-def test_make_targets_named_in_a_page_exist(page) -> None:
+def test_make_targets_named_in_a_page_exist(page: Path) -> None:
     targets = set(TARGET.findall((ROOT / "Makefile").read_text()))
     code = "\n".join(CODE.findall((ROOT / page).read_text()))
     named = set(re.findall(r"\bmake ([a-z]+)", code))
