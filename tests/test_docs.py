@@ -19,9 +19,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.architecture.sources import ROOT
+from tests.architecture.sources import PACKAGES, ROOT
 
-PAGES = [ROOT / "README.md", *sorted(ROOT.glob("s*/README.md"))]
+PAGES = [
+    page
+    for page in (ROOT / "README.md", *(ROOT / package / "README.md" for package in PACKAGES))
+    if page.is_file()
+]
 BLOCK = re.compile(
     r"(?P<skip><!-- no-test -->\n+)?^```(?P<language>python|console)\n(?P<text>.*?)^```",
     re.DOTALL | re.MULTILINE,
