@@ -1,0 +1,138 @@
+"""The catalogue: every run of a directory in one table that can be queried.
+
+The process that computes is the only writer. Readers, in other threads or processes, open
+their own short connections. The journal is SQLite's rollback journal: unlike the write-ahead
+log it needs no memory shared between machines, so the directory may lie on a network volume.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+_COLUMNS = (
+    "id", "scene", "status", "message", "parameters", "scalars", "path", "created",
+    "cpu_seconds", "solver_source",
+)  # fmt: skip
+_JSON = ("parameters", "scalars")
+_WAIT = 30.0
+"""Seconds a connection waits for another one's lock."""
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS runs (
+    id TEXT PRIMARY KEY, scene TEXT NOT NULL, status TEXT NOT NULL, message TEXT NOT NULL,
+    parameters TEXT NOT NULL, scalars TEXT NOT NULL, path TEXT NOT NULL, created TEXT NOT NULL,
+    cpu_seconds REAL, solver_source TEXT NOT NULL
+);
+CREATE INDEX IF NOT EXISTS runs_by_scene ON runs (scene, status);
+"""
+
+Row = dict[str, Any]
+
+
+class Catalogue:
+    """Rows of runs in an SQLite file.
+
+    Parameters
+    ----------
+    path : the file; it is made by the first write
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def run(self, run_id: str) -> Row | None:
+        """Return the row of one run, or None."""
+        rows = self._select("WHERE id = ?", [run_id])
+        return rows[0] if rows else None
+
+    def runs(
+        self,
+        scene: str | None = None,
+        status: str | None = None,
+        limit: int = 100,
+        offset: int = 0,
+        **parameters: Any,
+    ) -> tuple[list[Row], int]:
+        """Return one page of the runs that match, and how many match in all.
+
+        Parameters
+        ----------
+        scene, status : wanted values; None for any
+        limit, offset : the page, in order of creation
+        **parameters : wanted parameter values, such as ``friction=0.3``
+        """
+        conditions = {"scene = ?": scene, "status = ?": status}
+        clauses = [clause for clause, value in conditions.items() if value is not None]
+        values = [value for value in conditions.values() if value is not None]
+        for name, value in parameters.items():
+            clauses.append("json_extract(parameters, ?) = ?")
+            values += [f"$.{json.dumps(name)}", value]
+        where = f"WHERE {' AND '.join(clauses)}" if clauses else ""
+        with self._reading() as connection:
+            if connection is None:
+                return [], 0
+            (total,) = connection.execute(f"SELECT count(*) FROM runs {where}", values).fetchone()
+        page = self._select(f"{where} ORDER BY created, id LIMIT ? OFFSET ?", [*values, limit, offset])
+        return page, total
+
+    def rows(self, run_ids: Iterable[str]) -> dict[str, Row]:
+        """Return, by id, the rows of those of `run_ids` that are known."""
+        wanted = json.dumps(list(run_ids))
+        found = self._select("WHERE id IN (SELECT value FROM json_each(?))", [wanted])
+        return {row["id"]: row for row in found}
+
+    def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Insert or replace rows in one transaction."""
+        marks = ", ".join("?" for _ in _COLUMNS)
+        values = [[_stored(row, column) for column in _COLUMNS] for row in rows]
+        with self._writing() as connection:
+            connection.executemany(f"INSERT OR REPLACE INTO runs VALUES ({marks})", values)
+
+    def remove(self, run_ids: Iterable[str]) -> None:
+        """Forget runs."""
+        with self._writing() as connection:
+            connection.executemany("DELETE FROM runs WHERE id = ?", [[each] for each in run_ids])
+
+    def ids(self) -> set[str]:
+        """Return the ids of all runs."""
+        with self._reading() as connection:
+            if connection is None:
+                return set()
+            return {row[0] for row in connection.execute("SELECT id FROM runs")}
+
+    def _select(self, rest: str, values: list[Any]) -> list[Row]:
+        with self._reading() as connection:
+            if connection is None:
+                return []
+            found = connection.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs {rest}", values)
+            return [_row(row) for row in found]
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection | None]:
+        if not self.path.exists():
+            yield None
+            return
+        address = f"{self.path.resolve().as_uri()}?mode=ro"
+        with closing(sqlite3.connect(address, uri=True, timeout=_WAIT)) as connection:
+            yield connection
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with closing(sqlite3.connect(self.path, timeout=_WAIT)) as connection:
+            connection.executescript(_SCHEMA)
+            with connection:
+                yield connection
+
+
+def _stored(row: Mapping[str, Any], column: str) -> Any:
+    return json.dumps(row[column]) if column in _JSON else row[column]
+
+
+def _row(values: tuple[Any, ...]) -> Row:
+    row = dict(zip(_COLUMNS, values, strict=True))
+    return row | {column: json.loads(row[column]) for column in _JSON}

@@ -1,0 +1,215 @@
+"""The runs of a study laid side by side in one data set, written run by run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+
+from solver.scenes import SCENES, Scene
+from studies import dataset as layout
+from studies.design import Case
+from studies.store import Store, appearing
+from studies.study import Study
+
+SAME = 1e-9
+"""Relative difference below which two runs are taken to have the same grid."""
+
+
+def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
+    """Write the combined data set of `study` and return its path.
+
+    Sweep dimensions come first: the usual ones, then the other axes. Runs are matched by
+    *label* along labelled dimensions (``component``, ``stage``, ``body``), which get the union
+    of the labels. Along numeric dimensions (``x``, ``depth``) they are matched by label too
+    where all runs have the same grid. Where grids differ, as they do when a length is swept,
+    runs are matched by position, and the coordinate becomes a variable over the sweep, so that
+    ``x`` of each run stays with the run; shorter grids are filled up with NaN. Runs without a
+    record are NaN, and `status` says why.
+    """
+    scene = SCENES[study.scene]
+    target = store.dataset_path(study.id)
+    found = [case for case in cases if store.run_path(case.id).exists()]
+    frame = _Frame(axes=_axes(study, scene), usual=layout.usual_dimensions(scene))
+    for case in found:
+        with h5netcdf.File(store.run_path(case.id), "r") as run:
+            frame.learn(run)
+    attributes = layout.provenance(study.name, scene, study.fixed) | {"id": study.id}
+    with appearing(target) as part, h5netcdf.File(part, "w") as file:
+        file.attrs.update(attributes)
+        frame.create_axes(file, scene)
+        frame.create_fields(file)
+        for case in found:
+            with h5netcdf.File(store.run_path(case.id), "r") as run:
+                frame.place(file, run, frame.position(case))
+        frame.write_small(file)
+    return target
+
+
+def _axes(study: Study, scene: Scene) -> dict[str, list[Any]]:
+    """Return all sweep dimensions; a usual one that is not swept has its single value."""
+    values = next(study.cases()).values
+    usual = {name: [values[name]] for name in layout.usual_dimensions(scene)}
+    return usual | study.axes
+
+
+@dataclass(slots=True, kw_only=True)
+class _Frame:
+    """Shape of the combined data set, learnt from the runs, and what is small enough to hold.
+
+    Attributes
+    ----------
+    axes, usual : all sweep dimensions with their values; those that every run has
+    labels : labelled dimension -> union of the labels
+    grids, sizes : numeric dimension -> the first grid found; the longest one's length
+    ragged : numeric dimensions whose grid differs from run to run
+    fields : variable -> (dimensions after the sweep's, attributes)
+    small : variable -> its values over the sweep: scalars, flags, grids that differ
+    """
+
+    axes: Mapping[str, Sequence[Any]]
+    usual: Sequence[str]
+    labels: dict[str, list[str]] = field(default_factory=dict)
+    grids: dict[str, np.ndarray] = field(default_factory=dict)
+    sizes: dict[str, int] = field(default_factory=dict)
+    ragged: set[str] = field(default_factory=set)
+    fields: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = field(default_factory=dict)
+    small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values on each sweep dimension."""
+        return tuple(len(values) for values in self.axes.values())
+
+    def position(self, case: Case) -> tuple[int, ...]:
+        """Return where a case lies on the sweep dimensions."""
+        return tuple(values.index(case.values[name]) for name, values in self.axes.items())
+
+    def learn(self, run: h5netcdf.File) -> None:
+        """Take in the grids and variables of one run."""
+        for name, variable in run.variables.items():
+            if name in self.usual:
+                continue
+            inner = variable.dimensions[len(self.usual) :]
+            if variable.dimensions == (name,):
+                self._learn_coordinate(name, variable[...])
+            elif inner:
+                self.fields.setdefault(name, (inner, _attributes(variable)))
+            elif name not in self.small:
+                empty = np.full(self.shape, _absent(name, variable.dtype), dtype=variable.dtype)
+                self.small[name] = (empty, _attributes(variable))
+
+    def _learn_coordinate(self, name: str, values: np.ndarray) -> None:
+        if values.dtype.kind not in "fi":
+            known = self.labels.setdefault(name, [])
+            known.extend(label for label in values if label not in known)
+            return
+        first = self.grids.setdefault(name, values)
+        self.sizes[name] = max(self.sizes.get(name, 0), len(values))
+        if len(first) != len(values) or not np.allclose(
+            first, values, rtol=0.0, atol=SAME * np.abs(first).max(initial=0.0)
+        ):
+            self.ragged.add(name)
+
+    def create_axes(self, file: h5netcdf.File, scene: Scene) -> None:
+        """Make the dimensions and their coordinates."""
+        lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
+        file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
+        for name, values in self.axes.items():
+            _write(file, name, (name,), _axis_array(values), layout.axis_attributes(scene, name))
+        for name, labels in self.labels.items():
+            values = np.array(labels, dtype=object)
+            _write(file, name, (name,), values, layout.attributes_of(name))
+        for name, grid in self.grids.items():
+            if name not in self.ragged:
+                _write(file, name, (name,), grid, layout.attributes_of(name))
+                continue
+            by_run = np.full((*self.shape, self.sizes[name]), np.nan)
+            self.small[name] = (by_run, layout.attributes_of(name))
+
+    def create_fields(self, file: h5netcdf.File) -> None:
+        """Make the variables that are written run by run: one compressed chunk a run."""
+        for name, (inner, attributes) in self.fields.items():
+            variable = file.create_variable(
+                name,
+                (*self.axes, *inner),
+                dtype="f8",
+                fillvalue=np.nan,
+                chunks=(*(1,) * len(self.axes), *self._inner_shape(inner)),
+                compression="gzip",
+                compression_opts=1,
+                shuffle=True,
+            )
+            variable.attrs.update(attributes)
+
+    def place(self, file: h5netcdf.File, run: h5netcdf.File, at: tuple[int, ...]) -> None:
+        """Put the values of one run in their place."""
+        for name, variable in run.variables.items():
+            if name in self.fields:
+                inner, _ = self.fields[name]
+                whole = np.full(self._inner_shape(inner), np.nan)
+                values = variable[...].reshape(variable.shape[len(self.usual) :])
+                whole[np.ix_(*(self._places(run, dimension) for dimension in inner))] = values
+                file.variables[name][at] = whole
+            elif name in self.ragged:
+                self.small[name][0][at][: variable.size] = variable[...]
+            elif name in self.small:
+                self.small[name][0][at] = variable[...].item()
+
+    def write_small(self, file: h5netcdf.File) -> None:
+        """Write what was held in memory: scalars, flags, grids that differ."""
+        for name, (values, attributes) in self.small.items():
+            inner = (name,) if name in self.ragged else ()
+            _write(file, name, (*self.axes, *inner), values, attributes)
+
+    def _inner_shape(self, inner: Sequence[str]) -> tuple[int, ...]:
+        return tuple(self.sizes.get(name) or len(self.labels[name]) for name in inner)
+
+    def _places(self, run: h5netcdf.File, dimension: str) -> list[int]:
+        """Return where a run's points along a dimension lie in the combined one."""
+        if dimension in self.labels:
+            return [self.labels[dimension].index(each) for each in run.variables[dimension][...]]
+        return list(range(run.dimensions[dimension].size))
+
+
+def _write(
+    file: h5netcdf.File,
+    name: str,
+    dimensions: Sequence[str],
+    values: np.ndarray,
+    attributes: Mapping[str, Any],
+) -> None:
+    text = values.dtype.kind == "O"
+    variable = file.create_variable(
+        name,
+        tuple(dimensions),
+        dtype=h5py.string_dtype() if text else values.dtype,
+        fillvalue=None if text or name == "status" else _absent(name, values.dtype),
+    )
+    variable[...] = values
+    variable.attrs.update(attributes)
+
+
+def _absent(name: str, kind: np.dtype[Any]) -> Any:
+    """Return what stands for a run that has not given this variable."""
+    if name == "status":
+        return layout.STATUSES.index(layout.MISSING)
+    return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
+
+
+def _attributes(variable: h5netcdf.Variable) -> dict[str, Any]:
+    return {name: value for name, value in variable.attrs.items() if name != "_FillValue"}
+
+
+def _axis_array(values: Sequence[Any]) -> np.ndarray:
+    """Return numbers as numbers and anything else as text."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.asarray(values)
+    texts = [value if isinstance(value, str) else json.dumps(value) for value in values]
+    return np.array(texts, dtype=object)

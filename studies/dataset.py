@@ -1,0 +1,244 @@
+"""One run as a labelled data set: names, units, flags and provenance in CF terms."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import json
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import solver
+from solver.record import Record, Status
+from solver.scenes import Scene
+from studies.design import USUAL_AXES, Case
+from studies.identity import solver_hash
+from studies.parameters import parameters_of
+
+STATUSES = (*(status.name.lower() for status in Status), "error", "missing")
+"""Outcomes by flag value: the solver's, then a run that broke, then one not computed."""
+
+OK = STATUSES[Status.OK.code]
+ERROR = "error"
+MISSING = "missing"
+
+INTEGER_FILL = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What a variable means; `count` marks whole numbers."""
+
+    long_name: str
+    units: str = "1"
+    standard_name: str = ""
+    count: bool = False
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """CF attributes."""
+        given = {
+            "long_name": self.long_name, "units": self.units, "standard_name": self.standard_name
+        }
+        return {key: value for key, value in given.items() if value}
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "x": Quantity("distance along the surface from the centre of the contact", "mm"),
+    "y": Quantity("height above the surface", "mm"),
+    "depth": Quantity("depth below the surface", "mm", "depth"),
+    "station": Quantity("position of a depth profile along the surface", "mm"),
+    "s": Quantity("distance along the contact surface from its centre", "mm"),
+    "residual_stress": Quantity("residual stress", "MPa"),
+    "residual_mises": Quantity("von Mises stress of the residual stress", "MPa"),
+    "plastic_strain": Quantity("equivalent plastic strain"),
+    "mises_loaded": Quantity("von Mises stress under load", "MPa"),
+    "residual_profile": Quantity("residual stress along depth", "MPa"),
+    "plastic_strain_profile": Quantity("equivalent plastic strain along depth"),
+    "surface_residual": Quantity("residual stress at the contact surface", "MPa"),
+    "contact_pressure": Quantity("contact pressure", "MPa"),
+    "contact_shear": Quantity("contact shear traction", "MPa"),
+    "contact_gap": Quantity("gap between the contact surfaces", "mm"),
+    "contact_half_width": Quantity("half-width of the contact under load", "mm"),
+    "max_plastic_strain": Quantity("largest equivalent plastic strain"),
+    "depth_of_max_plastic_strain": Quantity("depth of the largest plastic strain", "mm"),
+    "peak_residual_tension": Quantity("largest residual tension", "MPa"),
+    "peak_residual_compression": Quantity("largest residual compression", "MPa"),
+    "increments": Quantity("load increments", count=True),
+    "cut_increments": Quantity("load increments that were cut", count=True),
+    "iterations": Quantity("Newton iterations", count=True),
+    "median_iterations": Quantity("median Newton iterations an increment"),
+    "cpu_seconds": Quantity("processor time", "s"),
+    "degrees_of_freedom": Quantity("degrees of freedom", count=True),
+}
+
+COORDINATE_ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
+    "x": {"axis": "X"},
+    "y": {"axis": "Y"},
+    "depth": {"positive": "down"},
+    "component": {"long_name": "component of the stress tensor"},
+    "stage": {"long_name": "stage of loading"},
+    "body": {"long_name": "body"},
+}
+
+
+def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
+    """Return the CF attributes of a sweep axis, from the scene's own description."""
+    known = parameters_of(scene.parameters)[axis]
+    given = {"long_name": known.description, "units": known.unit}
+    return {key: value for key, value in given.items() if value}
+
+
+def attributes_of(name: str) -> dict[str, str]:
+    """Return the CF attributes of a variable or coordinate; unknown ones are named in words."""
+    quantity = QUANTITIES.get(name)
+    known = quantity.attributes if quantity else {"long_name": name.replace("_", " ")}
+    return known | dict(COORDINATE_ATTRIBUTES.get(name, {}))
+
+
+def status_attributes() -> dict[str, Any]:
+    """Return the CF attributes of the status flag."""
+    return {
+        "long_name": "outcome of the run",
+        "standard_name": "status_flag",
+        "flag_values": np.arange(len(STATUSES), dtype=np.int8),
+        "flag_meanings": " ".join(STATUSES),
+    }
+
+
+def usual_dimensions(scene: Scene) -> tuple[str, ...]:
+    """Return the sweep dimensions every run of the scene has."""
+    known = parameters_of(scene.parameters)
+    return tuple(name for name in USUAL_AXES if name in known)
+
+
+def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
+    """Return the data set of a run; it does not depend on the study that asked for it."""
+    sweep = usual_dimensions(scene)
+    ones = (1,) * len(sweep)
+    status = STATUSES[record.status.code]
+    dataset = _frame(scene, case, sweep, status, record.message)
+    for name, labels in record.coordinates.items():
+        dataset[name] = (name, np.asarray(labels), attributes_of(name))
+    for name, (dimensions, values) in record.fields.items():
+        if unnamed := set(dimensions) - set(record.coordinates):
+            raise ValueError(f"{name} has dimensions without coordinates: {sorted(unnamed)}")
+        array = np.asarray(values, dtype=float)
+        dataset[name] = ((*sweep, *dimensions), array.reshape(*ones, *array.shape))
+    for name, number in record.scalars.items():
+        dataset[name] = (sweep, _scalar(name, number).reshape(ones))
+    for name in (*record.fields, *record.scalars):
+        dataset[name].attrs.update(attributes_of(name))
+    return dataset
+
+
+def broken_dataset(scene: Scene, case: Case, message: str) -> xr.Dataset:
+    """Return the data set of a run that gave no record: status and message only."""
+    return _frame(scene, case, usual_dimensions(scene), ERROR, message)
+
+
+def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Return how to store each variable: compressed numbers, a fill value for counts."""
+    packed = {"zlib": True, "complevel": 1, "shuffle": True}
+    chosen: dict[str, dict[str, Any]] = {}
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind == "f":
+            fill = {} if name in dataset.coords else {"_FillValue": np.nan}
+            chosen[str(name)] = {**packed, **fill} if variable.ndim else fill
+        elif variable.dtype.kind == "i" and name != "status":
+            chosen[str(name)] = {"_FillValue": np.int32(INTEGER_FILL)}
+    return chosen
+
+
+def summary(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return what the catalogue keeps of a run: identity, outcome, parameters and figures."""
+    scalars = {
+        str(name): _plain(variable.item())
+        for name, variable in dataset.data_vars.items()
+        if variable.size == 1 and name not in {"status", "message"}
+    }
+    return {
+        "id": dataset.attrs["id"],
+        "scene": dataset.attrs["scene"],
+        "status": STATUSES[int(dataset["status"].item())],
+        "message": str(dataset["message"].item()),
+        "parameters": json.loads(dataset.attrs["parameters"]),
+        "scalars": scalars,
+        "created": dataset.attrs["created"],
+        "cpu_seconds": scalars.get("cpu_seconds"),
+        "solver_source": dataset.attrs["solver_source"],
+    }
+
+
+def provenance(title: str, scene: Scene, parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Return the global attributes: what this is, from which parameters, made by what, when."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "scene": scene.name,
+        "parameters": json.dumps(parameters),
+        "source": f"Residua {solver.__version__}",
+        "solver_source": solver_hash(),
+        "versions": json.dumps(_versions()),
+        **_commit(),
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _frame(
+    scene: Scene, case: Case, sweep: tuple[str, ...], status: str, message: str
+) -> xr.Dataset:
+    """Return a data set with everything but what the solver computed."""
+    ones = (1,) * len(sweep)
+    flag = np.full(ones, STATUSES.index(status), dtype=np.int8)
+    text = np.full(ones, message, dtype=object)
+    title = f"{scene.name}: {scene.summary}"
+    return xr.Dataset(
+        {
+            "status": (sweep, flag, status_attributes()),
+            "message": (sweep, text, {"long_name": "reason of the outcome"}),
+        },
+        coords={
+            name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep
+        },
+        attrs=provenance(title, scene, case.values) | {"id": case.id},
+    )
+
+
+def _scalar(name: str, number: float) -> np.ndarray:
+    count = name in QUANTITIES and QUANTITIES[name].count
+    if count and np.isfinite(number):
+        return np.asarray(number, dtype=np.int32)
+    return np.asarray(INTEGER_FILL, dtype=np.int32) if count else np.asarray(number, dtype=float)
+
+
+def _plain(number: Any) -> float | int | None:
+    return number if np.isfinite(number) else None
+
+
+@cache
+def _versions() -> dict[str, str]:
+    names = ("numpy", "scipy", "scikit-fem", "xarray")
+    return {"solver": solver.__version__} | {name: importlib.metadata.version(name) for name in names}
+
+
+@cache
+def _commit() -> dict[str, str]:
+    """Return the commit of the solver's own working tree, or nothing where it is not under git."""
+    root = Path(solver.__file__).parent
+    try:
+        for command in (
+            ["git", "-C", str(root), "ls-files", "--error-unmatch", "__init__.py"],
+            ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"],
+        ):
+            answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
+    except (OSError, subprocess.SubprocessError):
+        return {}
+    return {"commit": answer.stdout.strip()}

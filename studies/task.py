@@ -1,0 +1,82 @@
+"""What a worker does: walk one loading path, and write each run as soon as it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from solver.scenes import Scene
+from studies import dataset as layout
+from studies.design import Case, Path
+from studies.identity import solver_hash
+from studies.store import Store
+
+NO_RECORD = "the path ended without a record of this run"
+
+
+@dataclass(frozen=True, slots=True)
+class PathTask:
+    """A path to walk, or what is left of it, and where its runs go.
+
+    ``source`` is the solver the caller has; a worker with another one refuses the task.
+    """
+
+    scene: Scene
+    path: Path
+    directory: FilePath
+    source: str
+
+
+class Stopped(Exception):
+    """Raised inside a path to leave it, because the study was asked to stop."""
+
+
+def walk(
+    task: PathTask, report: Callable[[dict[str, Any]], None], stopped: Callable[[], bool]
+) -> list[dict[str, Any]]:
+    """Compute the runs of a path, and return their catalogue rows.
+
+    A run that is already there in full is left alone: a worker that took the path over from a
+    dead one continues where that stopped. When the path raises, the runs it still owed are
+    written as broken, with the reason.
+    """
+    if task.source != solver_hash():
+        raise RuntimeError("the worker has another version of the solver than the caller")
+    store = Store(task.directory)
+    rows: list[dict[str, Any]] = []
+
+    def keep(row: dict[str, Any]) -> None:
+        rows.append(row)
+        report({"path": task.path.id, "row": row})
+
+    def monitor(fraction: float, text: str) -> None:
+        report({"path": task.path.id, "fraction": float(fraction), "text": text})
+        if stopped():
+            raise Stopped
+
+    owed: dict[Any, Case] = {}
+    for case in task.path.cases:
+        if store.run_path(case.id).exists() and _is_ok(row := store.read_row(case.id)):
+            keep(row)
+        else:
+            owed[case.values[task.scene.branch]] = case
+    reason = NO_RECORD
+    try:
+        if owed:
+            monitor(0.0, "")
+            for record in task.scene.path(task.path.parameters, list(owed), monitor):
+                case = owed.pop(getattr(record.parameters, task.scene.branch))
+                keep(store.write_run(layout.run_dataset(task.scene, case, record)))
+    except Stopped:
+        return rows
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+    for case in owed.values():
+        keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
+    return rows
+
+
+def _is_ok(row: dict[str, Any]) -> bool:
+    return bool(row["status"] == layout.OK)

@@ -1,0 +1,140 @@
+"""A scene that costs nothing, to test what is done with scenes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from annotated_types import Gt, Interval, Unit
+
+from solver.errors import ModelError
+from solver.record import Record, Status
+from solver.scenes import SCENES, Monitor, Scene
+
+INCREMENTS = 10
+COMPONENTS = ["xx", "yy", "zz", "xy"]
+
+
+def described(default: Any, description: str) -> Any:
+    return field(default=default, metadata={"description": description})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FakeParameters:
+    load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(0.5, "load")
+    friction: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(0.0, "friction")
+    hardening: Literal["none", "isotropic"] = described("none", "hardening rule")
+    half_width: Annotated[float, Gt(0.0), Unit("mm")] = described(50.0, "half-width")
+    points: Annotated[int, Interval(ge=2, le=400)] = described(5, "points of the map")
+    seconds: Annotated[float, Interval(ge=0.0), Unit("s")] = described(0.0, "duration of a path")
+    state: Literal["plane_strain", "plane_stress"] = described("plane_stress", "out of plane")
+    trouble: Literal["none", "limit", "raise", "short", "die", "die_once", "bare"] = described(
+        "none", "what goes wrong at load_ratio 0.8 and above"
+    )
+    mark: str = described("", "directory that counts how often a path was begun")
+
+    def __post_init__(self) -> None:
+        if self.state == "plane_strain" and self.friction > 0.9:
+            raise ModelError("friction", self.friction, "at most 0.9 in plane strain")
+
+
+def path(
+    parameters: FakeParameters, values: Sequence[float], monitor: Monitor
+) -> Iterator[Record]:
+    """Yield a record for each load ratio, after some increments."""
+    if parameters.mark:
+        name = f"{parameters.friction}-{time.time_ns()}-{os.getpid()}"
+        (Path(parameters.mark) / name).write_text(" ".join(map(str, values)))
+    for number, load_ratio in enumerate(values):
+        run = replace(parameters, load_ratio=load_ratio)
+        for step in range(INCREMENTS):
+            time.sleep(parameters.seconds / INCREMENTS / len(values))
+            done = (number + (step + 1) / INCREMENTS) / len(values)
+            monitor(done, f"load ratio {load_ratio}, increment {step + 1}")
+        if load_ratio >= 0.8 and parameters.trouble != "none":
+            if parameters.trouble == "short":
+                return
+            yield troubled(run)
+        else:
+            yield record(run)
+
+
+def troubled(run: FakeParameters) -> Record:
+    """Return, or do, what goes wrong."""
+    if run.trouble == "raise":
+        raise ZeroDivisionError("the stiffness is gone")
+    if run.trouble == "die" or (run.trouble == "die_once" and first_time(run)):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if run.trouble == "limit":
+        known = {"x": record(run).coordinates["x"]}
+        return Record(
+            parameters=run, status=Status.LIMIT_LOAD, message="flows at 0.75", coordinates=known
+        )
+    if run.trouble == "bare":
+        return Record(parameters=run, status=Status.NOT_CONVERGED, message="increment 3")
+    return record(run)
+
+
+def first_time(run: FakeParameters) -> bool:
+    """Tell whether no process died here before."""
+    try:
+        (Path(run.mark) / "died").touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True
+
+
+def record(run: FakeParameters) -> Record:
+    """Return the record of one run: smooth fields of the right shape."""
+    a = run.half_width
+    x = np.linspace(0.0, 2.0 * a, run.points)
+    y = np.linspace(-a, a, run.points + 1)
+    s = np.linspace(0.0, a, run.points)
+    components = COMPONENTS if run.state == "plane_strain" else ["xx", "yy", "xy"]
+    size = 100.0 * run.load_ratio * (1.0 + run.friction)
+    stress = np.array(
+        [
+            size * (k + 1) * np.sin(np.pi * x[None, :] / a) * np.exp(-np.abs(y[:, None]) / a)
+            for k, _ in enumerate(components)
+        ]
+    )
+    stress[:, y > 0.0, -1] = np.nan
+    return Record(
+        parameters=run,
+        status=Status.OK,
+        coordinates={
+            "x": x,
+            "y": y,
+            "s": s,
+            "component": np.array(components),
+            "stage": np.array(["loaded", "unloaded"]),
+            "body": np.array(["punch", "half_plane"]),
+        },
+        fields={
+            "residual_stress": (("component", "y", "x"), stress),
+            "plastic_strain": (("y", "x"), np.abs(stress[0]) * 1e-5),
+            "contact_pressure": (("stage", "s"), np.array([size + s, 0.0 * s])),
+        },
+        scalars={
+            "peak_residual_tension": float(np.nanmax(stress)),
+            "increments": float(INCREMENTS),
+            "cpu_seconds": run.seconds,
+            "audit_balance": 1e-12,
+        },
+    )
+
+
+FAKE = Scene(
+    name="fake",
+    summary="a scene that costs nothing",
+    parameters=FakeParameters,
+    branch="load_ratio",
+    path=path,
+)
+SCENES[FAKE.name] = FAKE
