@@ -38,7 +38,7 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
     found = [case for case in cases if store.run_path(case.id).exists()]
     frame = _Frame(axes=_axes(study, scene), usual=layout.usual_dimensions(scene))
     for case in found:
-        with h5netcdf.File(store.run_path(case.id), "r") as run:
+        with h5py.File(store.run_path(case.id), "r") as run:
             frame.learn(run)
     attributes = layout.provenance(study.name, scene, study.fixed) | {"id": study.id}
     with appearing(target) as part, h5netcdf.File(part, "w") as file:
@@ -46,7 +46,7 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
         frame.create_axes(file, scene)
         frame.create_fields(file)
         for case in found:
-            with h5netcdf.File(store.run_path(case.id), "r") as run:
+            with h5py.File(store.run_path(case.id), "r") as run:
                 frame.place(file, run, frame.position(case))
         frame.write_small(file)
     return target
@@ -79,7 +79,7 @@ class _Frame:
     grids: dict[str, np.ndarray] = field(default_factory=dict)
     sizes: dict[str, int] = field(default_factory=dict)
     ragged: set[str] = field(default_factory=set)
-    fields: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = field(default_factory=dict)
+    fields: dict[str, tuple[list[str], dict[str, Any]]] = field(default_factory=dict)
     small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
 
     @property
@@ -91,19 +91,18 @@ class _Frame:
         """Return where a case lies on the sweep dimensions."""
         return tuple(values.index(case.values[name]) for name, values in self.axes.items())
 
-    def learn(self, run: h5netcdf.File) -> None:
+    def learn(self, run: h5py.File) -> None:
         """Take in the grids and variables of one run."""
-        for name, variable in run.variables.items():
-            if name in self.usual:
+        for name, variable in run.items():
+            if name in self.usual or name in self.fields or name in self.small:
                 continue
-            inner = variable.dimensions[len(self.usual) :]
-            if variable.dimensions == (name,):
-                self._learn_coordinate(name, variable[...])
-            elif inner:
-                self.fields.setdefault(name, (inner, _attributes(variable)))
-            elif name not in self.small:
+            if variable.is_scale:
+                self._learn_coordinate(name, _values(variable))
+            elif inner := [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]:
+                self.fields[name] = (inner, layout.attributes_of(name))
+            else:
                 empty = np.full(self.shape, _absent(name, variable.dtype), dtype=variable.dtype)
-                self.small[name] = (empty, _attributes(variable))
+                self.small[name] = (empty, layout.attributes_of(name))
 
     def _learn_coordinate(self, name: str, values: np.ndarray) -> None:
         if values.dtype.kind not in "fi":
@@ -148,19 +147,19 @@ class _Frame:
             )
             variable.attrs.update(attributes)
 
-    def place(self, file: h5netcdf.File, run: h5netcdf.File, at: tuple[int, ...]) -> None:
+    def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Put the values of one run in their place."""
-        for name, variable in run.variables.items():
+        for name, variable in run.items():
             if name in self.fields:
                 inner, _ = self.fields[name]
                 whole = np.full(self._inner_shape(inner), np.nan)
-                values = variable[...].reshape(variable.shape[len(self.usual) :])
+                values = _values(variable).reshape(variable.shape[len(self.usual) :])
                 whole[np.ix_(*(self._places(run, dimension) for dimension in inner))] = values
                 file.variables[name][at] = whole
             elif name in self.ragged:
-                self.small[name][0][at][: variable.size] = variable[...]
+                self.small[name][0][at][: len(variable)] = _values(variable)
             elif name in self.small:
-                self.small[name][0][at] = variable[...].item()
+                self.small[name][0][at] = _values(variable).item()
 
     def write_small(self, file: h5netcdf.File) -> None:
         """Write what was held in memory: scalars, flags, grids that differ."""
@@ -171,11 +170,16 @@ class _Frame:
     def _inner_shape(self, inner: Sequence[str]) -> tuple[int, ...]:
         return tuple(self.sizes.get(name) or len(self.labels[name]) for name in inner)
 
-    def _places(self, run: h5netcdf.File, dimension: str) -> list[int]:
+    def _places(self, run: h5py.File, dimension: str) -> list[int]:
         """Return where a run's points along a dimension lie in the combined one."""
         if dimension in self.labels:
-            return [self.labels[dimension].index(each) for each in run.variables[dimension][...]]
-        return list(range(run.dimensions[dimension].size))
+            return [self.labels[dimension].index(label) for label in _values(run[dimension])]
+        return list(range(len(run[dimension])))
+
+
+def _values(variable: h5py.Dataset) -> np.ndarray:
+    """Return all values; texts as str."""
+    return variable.asstr()[...] if variable.dtype.kind == "O" else variable[...]
 
 
 def _write(
@@ -186,11 +190,12 @@ def _write(
     attributes: Mapping[str, Any],
 ) -> None:
     text = values.dtype.kind == "O"
+    complete = name == "status" or tuple(dimensions) == (name,)
     variable = file.create_variable(
         name,
         tuple(dimensions),
         dtype=h5py.string_dtype() if text else values.dtype,
-        fillvalue=None if text or name == "status" else _absent(name, values.dtype),
+        fillvalue=None if text or complete else _absent(name, values.dtype),
     )
     variable[...] = values
     variable.attrs.update(attributes)
@@ -201,10 +206,6 @@ def _absent(name: str, kind: np.dtype[Any]) -> Any:
     if name == "status":
         return layout.STATUSES.index(layout.MISSING)
     return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
-
-
-def _attributes(variable: h5netcdf.Variable) -> dict[str, Any]:
-    return {name: value for name, value in variable.attrs.items() if name != "_FillValue"}
 
 
 def _axis_array(values: Sequence[Any]) -> np.ndarray:

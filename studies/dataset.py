@@ -79,7 +79,14 @@ QUANTITIES: Mapping[str, Quantity] = {
     "degrees_of_freedom": Quantity("degrees of freedom", count=True),
 }
 
-COORDINATE_ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
+LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
+    "status": {
+        "long_name": "outcome of the run",
+        "standard_name": "status_flag",
+        "flag_values": np.arange(len(STATUSES), dtype=np.int8),
+        "flag_meanings": " ".join(STATUSES),
+    },
+    "message": {"long_name": "reason of the outcome"},
     "x": {"axis": "X"},
     "y": {"axis": "Y"},
     "depth": {"positive": "down"},
@@ -100,17 +107,7 @@ def attributes_of(name: str) -> dict[str, str]:
     """Return the CF attributes of a variable or coordinate; unknown ones are named in words."""
     quantity = QUANTITIES.get(name)
     known = quantity.attributes if quantity else {"long_name": name.replace("_", " ")}
-    return known | dict(COORDINATE_ATTRIBUTES.get(name, {}))
-
-
-def status_attributes() -> dict[str, Any]:
-    """Return the CF attributes of the status flag."""
-    return {
-        "long_name": "outcome of the run",
-        "standard_name": "status_flag",
-        "flag_values": np.arange(len(STATUSES), dtype=np.int8),
-        "flag_meanings": " ".join(STATUSES),
-    }
+    return known | dict(LABEL_ATTRIBUTES.get(name, {}))
 
 
 def usual_dimensions(scene: Scene) -> tuple[str, ...]:
@@ -157,23 +154,36 @@ def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     return chosen
 
 
-def summary(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the catalogue keeps of a run: identity, outcome, parameters and figures."""
+def singles(run: xr.Dataset) -> dict[str, Any]:
+    """Return the variables of a run that have one value."""
+    rank = run["status"].ndim
+    return {str(name): each.item() for name, each in run.data_vars.items() if each.ndim == rank}
+
+
+def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the catalogue keeps of a run: identity, outcome, parameters and figures.
+
+    Parameters
+    ----------
+    attributes : global attributes of the run's data set
+    values : its variables that have one value
+    """
     scalars = {
-        str(name): _plain(variable.item())
-        for name, variable in dataset.data_vars.items()
-        if variable.size == 1 and name not in {"status", "message"}
+        name: _plain(name, value)
+        for name, value in values.items()
+        if name not in {"status", "message"}
     }
     return {
-        "id": dataset.attrs["id"],
-        "scene": dataset.attrs["scene"],
-        "status": STATUSES[int(dataset["status"].item())],
-        "message": str(dataset["message"].item()),
-        "parameters": json.loads(dataset.attrs["parameters"]),
+        "id": attributes["id"],
+        "scene": attributes["scene"],
+        "status": STATUSES[values["status"]],
+        "message": values["message"],
+        "parameters": json.loads(attributes["parameters"]),
         "scalars": scalars,
-        "created": dataset.attrs["created"],
+        "path": f"runs/{attributes['id']}.nc",
+        "created": attributes["created"],
         "cpu_seconds": scalars.get("cpu_seconds"),
-        "solver_source": dataset.attrs["solver_source"],
+        "solver_source": attributes["solver_source"],
     }
 
 
@@ -202,8 +212,8 @@ def _frame(
     title = f"{scene.name}: {scene.summary}"
     return xr.Dataset(
         {
-            "status": (sweep, flag, status_attributes()),
-            "message": (sweep, text, {"long_name": "reason of the outcome"}),
+            "status": (sweep, flag, attributes_of("status")),
+            "message": (sweep, text, attributes_of("message")),
         },
         coords={
             name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep
@@ -212,15 +222,20 @@ def _frame(
     )
 
 
+def _is_count(name: str) -> bool:
+    return name in QUANTITIES and QUANTITIES[name].count
+
+
 def _scalar(name: str, number: float) -> np.ndarray:
-    count = name in QUANTITIES and QUANTITIES[name].count
-    if count and np.isfinite(number):
-        return np.asarray(number, dtype=np.int32)
-    return np.asarray(INTEGER_FILL, dtype=np.int32) if count else np.asarray(number, dtype=float)
+    if _is_count(name):
+        return np.asarray(number if np.isfinite(number) else INTEGER_FILL, dtype=np.int32)
+    return np.asarray(number, dtype=float)
 
 
-def _plain(number: Any) -> float | int | None:
-    return number if np.isfinite(number) else None
+def _plain(name: str, number: float) -> float | None:
+    """Return a number as JSON has it: None for one that is absent."""
+    absent = number == INTEGER_FILL if _is_count(name) else not np.isfinite(number)
+    return None if absent else number
 
 
 @cache

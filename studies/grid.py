@@ -79,7 +79,7 @@ class Grid:
                         threads_per_worker=1,
                         processes=True,
                         host="127.0.0.1",
-                        dashboard_address=None,
+                        dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                         local_directory=scratch,
                         silence_logs=logging.CRITICAL,
                     )
