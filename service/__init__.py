@@ -1,0 +1,1 @@
+"""Studies over HTTP: submit, watch, and fetch what they found."""

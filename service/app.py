@@ -1,0 +1,97 @@
+"""The application and the command that serves it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import uvicorn
+from fastapi import FastAPI
+from pydantic import ValidationError
+
+import solver
+from service import errors, routes
+from service.jobs import Jobs
+from service.limits import BodyLimit
+from service.lock import DirectoryInUse, lock_directory
+from service.runner import Runner
+from service.settings import Settings
+from studies import Store
+
+DESCRIPTION = """Elastic-plastic contact studies: post one, watch it, fetch its data set.
+
+A study has a content id: the same study posted twice is the same study."""
+
+OPEN_STREAMS_SECONDS = 2
+"""Time that open event streams are given when the service stops."""
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """Return the application, owner of the data directory until it has been shut down.
+
+    Raises
+    ------
+    DirectoryInUse
+        If another service works in the data directory.
+    """
+    lock = lock_directory(settings.data, settings.lock_seconds)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        try:
+            async with app.state.runner.working():
+                yield
+        finally:
+            os.close(lock)
+
+    app = FastAPI(
+        title="Residua", version=solver.__version__, description=DESCRIPTION, lifespan=lifespan
+    )
+    app.state.settings = settings
+    app.state.store = Store(settings.data)
+    app.state.jobs = Jobs(settings.data / "jobs.sqlite")
+    app.state.runner = Runner(settings, app.state.jobs, lock)
+    app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    errors.install(app)
+    for router in routes.ROUTERS:
+        app.include_router(router)
+    return app
+
+
+def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) -> None:
+    """Serve until a signal comes; a study that is running then resumes at the next start.
+
+    Parameters
+    ----------
+    host, port : where to listen
+    data : directory of runs, studies and the queue
+    scheduler : address of a dask scheduler; without one each study starts its own workers
+    """
+    given: dict[str, Any] = {} if scheduler is None else {"scheduler": scheduler}
+    try:
+        app = create_app(Settings(data=Path(data), **given))
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = f"RESIDUA_{first['loc'][0]}".upper()
+        refuse(f"{name} = {first['input']!r}: {first['msg']}")
+    except DirectoryInUse as error:
+        refuse(str(error))
+    except OSError as error:
+        refuse(f"data = {str(data)!r}: must be a directory to write in ({error.strerror})")
+    uvicorn.run(
+        app,
+        host=host,
+        port=port,
+        timeout_graceful_shutdown=OPEN_STREAMS_SECONDS,
+        server_header=False,
+    )
+
+
+def refuse(reason: str) -> NoReturn:
+    """End with one line on the error output and the exit status of bad input."""
+    print(f"residua serve: {reason}", file=sys.stderr)
+    raise SystemExit(2)

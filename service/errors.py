@@ -1,0 +1,160 @@
+"""Every error leaves as a problem document (RFC 9457); one table maps exception to status."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from starlette.exceptions import HTTPException
+
+from studies import StudyError
+
+LONGEST_VALUE = 200
+"""Characters of an offending value that are shown back."""
+
+
+class NotFound(LookupError):
+    """Nothing is stored under this id, or not yet."""
+
+
+class Conflict(RuntimeError):
+    """The resource is in a state that does not allow this."""
+
+
+class BadField(ValueError):
+    """A query names something that this resource does not have."""
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        super().__init__(f"{field} = {value!r}: {allowed}")
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+
+
+STATUS: dict[type[Exception], HTTPStatus] = {
+    StudyError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    BadField: HTTPStatus.UNPROCESSABLE_ENTITY,
+    RequestValidationError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    NotFound: HTTPStatus.NOT_FOUND,
+    Conflict: HTTPStatus.CONFLICT,
+}
+
+
+class Problem(Response):
+    """A response of type ``application/problem+json``."""
+
+    media_type = "application/problem+json"
+
+    def render(self, content: Any) -> bytes:
+        """Encode in ASCII: what a client sent may hold lone surrogates."""
+        return json.dumps(content, allow_nan=False).encode("ascii")
+
+
+def problem(
+    request: Request,
+    status: HTTPStatus,
+    detail: str,
+    errors: Sequence[dict[str, Any]] = (),
+    headers: dict[str, str] | None = None,
+) -> Problem:
+    """Return the problem document for one failed request."""
+    return Problem(
+        {
+            "type": "about:blank",
+            "title": status.phrase,
+            "status": status.value,
+            "detail": detail,
+            "instance": request.url.path,
+            "errors": list(errors),
+        },
+        status_code=status.value,
+        headers=headers,
+    )
+
+
+def shown(value: object) -> str | int | float | bool | None:
+    """Return an offending value as JSON can carry it, cut to a readable length."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int | float) and abs(value) < 2**53:
+        return value
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= LONGEST_VALUE else text[:LONGEST_VALUE] + "…"
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """Return a pydantic location as ``sweep.friction[2]``, without the part of the request."""
+    path = location[1:] if len(location) > 1 else location
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
+    """Return field, value and what is allowed for each error FastAPI found."""
+    errors = []
+    for error in exc.errors():
+        broken = error["type"] == "json_invalid"
+        errors.append(
+            {
+                "field": "body" if broken else dotted(error["loc"]),
+                "value": None if broken else shown(error.get("input")),
+                "allowed": f"valid JSON ({error['ctx']['error']} at character {error['loc'][-1]})"
+                if broken
+                else error["msg"],
+            }
+        )
+    return errors
+
+
+def on_field_error(request: Request, exc: StudyError | BadField) -> Problem:
+    """Answer an error that names its field."""
+    error = {"field": exc.field, "value": shown(exc.value), "allowed": exc.allowed}
+    detail = f"{exc.field}: {exc.allowed}"
+    return problem(request, STATUS[type(exc)], detail, [error])
+
+
+def on_validation_error(request: Request, exc: RequestValidationError) -> Problem:
+    """Answer a request whose path, query or body has the wrong form."""
+    errors = validation_errors(exc)
+    broken = any(error["type"] == "json_invalid" for error in exc.errors())
+    status = HTTPStatus.BAD_REQUEST if broken else STATUS[RequestValidationError]
+    detail = "; ".join(f"{error['field']}: {error['allowed']}" for error in errors)
+    return problem(request, status, detail, errors)
+
+
+def on_plain_error(request: Request, exc: NotFound | Conflict) -> Problem:
+    """Answer an error that is told in one sentence."""
+    return problem(request, STATUS[type(exc)], str(exc))
+
+
+def on_http_error(request: Request, exc: HTTPException) -> Problem:
+    """Answer what the framework refuses itself: unknown paths, methods, large bodies."""
+    headers = dict(exc.headers) if exc.headers else None
+    return problem(request, HTTPStatus(exc.status_code), exc.detail, headers=headers)
+
+
+def on_unexpected(request: Request, exc: Exception) -> Problem:
+    """Answer a defect without showing its inside; the server writes the traceback to its log."""
+    return problem(request, HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log")
+
+
+HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {
+    StudyError: on_field_error,
+    BadField: on_field_error,
+    RequestValidationError: on_validation_error,
+    NotFound: on_plain_error,
+    Conflict: on_plain_error,
+    HTTPException: on_http_error,
+    Exception: on_unexpected,
+}
+
+
+def install(app: FastAPI) -> None:
+    """Register the handlers on ``app``."""
+    for kind, handler in HANDLERS.items():
+        app.add_exception_handler(kind, handler)

@@ -1,0 +1,5 @@
+"""The resources, a module each."""
+
+from service.routes import health, runs, scenes, studies
+
+ROUTERS = (studies.router, runs.router, scenes.router, health.router)

@@ -1,0 +1,99 @@
+"""Studies: submit, list, watch, stop, retry, fetch."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from http import HTTPStatus
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi.responses import FileResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from service import overview
+from service.dependencies import TheJob, TheJobs, TheRunner, TheSettings, TheStore
+from service.errors import NotFound
+from service.files import NETCDF, netcdf
+from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
+from studies import Study
+
+router = APIRouter(prefix="/studies", tags=["studies"])
+
+EXAMPLE = {
+    "name": "two-frictions",
+    "scene": "punch",
+    "parameters": {"hardening": "isotropic"},
+    "sweep": {"load_ratio": [0.3, 0.5714], "friction": [0.0, 0.3]},
+}
+
+
+@router.post("", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}})
+def submit(
+    content: Annotated[dict[str, Any], Body(examples=[EXAMPLE])],
+    jobs: TheJobs,
+    request: Request,
+    response: Response,
+) -> StudySummary:
+    """Accept a study; 200 when it is known already, whatever became of it."""
+    study = Study.from_dict(content)
+    runs = [case.id for case in study.cases()]
+    job, new = jobs.accept(study.id, study.to_dict(), runs)
+    if not new:
+        response.status_code = HTTPStatus.OK
+    response.headers["location"] = request.url_for("get_study", study_id=job.id).path
+    return overview.summary(job)
+
+
+@router.get("")
+def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
+    """List studies, the latest first."""
+    page, total = jobs.page(limit=which.limit, offset=which.offset, state=which.state)
+    return StudyPage(total=total, items=[overview.summary(job) for job in page])
+
+
+@router.get("/{study_id}")
+def get_study(
+    job: TheJob, window: Annotated[Window, Query()], jobs: TheJobs, store: TheStore
+) -> StudyDetail:
+    """Return where a study stands, and a page of its runs in the order of the sweep."""
+    return overview.detail(job, jobs, store, window)
+
+
+@router.delete("/{study_id}")
+def dismiss(study_id: ContentId, jobs: TheJobs) -> StudySummary:
+    """Stop the work on a study; the runs it has finished are kept."""
+    return overview.summary(jobs.dismiss(study_id))
+
+
+@router.post("/{study_id}/retry", status_code=HTTPStatus.ACCEPTED)
+def retry(study_id: ContentId, jobs: TheJobs) -> StudySummary:
+    """Compute the failed and the missing runs of a study again."""
+    return overview.summary(jobs.retry(study_id))
+
+
+@router.get("/{study_id}/events", response_class=EventSourceResponse)
+async def events(
+    job: TheJob, jobs: TheJobs, runner: TheRunner, settings: TheSettings
+) -> AsyncIterator[ServerSentEvent]:
+    """Send where a study stands at every change, until its end."""
+    shown = None
+    while runner.alive:
+        now = overview.summary(await asyncio.to_thread(jobs.get, job.id))
+        if now != shown:
+            yield ServerSentEvent(event="study", data=now.model_dump(mode="json"))
+            shown = now
+        if now.state.final:
+            return
+        await asyncio.sleep(settings.poll_seconds)
+
+
+@router.api_route("/{study_id}/dataset.nc", methods=["GET", "HEAD"], responses=NETCDF)
+def dataset(job: TheJob, store: TheStore) -> FileResponse:
+    """Return the combined data set of a study that has come to an end."""
+    path = store.dataset_path(job.id)
+    if not job.state.final or not path.is_file():
+        raise NotFound(
+            f"no data set yet: it is written when the work ends, and the study is {job.state}"
+        )
+    return netcdf(path, f"{job.study['name']}.nc")

@@ -1,0 +1,124 @@
+"""What the answers look like."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import Path
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.jobs import State
+
+ContentId = Annotated[
+    str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")
+]
+
+
+class Window(BaseModel):
+    """Which part of a list is asked for."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    limit: int = Field(default=100, ge=1, le=1000, description="entries on a page")
+    offset: int = Field(default=0, ge=0, le=2**53, description="entries before the page")
+
+
+class StudyFilter(Window):
+    """Which studies are asked for."""
+
+    state: State | None = None
+
+
+class RunFilter(Window):
+    """Which runs are asked for; a number must be the very number of the run."""
+
+    scene: str | None = Field(default=None, description="name of the scene")
+    status: str | None = Field(default=None, description="outcome, such as ``ok``")
+    friction: float | None = Field(default=None, allow_inf_nan=False)
+    load_ratio: float | None = Field(default=None, allow_inf_nan=False)
+    hardening: str | None = None
+
+
+class MapQuery(BaseModel):
+    """Which field of a run is drawn."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    field: str = Field(default="residual_stress", description="variable on the map grid")
+    component: str | None = Field(default=None, description="of a stress: xx, yy, zz or xy")
+
+
+class StudySummary(BaseModel):
+    """Where a study stands."""
+
+    id: str
+    name: str
+    scene: str
+    state: State
+    message: str = Field(description="why it failed, or is not getting on")
+    progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
+    size: int = Field(description="number of runs")
+    submitted: str
+    started: str | None
+    finished: str | None
+
+
+class StudyRun(BaseModel):
+    """One run as a part of a study."""
+
+    id: str
+    status: str = Field(description="outcome, or ``pending``")
+    message: str
+    at: dict[str, Any] = Field(description="its values on the axes of the sweep")
+
+
+class StudyDetail(StudySummary):
+    """A study with its definition and a page of its runs."""
+
+    parameters: dict[str, Any]
+    sweep: dict[str, list[Any]]
+    counts: dict[str, int] = Field(description="runs by status")
+    runs: list[StudyRun] = Field(description="a page of its runs")
+
+
+class Run(BaseModel):
+    """One run in the catalogue."""
+
+    id: str
+    scene: str
+    status: str
+    message: str
+    parameters: dict[str, Any]
+    scalars: dict[str, float | None] = Field(description="the figures of the run")
+    created: str
+    cpu_seconds: float | None
+
+
+class StudyPage(BaseModel):
+    """A part of the list of studies, the latest first."""
+
+    total: int
+    items: list[StudySummary]
+
+
+class RunPage(BaseModel):
+    """A part of the list of runs."""
+
+    total: int
+    items: list[Run]
+
+
+class SceneSummary(BaseModel):
+    """A scene in the list of scenes."""
+
+    name: str
+    summary: str
+    branch: str = Field(description="the parameter along which one loading path serves many runs")
+
+
+class Health(BaseModel):
+    """Whether studies can be accepted and computed."""
+
+    status: Literal["ready", "failing"]
+    data_writable: bool
+    executor_alive: bool

@@ -1,0 +1,152 @@
+"""A service as its users meet it: a process of its own, and HTTP."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from tests.architecture.sources import ROOT
+
+STARTUP = Path(__file__).with_name("startup")
+PROGRAM = (
+    "import sys; from service.app import serve; serve('127.0.0.1', int(sys.argv[1]), sys.argv[2])"
+)
+
+
+def environment(log: Path) -> dict[str, str]:
+    """Return the environment in which processes know the fake scene and write to ``log``."""
+    return os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(STARTUP)]),
+        "FAKE_SCENE_LOG": str(log),
+        "RESIDUA_WORKERS": "2",
+        "RESIDUA_POLL_SECONDS": "0.1",
+        "RESIDUA_ATTEMPTS": "2",
+    }
+
+
+def free_port() -> int:
+    """Return a port nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def wait_until(condition: Callable[[], Any], seconds: float = 30.0) -> Any:
+    """Return the first true answer of ``condition``."""
+    deadline = time.monotonic() + seconds
+    while not (answer := condition()):
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.05)
+    return answer
+
+
+@dataclass
+class Server:
+    """A service on the directory ``home``; may be stopped, killed and started again."""
+
+    home: Path
+    port: int = field(default_factory=free_port)
+    process: subprocess.Popen[bytes] | None = None
+
+    def __post_init__(self) -> None:
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=30.0)
+
+    @property
+    def log(self) -> Path:
+        """File with a line for each record the fake scene computed."""
+        return self.home / "computed.log"
+
+    @property
+    def data(self) -> Path:
+        """The data directory."""
+        return self.home / "data"
+
+    def start(self) -> Server:
+        """Start the process, and wait until it answers."""
+        self.home.mkdir(exist_ok=True)
+        with (self.home / "service.log").open("ab") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", PROGRAM, str(self.port), str(self.data)],
+                cwd=self.home,
+                env=environment(self.log),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+            )
+        wait_until(self._answers)
+        return self
+
+    def kill(self) -> None:
+        """End the process as a power cut would."""
+        assert self.process is not None
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self) -> int:
+        """Ask the process to end, and return its exit status."""
+        assert self.process is not None
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(timeout=30.0)
+
+    def close(self) -> None:
+        """Leave nothing running, and nothing open."""
+        self.client.close()
+        if self.process is not None and self.process.poll() is None:
+            self.stop()
+
+    def post(self, study: dict[str, Any]) -> str:
+        """Submit a study, and return its id."""
+        answer = self.client.post("/studies", json=study)
+        assert answer.status_code in (200, 201), answer.text
+        study_id: str = answer.json()["id"]
+        return study_id
+
+    def study(self, study_id: str) -> dict[str, Any]:
+        """Return where a study stands."""
+        answer = self.client.get(f"/studies/{study_id}")
+        assert answer.status_code == 200, answer.text
+        content: dict[str, Any] = answer.json()
+        return content
+
+    def finished(self, study_id: str, seconds: float = 60.0) -> dict[str, Any]:
+        """Wait for the end of a study, and return where it stands."""
+
+        def ended() -> dict[str, Any] | None:
+            study = self.study(study_id)
+            return study if study["state"] not in ("accepted", "running") else None
+
+        study: dict[str, Any] = wait_until(ended, seconds)
+        return study
+
+    def computed(self) -> list[str]:
+        """Return a line for each record that was computed."""
+        return self.log.read_text().splitlines() if self.log.exists() else []
+
+    def _answers(self) -> bool:
+        assert self.process is not None
+        assert self.process.poll() is None, (self.home / "service.log").read_text()
+        try:
+            return self.client.get("/health").status_code == 200
+        except httpx.TransportError:
+            return False
+
+
+def fake_study(name: str, **parameters: Any) -> dict[str, Any]:
+    """Return a study of the fake scene: two frictions, two loads, four runs in two paths."""
+    return {
+        "name": name,
+        "scene": "fake",
+        "parameters": parameters,
+        "sweep": {"load_ratio": [0.25, 0.5], "friction": [0.0, 0.3]},
+    }

@@ -1,0 +1,226 @@
+"""What is refused, and how it is said."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from fastapi import FastAPI
+
+from service.app import create_app
+from service.settings import Settings
+from tests.service.servers import Server, fake_study
+
+UNKNOWN = "0" * 32
+
+
+def problem(answer: httpx.Response, status: int) -> dict[str, Any]:
+    """Return the problem document of an answer that must be one."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    document: dict[str, Any] = answer.json()
+    assert set(document) == {"type", "title", "status", "detail", "instance", "errors"}
+    assert document["status"] == status
+    return document
+
+
+def changed(**parts: Any) -> dict[str, Any]:
+    """Return a good study with some parts replaced."""
+    return fake_study("bad") | parts
+
+
+@pytest.mark.parametrize(
+    ("study", "field", "value"),
+    [
+        (changed(sweep={"friction": [0.1, -0.1]}), "sweep.friction[1]", -0.1),
+        (changed(parameters={"friction": -1}, sweep={}), "parameters.friction", -1),
+        (changed(scene="pinch"), "scene", "pinch"),
+        (changed(scene=None), "scene", None),
+        (changed(parameters={"secnods": 1}), "parameters.secnods", 1),
+        (changed(parameters={"friction": 0.1}), "parameters.friction", 0.1),
+        (changed(sweep={"friction": []}), "sweep.friction", "[]"),
+        (changed(sweep={"friction": 0.1}), "sweep.friction", 0.1),
+        (changed(sweep=[1]), "sweep", "[1]"),
+        (changed(parameters=3), "parameters", 3),
+        (changed(sweep={"friction": ["much"]}), "sweep.friction[0]", "much"),
+        (changed(sweep={"friction": [True]}), "sweep.friction[0]", True),
+        (changed(sweep={"friction": [None]}), "sweep.friction[0]", None),
+        (changed(sweep={"friction": [0.1, 0.2, 0.10]}), "sweep.friction[2]", 0.1),
+        (changed(sweep={"hardening": ["soft"]}), "sweep.hardening[0]", "soft"),
+        (changed(name="../../etc/passwd"), "name", "../../etc/passwd"),
+        (changed(name=".hidden"), "name", ".hidden"),
+        (changed(name="\ud800"), "name", "\ud800"),
+        (changed(name=7), "name", 7),
+        (changed(colour="red"), "colour", "red"),
+        (
+            changed(parameters={"behaviour": "limit"}, sweep={"friction": [0.5, 1.0]}),
+            "sweep.friction[1]",
+            1.0,
+        ),
+    ],
+)
+def test_a_bad_study_is_refused_with_field_and_value(
+    service: Server, study: dict[str, Any], field: str, value: Any
+) -> None:
+    body = json.dumps(study).encode()
+    answer = service.client.post("/studies", content=body, headers=JSON)
+    (error,) = problem(answer, 422)["errors"]
+    assert (error["field"], error["value"]) == (field, value)
+    assert error["allowed"]
+
+
+JSON = {"content-type": "application/json"}
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "1" + "0" * 400])
+def test_numbers_that_are_not_finite_are_refused(service: Server, number: str) -> None:
+    body = json.dumps(changed(sweep={"friction": ["?"]})).replace('"?"', number)
+    answer = service.client.post("/studies", content=body, headers=JSON)
+    (error,) = problem(answer, 422)["errors"]
+    assert error["field"] == "sweep.friction[0]"
+
+
+def test_a_sweep_of_a_thousand_million_points_is_refused_before_it_is_expanded(
+    service: Server,
+) -> None:
+    axis = [i / 1000 for i in range(1, 1001)]
+    study = changed(sweep={"friction": axis, "load_ratio": axis, "seconds": axis})
+    (error,) = problem(service.client.post("/studies", json=study, timeout=5.0), 422)["errors"]
+    assert error["field"] == "sweep" and "1000000000" in error["value"]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"{", b"", b'{"name": "a",}', b"\xff\xfe", b"[" * 100_000, b"9" * 10_000],
+    ids=["open", "empty", "comma", "bytes", "deep", "digits"],
+)
+def test_a_body_that_is_not_json_is_refused(service: Server, body: bytes) -> None:
+    answer = service.client.post("/studies", content=body, headers=JSON)
+    assert answer.status_code in (400, 422)
+    document = problem(answer, answer.status_code)
+    assert "body" in document["detail"]
+
+
+@pytest.mark.parametrize("body", [[], "text", 3, None])
+def test_a_body_that_is_no_table_is_refused(service: Server, body: Any) -> None:
+    problem(service.client.post("/studies", json=body), 422)
+
+
+def test_a_form_is_refused(service: Server) -> None:
+    problem(service.client.post("/studies", data={"name": "a"}), 422)
+
+
+@pytest.mark.parametrize(
+    "body", [b" " * 3_000_000, [b" " * 100_000] * 30], ids=["declared", "chunked"]
+)
+def test_a_huge_body_is_refused(service: Server, body: Any) -> None:
+    try:
+        answer = service.client.post("/studies", content=body, headers=JSON)
+    except httpx.WriteError:
+        pytest.fail("the service hung up before it answered")
+    assert "1000000 bytes" in problem(answer, 413)["detail"]
+
+
+@pytest.mark.parametrize("kind", ["studies", "runs"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "..%2f..%2fetc",
+        "..",
+        "%2e%2e",
+        "%00",
+        "A" * 32,
+        "0" * 31,
+        "0" * 33,
+        "0" * 32 + "%0a",
+        "%C3%A9",
+    ],
+)
+def test_an_id_of_another_form_is_refused(service: Server, kind: str, name: str) -> None:
+    url = httpx.URL(f"http://127.0.0.1:{service.port}").copy_with(
+        raw_path=f"/{kind}/{name}/".encode()[:-1]
+    )
+    answer = service.client.get(url)
+    assert answer.status_code in (404, 422)
+    problem(answer, answer.status_code)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/nowhere",
+        f"/studies/{UNKNOWN}",
+        f"/studies/{UNKNOWN}/dataset.nc",
+        f"/studies/{UNKNOWN}/events",
+        f"/runs/{UNKNOWN}",
+        f"/runs/{UNKNOWN}.nc",
+        f"/runs/{UNKNOWN}/map.png",
+        "/scenes/pinch",
+    ],
+)
+def test_what_does_not_exist_is_not_found(service: Server, path: str) -> None:
+    assert problem(service.client.get(path), 404)["instance"] == path
+
+
+def test_a_method_that_is_not_offered_is_named(service: Server) -> None:
+    answer = service.client.put("/studies", json={})
+    problem(answer, 405)
+    assert "POST" in answer.headers["allow"] or "GET" in answer.headers["allow"]
+
+
+@pytest.mark.parametrize(
+    ("path", "field"),
+    [
+        ("/runs?limit=0", "limit"),
+        ("/runs?limit=100000", "limit"),
+        ("/runs?offset=-1", "offset"),
+        ("/runs?offset=99999999999999999999999", "offset"),
+        ("/runs?friction=nan", "friction"),
+        ("/runs?friction=rough", "friction"),
+        ("/runs?frictoin=0.1", "frictoin"),
+        ("/studies?state=happy", "state"),
+    ],
+)
+def test_a_bad_query_is_refused_by_field(service: Server, path: str, field: str) -> None:
+    (error,) = problem(service.client.get(path), 422)["errors"]
+    assert error["field"] == field
+
+
+def ask(app: FastAPI, path: str) -> httpx.Response:
+    """Return the answer of an application that runs in this process."""
+
+    async def get() -> httpx.Response:
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+            return await client.get(path)
+
+    return asyncio.run(get())
+
+
+@pytest.fixture
+def app(tmp_path: Path) -> FastAPI:
+    """An application that has not been started."""
+    return create_app(Settings(data=tmp_path / "data"))
+
+
+def test_a_defect_shows_nothing_of_its_inside(app: FastAPI) -> None:
+    def broken() -> None:
+        raise RuntimeError("a secret")
+
+    app.add_api_route("/broken", broken)
+    answer = ask(app, "/broken")
+    problem(answer, 500)
+    assert "secret" not in answer.text and "Traceback" not in answer.text
+
+
+def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI) -> None:
+    answer = ask(app, "/health")
+    assert answer.status_code == 503
+    assert answer.json() == {"status": "failing", "data_writable": True, "executor_alive": False}
+    data = app.state.settings.data
+    data.rename(data.with_name("elsewhere"))
+    assert ask(app, "/health").json()["data_writable"] is False

@@ -1,0 +1,119 @@
+"""Runs, scenes and health over HTTP."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import matplotlib.image
+import pytest
+import xarray as xr
+
+from tests.service.servers import Server, fake_study
+
+
+@pytest.fixture(scope="module")
+def runs(service: Server) -> list[dict[str, Any]]:
+    """The runs of a study: two loads, the friction of 0.3 unlike any other test's."""
+    study = fake_study("catalogued", hardening="isotropic")
+    study["sweep"]["friction"] = [0.125, 0.875]
+    found: list[dict[str, Any]] = service.finished(service.post(study))["runs"]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("wanted", "count"),
+    [
+        ({"friction": 0.125}, 2),
+        ({"friction": 0.125, "load_ratio": 0.5}, 1),
+        ({"friction": 0.125, "hardening": "none"}, 0),
+        ({"friction": 0.125, "status": "ok", "scene": "fake"}, 2),
+        ({"friction": 0.125, "scene": "punch"}, 0),
+        ({"friction": 0.125, "limit": 1}, 2),
+    ],
+)
+def test_runs_are_found_by_their_parameters(
+    service: Server, runs: list[dict[str, Any]], wanted: dict[str, Any], count: int
+) -> None:
+    page = service.client.get("/runs", params=wanted).json()
+    assert page["total"] == count
+    assert len(page["items"]) == min(count, wanted.get("limit", count))
+    assert {run["parameters"]["friction"] for run in page["items"]} <= {0.125}
+
+
+def test_pages_of_runs_follow_each_other(service: Server, runs: list[dict[str, Any]]) -> None:
+    whole = service.client.get("/runs", params={"hardening": "isotropic"}).json()["items"]
+    pages = [
+        service.client.get("/runs", params={"hardening": "isotropic", "limit": 1, "offset": i})
+        for i in range(len(whole))
+    ]
+    assert [page.json()["items"][0] for page in pages] == whole
+
+
+def test_a_run_arrives_as_a_labelled_data_set(service: Server, runs: list[dict[str, Any]]) -> None:
+    answer = service.client.get(f"/runs/{runs[-1]['id']}.nc")
+    with xr.open_dataset(io.BytesIO(answer.content), engine="h5netcdf") as run:
+        assert run["residual_stress"].sizes["friction"] == 1
+        assert run["residual_stress"].max() == 0.5 * 1.875
+        assert run["residual_stress"].attrs["units"] == "MPa"
+
+
+@pytest.mark.parametrize(
+    "query", [{"field": "residual_stress", "component": "xx"}, {"field": "plastic_strain"}]
+)
+def test_a_map_is_a_picture_that_need_not_be_sent_twice(
+    service: Server, runs: list[dict[str, Any]], query: dict[str, str]
+) -> None:
+    url = f"/runs/{runs[0]['id']}/map.png"
+    answer = service.client.get(url, params=query)
+    assert answer.status_code == 200, answer.text
+    picture = matplotlib.image.imread(io.BytesIO(answer.content), format="png")
+    assert picture.shape[0] > 300 and picture.shape[1] > 300
+    assert picture[..., :3].std() > 0.01
+    tag = {"if-none-match": answer.headers["etag"]}
+    assert service.client.get(url, params=query, headers=tag).status_code == 304
+    other = service.client.get(f"/runs/{runs[1]['id']}/map.png", params=query, headers=tag)
+    assert other.status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("query", "field", "allowed"),
+    [
+        ({"field": "nonsense"}, "field", "residual_stress"),
+        ({"field": "max_plastic_strain"}, "field", "residual_stress"),
+        ({"field": "residual_stress"}, "component", "xx, yy, zz, xy"),
+        ({"field": "residual_stress", "component": "rr"}, "component", "xx, yy, zz, xy"),
+        ({"field": "plastic_strain", "component": "xx"}, "component", "left out"),
+    ],
+)
+def test_a_map_that_cannot_be_drawn_is_refused_by_field(
+    service: Server, runs: list[dict[str, Any]], query: dict[str, str], field: str, allowed: str
+) -> None:
+    answer = service.client.get(f"/runs/{runs[0]['id']}/map.png", params=query)
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert error["field"] == field and error["value"] == query.get(field)
+    assert allowed in error["allowed"]
+
+
+def test_a_run_without_fields_has_no_map(service: Server) -> None:
+    study = service.finished(service.post(fake_study("empty", behaviour="limit")))
+    answer = service.client.get(f"/runs/{study['runs'][0]['id']}/map.png")
+    assert answer.status_code == 422
+    assert "no fields" in answer.json()["errors"][0]["allowed"]
+
+
+def test_a_scene_describes_its_parameters(service: Server) -> None:
+    names = [scene["name"] for scene in service.client.get("/scenes").json()]
+    assert "punch" in names
+    schema = service.client.get("/scenes/punch").json()
+    width = schema["properties"]["yield_stress"]
+    assert width["unit"] == "MPa" and width["exclusiveMinimum"] == 0
+    assert all(each["description"] for each in schema["properties"].values())
+    assert all("default" in each for each in schema["properties"].values())
+
+
+def test_health_is_ready_while_work_is_done(service: Server) -> None:
+    answer = service.client.get("/health")
+    assert answer.status_code == 200
+    assert answer.json() == {"status": "ready", "data_writable": True, "executor_alive": True}

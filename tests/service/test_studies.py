@@ -1,0 +1,162 @@
+"""A study from its submission to its data set, over HTTP."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from tests.service.servers import Server, fake_study, wait_until
+
+
+@pytest.fixture(scope="module")
+def done(service: Server) -> dict[str, Any]:
+    """A study that was computed."""
+    return service.finished(service.post(fake_study("done")))
+
+
+def test_a_new_study_is_created_and_a_known_one_is_found(service: Server) -> None:
+    study = fake_study("twice")
+    first = service.client.post("/studies", json=study)
+    study["sweep"]["friction"] = [0, 0.30]
+    second = service.client.post("/studies", json=study)
+    assert (first.status_code, second.status_code) == (201, 200)
+    assert first.headers["location"] == second.headers["location"]
+    assert service.client.get(first.headers["location"]).json()["name"] == "twice"
+
+
+def test_simultaneous_posts_of_a_study_make_one_study(service: Server) -> None:
+    study = fake_study("crowd")
+    with ThreadPoolExecutor(16) as pool:
+        answers = list(pool.map(lambda _: service.client.post("/studies", json=study), range(16)))
+    assert sorted(answer.status_code for answer in answers) == [200] * 15 + [201]
+    assert len({answer.json()["id"] for answer in answers}) == 1
+    service.finished(answers[0].json()["id"])
+
+
+def test_a_finished_study_counts_its_runs_and_names_their_place(
+    service: Server, done: dict[str, Any]
+) -> None:
+    assert (done["state"], done["progress"], done["counts"]) == ("successful", 100, {"ok": 4})
+    places = [(run["at"]["load_ratio"], run["at"]["friction"]) for run in done["runs"]]
+    assert places == [(0.25, 0.0), (0.25, 0.3), (0.5, 0.0), (0.5, 0.3)]
+    for run in done["runs"]:
+        parameters = service.client.get(f"/runs/{run['id']}").json()["parameters"]
+        assert run["at"].items() <= parameters.items()
+
+
+def test_runs_of_a_study_come_in_pages(service: Server, done: dict[str, Any]) -> None:
+    page = service.client.get(f"/studies/{done['id']}", params={"limit": 2, "offset": 1}).json()
+    assert page["runs"] == done["runs"][1:3]
+    assert page["counts"] == done["counts"]
+
+
+def test_studies_come_in_pages_the_latest_first(service: Server, done: dict[str, Any]) -> None:
+    service.finished(service.post(fake_study("later")))
+    everything = service.client.get("/studies").json()
+    ids = [study["id"] for study in everything["items"]]
+    assert everything["total"] == len(ids) >= 2
+    assert everything["items"][0]["name"] == "later"
+    page = service.client.get("/studies", params={"limit": 1, "offset": 1}).json()
+    assert [study["id"] for study in page["items"]] == ids[1:2]
+    failed = service.client.get("/studies", params={"state": "failed"}).json()
+    assert done["id"] not in {study["id"] for study in failed["items"]}
+
+
+def test_the_data_set_arrives_as_it_was_stored(
+    service: Server, done: dict[str, Any], tmp_path: Path
+) -> None:
+    answer = service.client.get(f"/studies/{done['id']}/dataset.nc")
+    assert answer.headers["content-type"] == "application/netcdf"
+    fetched = tmp_path / "fetched.nc"
+    fetched.write_bytes(answer.content)
+    with xr.open_dataset(fetched, engine="h5netcdf") as ours:
+        assert ours["residual_stress"].sel(load_ratio=0.5, friction=0.3).max() == 0.65
+        with xr.open_dataset(
+            service.data / "studies" / done["id"] / "dataset.nc", engine="h5netcdf"
+        ) as stored:
+            xr.testing.assert_identical(ours, stored)
+    head = service.client.head(f"/studies/{done['id']}/dataset.nc")
+    assert int(head.headers["content-length"]) == len(answer.content)
+    part = service.client.get(f"/studies/{done['id']}/dataset.nc", headers={"range": "bytes=0-7"})
+    assert (part.status_code, part.content) == (206, answer.content[:8])
+
+
+def test_events_tell_the_story_to_its_end(service: Server) -> None:
+    study_id = service.post(fake_study("story", seconds=0.3))
+    with service.client.stream("GET", f"/studies/{study_id}/events") as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        story = [json.loads(line[5:]) for line in stream.iter_lines() if line.startswith("data:")]
+    assert story[-1]["state"] == "successful"
+    progress = [chapter["progress"] for chapter in story]
+    assert progress == sorted(progress)
+    assert progress[0] == 0 and progress[-1] == 100
+    assert any(0 < each < 100 for each in progress)
+
+
+def test_a_study_with_failed_runs_fails_and_a_retry_computes_only_those(service: Server) -> None:
+    shared = fake_study("shared", behaviour="limit")
+    shared["sweep"]["behaviour"] = ["good", shared["parameters"].pop("behaviour")]
+    shared["sweep"].pop("load_ratio")
+    study_id = service.post(shared)
+    failed = service.finished(study_id)
+    assert (failed["state"], failed["counts"]) == ("failed", {"ok": 2, "limit_load": 2})
+    assert failed["message"] == "2 of 4 runs: 2 limit_load"
+    assert {run["message"] for run in failed["runs"] if run["status"] != "ok"} == {"no equilibrium"}
+    before = len(service.computed())
+    answer = service.client.post(f"/studies/{study_id}/retry")
+    assert (answer.status_code, answer.json()["state"]) == (202, "accepted")
+    assert service.finished(study_id)["state"] == "failed"
+    again = service.computed()[before:]
+    assert len(again) == 2 and all("behaviour='limit'" in line for line in again)
+
+
+def test_a_path_that_raises_is_a_failed_run_with_its_reason(service: Server) -> None:
+    study = service.finished(service.post(fake_study("raises", behaviour="raise")))
+    assert (study["state"], study["counts"]) == ("failed", {"error": 4})
+    assert "a defect of the scene" in study["runs"][0]["message"]
+
+
+def test_a_dismissed_study_stops_and_keeps_its_finished_runs(service: Server) -> None:
+    study = fake_study("long", seconds=0.4)
+    study["sweep"]["friction"] = [i / 100 for i in range(20)]
+    study_id = service.post(study)
+    wait_until(lambda: service.study(study_id)["counts"].get("ok", 0) >= 2)
+    answer = service.client.delete(f"/studies/{study_id}")
+    assert (answer.status_code, answer.json()["state"]) == (200, "dismissed")
+    assert service.client.delete(f"/studies/{study_id}").status_code == 200
+    # The next study runs when the work on this one has ended.
+    service.finished(service.post(fake_study("next")))
+    left = service.study(study_id)
+    assert left["state"] == "dismissed"
+    assert left["counts"]["ok"] >= 2 and left["counts"]["pending"] >= 20
+    path = Path(service.data / "studies" / study_id / "dataset.nc")
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        stress = dataset["max_plastic_strain"].values
+    assert np.isfinite(stress).sum() == left["counts"]["ok"]
+
+
+def test_a_waiting_study_is_dismissed_without_being_computed(service: Server) -> None:
+    busy = service.post(fake_study("busy", seconds=0.5))
+    waiting = service.post(fake_study("waiting", seconds=0.05))
+    assert service.client.post(f"/studies/{waiting}/retry").status_code == 409
+    assert service.client.delete(f"/studies/{waiting}").json()["state"] == "dismissed"
+    assert service.client.get(f"/studies/{waiting}/dataset.nc").status_code == 404
+    service.finished(busy)
+    assert service.study(waiting)["counts"] == {"pending": 4}
+    assert service.client.delete(f"/studies/{busy}").status_code == 409
+    service.client.post(f"/studies/{waiting}/retry")
+    assert service.finished(waiting)["state"] == "successful"
+
+
+def test_runs_are_shared_between_studies(service: Server, done: dict[str, Any]) -> None:
+    before = len(service.computed())
+    copy = service.finished(service.post(fake_study("copy")))
+    assert copy["id"] != done["id"]
+    assert [run["id"] for run in copy["runs"]] == [run["id"] for run in done["runs"]]
+    assert len(service.computed()) == before
