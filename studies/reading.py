@@ -1,11 +1,14 @@
-"""Stored results opened as labelled data sets."""
+"""Stored results opened as labelled data sets, and one run picked out of many."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
+from studies.dataset import OK, STATUSES
 from studies.errors import StudyError
 from studies.store import ENGINE
 
@@ -22,24 +25,89 @@ def open_study(path: Path | str) -> xr.Dataset:
     StudyError
         when there is no data set, or more than one
     """
-    return open_netcdf(find_dataset(Path(path)))
+    found = find_datasets(path)
+    if len(found) > 1:
+        names = ", ".join(str(each.parent) for each in found)
+        raise StudyError("path", str(path), f"holds several studies; name one of {names}")
+    return open_netcdf(found[0])
 
 
 def open_netcdf(path: Path | str) -> xr.Dataset:
     """Open the file of a run or of a study; arrays are read when they are used."""
-    return xr.open_dataset(path, engine=ENGINE)
+    try:
+        return xr.open_dataset(path, engine=ENGINE)
+    except OSError as error:
+        raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
 
 
-def find_dataset(path: Path) -> Path:
-    """Return the combined data set that `path` stands for."""
+def find_datasets(path: Path | str) -> list[Path]:
+    """Return the data sets `path` stands for: itself, a study's, or those of all studies in it."""
+    path = Path(path)
     if path.is_file():
-        return path
+        return [path]
     if (path / "dataset.nc").is_file():
-        return path / "dataset.nc"
+        return [path / "dataset.nc"]
     found = sorted(path.glob("studies/*/dataset.nc"))
-    if len(found) == 1:
-        return found[0]
-    if found:
-        names = ", ".join(str(each.parent) for each in found)
-        raise StudyError("path", str(path), f"holds several studies, name one of {names}")
-    raise StudyError("path", str(path), "must be a data set, a study or an output directory")
+    if not found:
+        raise StudyError("path", str(path), "must be a data set, a study or an output directory")
+    return found
+
+
+def sweep_axes(dataset: xr.Dataset) -> list[str]:
+    """Return the sweep dimensions of a data set, those of size one included."""
+    return [str(name) for name in dataset["status"].dims]
+
+
+def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = None) -> xr.Dataset:
+    """Return one successful run of a study.
+
+    Parameters
+    ----------
+    dataset : of a study or of a run
+    selection : axis -> wanted value. What it leaves open is decided in favour of the largest
+        number and the first label: usually the run with most residual stress.
+
+    Raises
+    ------
+    StudyError
+        when an axis or a value is unknown, or no run that matches succeeded
+    """
+    axes = sweep_axes(dataset)
+    chosen = dataset
+    for axis, value in (selection or {}).items():
+        if axis not in axes:
+            raise StudyError(axis, value, f"must be one of {', '.join(axes)}")
+        chosen = chosen.isel({axis: [_position(chosen[axis], value)]})
+    ok = np.argwhere(chosen["status"].to_numpy() == STATUSES.index(OK))
+    if not len(ok):
+        reasons = sorted({str(text) for text in chosen["message"].to_numpy().flat if text})
+        wanted = dict(selection) if selection else "any"
+        raise StudyError("run", wanted, f"no such run succeeded: {'; '.join(reasons) or 'missing'}")
+    numeric = [chosen[axis].dtype.kind in "fiu" for axis in axes]
+    best = max(ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)])
+    return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
+
+
+def _position(axis: xr.DataArray, value: str | float) -> int:
+    values = axis.to_numpy()
+    try:
+        same = (
+            np.isclose(values.astype(float), float(value), rtol=1e-9)
+            if values.dtype.kind in "fiu"
+            else values == str(value)
+        )
+    except ValueError:
+        same = np.zeros(len(values), dtype=bool)
+    if not same.any():
+        known = ", ".join(str(each) for each in values)
+        raise StudyError(str(axis.name), value, f"must be one of {known}")
+    return int(np.argmax(same))
+
+
+def _own_grid(run: xr.Dataset) -> xr.Dataset:
+    """Return a run on its own grid, where the study's runs have different ones."""
+    for name in [str(name) for name in run.dims]:
+        if name in run.coords and name not in run.indexes:
+            there = run[name].notnull().to_numpy()
+            run = run.isel({name: there}).set_xindex(name)
+    return run

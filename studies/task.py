@@ -43,7 +43,9 @@ def walk(
     written as broken, with the reason.
     """
     if task.source != solver_hash():
-        raise RuntimeError("the worker has another version of the solver than the caller")
+        raise RuntimeError(
+            "the worker has another version of the solver than the caller; restart both"
+        )
     store = Store(task.directory)
     rows: list[dict[str, Any]] = []
 

@@ -1,0 +1,97 @@
+"""Text tables: the runs of a study, the parameters of a scene."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from solver.scenes import SCENES
+from studies.dataset import STATUSES
+from studies.parameters import parameters_of, scene_named
+from studies.reading import sweep_axes
+
+FIGURES = (
+    "peak_residual_tension",
+    "peak_residual_compression",
+    "max_plastic_strain",
+    "increments",
+    "median_iterations",
+    "cpu_seconds",
+)
+"""Variables a table of runs shows, where the scene gives them."""
+
+
+def runs_table(dataset: xr.Dataset) -> str:
+    """Return a line for each run: where it lies in the sweep, its status, its main figures."""
+    axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
+    figures = [name for name in FIGURES if name in dataset]
+    columns = [*axes, "status", *figures]
+    units = [_unit(dataset[name]) for name in columns]
+    values = {name: dataset[name].to_numpy() for name in ("status", *figures)}
+    grids = {axis: dataset[axis].to_numpy() for axis in axes}
+    rows = []
+    for at in np.ndindex(values["status"].shape):
+        place = dict(zip(sweep_axes(dataset), at, strict=True))
+        where = [_text(grids[axis][place[axis]]) for axis in axes]
+        rows.append(
+            [*where, STATUSES[values["status"][at]], *(_text(values[name][at]) for name in figures)]
+        )
+    return _table([[name.replace("_", " ") for name in columns], units, *rows])
+
+
+def run_details(dataset: xr.Dataset) -> str:
+    """Return the parameters, outcome and figures of a single run."""
+    lines = [["scene", dataset.attrs["scene"]]]
+    lines += [[name, _text(value)] for name, value in _parameters(dataset).items()]
+    lines.append(["status", STATUSES[int(dataset["status"].item())]])
+    if message := str(dataset["message"].item()):
+        lines.append(["message", message])
+    rank = dataset["status"].ndim
+    lines += [
+        [str(name), f"{_text(each.item())} {_unit(each)}".rstrip()]
+        for name, each in dataset.data_vars.items()
+        if each.ndim == rank and name not in {"status", "message"}
+    ]
+    return _table(lines)
+
+
+def scenes_table() -> str:
+    """Return a line for each scene."""
+    return _table([[scene.name, scene.summary] for scene in SCENES.values()])
+
+
+def scene_table(name: str) -> str:
+    """Return a line for each parameter of a scene: default, what is allowed, what it means."""
+    scene = scene_named(name)
+    known = parameters_of(scene.parameters).values()
+    lines = [["parameter", "default", "allowed", "meaning"]]
+    lines += [[each.name, _text(each.default), each.allowed, each.description] for each in known]
+    return f"{scene.name}: {scene.summary}\n\n{_table(lines)}"
+
+
+def _parameters(dataset: xr.Dataset) -> Mapping[str, Any]:
+    return json.loads(dataset.attrs["parameters"])
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float | np.floating):
+        return "-" if np.isnan(value) else f"{value:.4g}"
+    return "-" if value is None else str(value)
+
+
+def _unit(variable: xr.DataArray) -> str:
+    unit = variable.attrs.get("units", "")
+    return "" if unit in {"", "1"} else f"[{unit}]"
+
+
+def _table(lines: Sequence[Sequence[str]]) -> str:
+    """Return columns set flush left, as wide as their widest entry."""
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    )
