@@ -33,6 +33,8 @@ _CONFIGURATION = {
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
+    # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
+    "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
 }
 
 

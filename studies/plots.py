@@ -28,8 +28,9 @@ def figure(
     zoom: float | None = None,
 ) -> Figure:
     """Return the figure that suits `field`: a map, or lines along the surface or along depth."""
-    maps = field in run and {"x", "y"} <= set(run[field].dims)
-    return (map_figure if maps else line_figure)(run, field, component, zoom)
+    known = _field(run, field, ("y", "x"), ("s",), ("depth",))
+    make = map_figure if "y" in known.dims else line_figure
+    return make(run, field, component, zoom)
 
 
 def map_figure(
@@ -59,7 +60,8 @@ def map_figure(
         values = _near(values, edge, zoom)
     signed = "component" in values.coords
     low, high, beyond = _limits(values.to_numpy(), signed)
-    sheet, axes = _sheet(run, values, float(np.ptp(values["x"]) / np.ptp(values["y"])))
+    width, height = (float(np.ptp(values[name].to_numpy())) for name in ("x", "y"))
+    sheet, axes = _sheet(run, values, width / height)
     axes.set_facecolor(_OUTSIDE)
     mesh = axes.pcolormesh(
         values["x"], values["y"], values, shading="nearest", rasterized=True,
