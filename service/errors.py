@@ -26,19 +26,8 @@ class Conflict(RuntimeError):
     """The resource is in a state that does not allow this."""
 
 
-class BadField(ValueError):
-    """A query names something that this resource does not have."""
-
-    def __init__(self, field: str, value: object, allowed: str) -> None:
-        super().__init__(f"{field} = {value!r}: {allowed}")
-        self.field = field
-        self.value = value
-        self.allowed = allowed
-
-
 STATUS: dict[type[Exception], HTTPStatus] = {
     StudyError: HTTPStatus.UNPROCESSABLE_ENTITY,
-    BadField: HTTPStatus.UNPROCESSABLE_ENTITY,
     RequestValidationError: HTTPStatus.UNPROCESSABLE_ENTITY,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
@@ -111,7 +100,7 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     return errors
 
 
-def on_field_error(request: Request, exc: StudyError | BadField) -> Problem:
+def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field."""
     error = {"field": exc.field, "value": shown(exc.value), "allowed": exc.allowed}
     detail = f"{exc.field}: {exc.allowed}"
@@ -145,7 +134,6 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {
     StudyError: on_field_error,
-    BadField: on_field_error,
     RequestValidationError: on_validation_error,
     NotFound: on_plain_error,
     Conflict: on_plain_error,

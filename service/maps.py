@@ -7,17 +7,12 @@ import io
 import threading
 from pathlib import Path
 
-import xarray as xr
-
 import solver
-from service.errors import BadField
 from service.schemas import MapQuery
-from studies.store import ENGINE
+from studies import open_netcdf
 
 DRAWING = threading.Lock()
 """Matplotlib shares fonts and the text cache among figures: one is drawn at a time."""
-
-DOTS_PER_INCH = 150
 
 
 def tag(path: Path, query: MapQuery) -> str:
@@ -32,29 +27,12 @@ def draw(path: Path, query: MapQuery) -> bytes:
 
     Raises
     ------
-    BadField
+    StudyError
         If the run has no such field, or the field no such component.
     """
     from studies.plots import map_figure  # matplotlib takes a second to import
 
-    with xr.open_dataset(path, engine=ENGINE, cache=False) as run:
-        check(run, query)
-        with DRAWING:
-            figure = map_figure(run.load(), field=query.field, component=query.component)
-            picture = io.BytesIO()
-            figure.savefig(picture, format="png", dpi=DOTS_PER_INCH)
+    picture = io.BytesIO()
+    with DRAWING, open_netcdf(path) as run:
+        map_figure(run, **query.model_dump()).savefig(picture, format="png")
     return picture.getvalue()
-
-
-def check(run: xr.Dataset, query: MapQuery) -> None:
-    """Raise a `BadField` unless ``run`` has what ``query`` asks for."""
-    fields = [str(name) for name, field in run.data_vars.items() if {"x", "y"} <= set(field.dims)]
-    if query.field not in fields:
-        known = f"one of {', '.join(fields)}" if fields else "nothing: the run has no fields"
-        raise BadField("field", query.field, known)
-    if "component" in run[query.field].dims:
-        components = [str(label) for label in run["component"].values]
-        if query.component not in components:
-            raise BadField("component", query.component, f"one of {', '.join(components)}")
-    elif query.component is not None:
-        raise BadField("component", query.component, f"left out: {query.field} has none")

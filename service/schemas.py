@@ -45,7 +45,13 @@ class MapQuery(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     field: str = Field(default="residual_stress", description="variable on the map grid")
-    component: str | None = Field(default=None, description="of a stress: xx, yy, zz or xy")
+    component: str | None = Field(default=None, description="of a stress; the first by default")
+    zoom: float | None = Field(
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+        description="only what lies within this distance of the edge of the contact [mm]",
+    )
 
 
 class StudySummary(BaseModel):

@@ -93,11 +93,13 @@ class Server:
         self.process.kill()
         self.process.wait()
 
-    def stop(self) -> int:
-        """Ask the process to end, and return its exit status."""
+    def stop(self) -> None:
+        """Ask the process to end, and see that it ends in order."""
         assert self.process is not None
         self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(timeout=30.0)
+        # The server ends its work, and then itself by the signal it was sent.
+        assert self.process.wait(timeout=30.0) == -signal.SIGTERM
+        assert "Application shutdown complete" in (self.home / "service.log").read_text()
 
     def close(self) -> None:
         """Leave nothing running, and nothing open."""

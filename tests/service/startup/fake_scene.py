@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Literal
@@ -17,7 +18,7 @@ from solver.errors import ModelError
 from solver.record import Record, Status
 
 LOG = "FAKE_SCENE_LOG"
-"""Environment variable: file that gets a line for each record computed."""
+"""Environment variable: file that gets a line for each record computed, its parameters."""
 
 INCREMENTS = 5
 
@@ -60,7 +61,7 @@ def path(parameters: FakeParameters, values: Sequence[float], monitor: object) -
 def record(parameters: FakeParameters) -> Record:
     """Return the outcome of one run, and write it down."""
     with Path(os.environ[LOG]).open("a") as log:
-        log.write(f"{parameters}\n")
+        log.write(json.dumps(asdict(parameters), sort_keys=True) + "\n")
     match parameters.behaviour:
         case "raise":
             raise ZeroDivisionError("a defect of the scene")

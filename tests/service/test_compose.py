@@ -1,0 +1,157 @@
+"""The compose file, read and acted out without containers."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import yaml
+
+from studies import open_netcdf
+from tests.architecture.sources import ROOT
+from tests.service.servers import environment, fake_study, free_port, wait_until
+
+COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())
+SERVICES: dict[str, Any] = COMPOSE["services"]
+DOCKERFILE = (ROOT / "Dockerfile").read_text()
+
+PROGRAMS = {
+    "residua": [sys.executable, "-c", "import sys; from studies.cli import main; sys.exit(main())"],
+    "dask": [sys.executable, "-m", "dask"],
+    "python": [sys.executable],
+}
+
+
+@pytest.mark.parametrize("name", ["scheduler", "worker", "service"])
+def test_every_service_restarts_and_is_watched(name: str) -> None:
+    service = SERVICES[name]
+    assert service["restart"] == "always"
+    assert service["healthcheck"]["test"][0] == "CMD"
+    assert {"interval", "timeout", "retries", "start_period"} <= set(service["healthcheck"])
+    assert service["image"] == "residua" and service["build"] == "."
+
+
+def test_only_the_service_is_reachable_from_outside() -> None:
+    assert {name for name, service in SERVICES.items() if "ports" in service} == {"service"}
+    assert SERVICES["service"]["ports"] == ["8000:8000"]
+    assert not [name for name, service in SERVICES.items() if "network_mode" in service]
+
+
+def test_workers_and_service_see_the_data_under_the_same_path() -> None:
+    (volume,) = COMPOSE["volumes"]
+    mounted = {name: service.get("volumes") for name, service in SERVICES.items()}
+    assert mounted["worker"] == mounted["service"] == [f"{volume}:/data"]
+    command = SERVICES["service"]["command"]
+    assert command[command.index("--data") + 1] == "/data"
+
+
+def test_workers_can_be_multiplied() -> None:
+    assert not {"container_name", "hostname", "ports"} & set(SERVICES["worker"])
+
+
+def test_who_needs_the_scheduler_waits_for_its_health() -> None:
+    for name in ("worker", "service"):
+        assert SERVICES[name]["depends_on"] == {"scheduler": {"condition": "service_healthy"}}
+        (address,) = [word for word in SERVICES[name]["command"] if word.startswith("tcp:")]
+        scheduler = SERVICES["scheduler"]["command"]
+        assert address == f"tcp://scheduler:{scheduler[scheduler.index('--port') + 1]}"
+
+
+def test_the_image_runs_as_an_ordinary_user_with_pinned_packages() -> None:
+    steps = re.findall(r"^([A-Z]+) (.*)$", DOCKERFILE, re.MULTILINE)
+    assert steps[0] == ("FROM", "python:3.11-slim")
+    users = [argument for step, argument in steps if step == "USER"]
+    assert users == ["residua"]
+    assert "--constraint constraints.txt" in DOCKERFILE
+    assert "HEALTHCHECK" in DOCKERFILE
+
+
+class Stage:
+    """Processes of the compose file on this machine: other ports, other folders, same words."""
+
+    def __init__(self, home: Path, stack: ExitStack) -> None:
+        self.home = home
+        self.stack = stack
+        self.ports = {port: str(free_port()) for port in ("8786", "8787", "8790", "8000")}
+        self.folders = {"/data": str(home / "data"), "/tmp": str(home / "scratch")}
+        self.environment = environment(home / "computed.log")
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def translated(self, words: list[str]) -> list[str]:
+        """Return a command of a container as a command of this machine."""
+
+        def word(text: str) -> str:
+            text = self.folders.get(text, text)
+            text = text.replace("scheduler:", "127.0.0.1:").replace("0.0.0.0", "127.0.0.1")
+            return re.sub(r"\b\d{4}\b", lambda port: self.ports.get(port[0], port[0]), text)
+
+        return PROGRAMS[words[0]] + [word(text) for text in words[1:]]
+
+    def start(self, name: str) -> None:
+        """Start a service of the compose file; it ends with the stage."""
+        log = self.stack.enter_context((self.home / f"{name}.log").open("ab"))
+        process = subprocess.Popen(
+            self.translated(SERVICES[name]["command"]),
+            cwd=self.home,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+        )
+        self.stack.callback(end, process)
+        self.processes[name] = process
+
+    def healthy(self, name: str) -> bool:
+        """Return what the health check of a service says."""
+        check = self.translated(SERVICES[name]["healthcheck"]["test"][1:])
+        done = subprocess.run(check, env=self.environment, capture_output=True, check=False)
+        return done.returncode == 0
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process that may have ended."""
+    process.terminate()
+    process.wait(timeout=30.0)
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Iterator[Stage]:
+    """The three services, healthy."""
+    with ExitStack() as stack:
+        stage = Stage(tmp_path, stack)
+        for name in ("scheduler", "worker", "service"):
+            stage.start(name)
+        for name in ("scheduler", "worker", "service"):
+            wait_until(lambda name=name: stage.healthy(name))
+        yield stage
+
+
+def test_the_three_processes_compute_a_posted_study(stage: Stage) -> None:
+    with httpx.Client(base_url=f"http://127.0.0.1:{stage.ports['8000']}") as client:
+        url = client.post("/studies", json=fake_study("composed")).headers["location"]
+        wait_until(lambda: client.get(url).json()["state"] == "successful", 60.0)
+        fetched = stage.home / "fetched.nc"
+        fetched.write_bytes(client.get(f"{url}/dataset.nc").content)
+    with open_netcdf(fetched) as dataset:
+        assert dataset["max_plastic_strain"].sel(load_ratio=0.5).values.tolist() == [[0.5], [0.5]]
+
+
+def test_a_scheduler_that_restarts_costs_no_study(stage: Stage) -> None:
+    study = fake_study("interrupted", seconds=0.5)
+    study["sweep"]["friction"] = [0.0, 0.1, 0.2, 0.3]
+    with httpx.Client(base_url=f"http://127.0.0.1:{stage.ports['8000']}") as client:
+        url = client.post("/studies", json=study).headers["location"]
+        wait_until(lambda: client.get(url).json()["counts"].get("ok", 0) >= 2, 60.0)
+        stage.processes["scheduler"].kill()
+        for name in ("scheduler", "worker"):
+            stage.processes[name].wait(timeout=30.0)
+            stage.start(name)  # as the engine does, see test_every_service_restarts_and_is_watched
+        wait_until(lambda: client.get(url).json()["state"] == "successful", 60.0)
+        assert client.get(url).json()["counts"] == {"ok": 8}

@@ -1,0 +1,160 @@
+"""What is accepted is computed, whatever happens to the processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from service.jobs import Jobs
+from studies import open_netcdf
+from tests.architecture.sources import ROOT
+from tests.service.servers import PROGRAM, Server, environment, fake_study, free_port, wait_until
+
+WORKERS = 2
+
+
+def long_study(name: str) -> dict[str, Any]:
+    """Return a study of sixteen runs in eight paths that takes some seconds."""
+    study = fake_study(name, seconds=0.4)
+    study["sweep"]["friction"] = [i / 10 for i in range(8)]
+    return study
+
+
+def stored(server: Server) -> set[Path]:
+    """Return the files of the finished runs."""
+    return set((server.data / "runs").glob("*.nc"))
+
+
+def some_done(server: Server) -> set[Path] | None:
+    """Return the files of the finished runs once there are a few."""
+    files = stored(server)
+    return files if len(files) >= 3 else None
+
+
+def repeated(server: Server, before: set[Path]) -> list[str]:
+    """Return the runs that were computed again although their file existed."""
+    times = Counter(server.computed())
+    labels = []
+    for path in before:
+        with open_netcdf(path) as run:
+            labels.append(json.dumps(json.loads(run.attrs["parameters"]), sort_keys=True))
+    assert set(labels) <= set(times)
+    return [label for label in labels if times[label] > 1]
+
+
+def children(server: Server) -> list[psutil.Process]:
+    """Return the processes a service has started."""
+    assert server.process is not None
+    return psutil.Process(server.process.pid).children(recursive=True)
+
+
+def test_a_killed_service_takes_its_studies_up_again(mortal: Server) -> None:
+    mortal.start()
+    first, second = (mortal.post(long_study("first")), mortal.post(fake_study("second")))
+    before = wait_until(lambda: some_done(mortal))
+    orphans = children(mortal)
+    mortal.kill()
+    mortal.start()
+    for study_id, runs in ((first, 16), (second, 4)):
+        study = mortal.finished(study_id)
+        assert (study["state"], study["counts"]) == ("successful", {"ok": runs})
+    assert len(stored(mortal)) == 20
+    assert repeated(mortal, before) == []
+    assert len(mortal.computed()) <= 20 + WORKERS
+    assert not list(mortal.data.rglob("*.part"))
+    assert not [process for process in orphans if process.is_running()]
+    path = mortal.data / "studies" / first / "dataset.nc"
+    with open_netcdf(path) as dataset:
+        assert bool(dataset["max_plastic_strain"].notnull().all())
+
+
+def test_a_stopped_service_ends_in_order_and_resumes(mortal: Server) -> None:
+    mortal.start()
+    study_id = mortal.post(long_study("stopped"))
+    before = wait_until(lambda: some_done(mortal))
+    mortal.stop()
+    assert 3 <= len(stored(mortal)) < 16
+    mortal.start()
+    assert mortal.study(study_id)["state"] in ("accepted", "running")
+    assert mortal.finished(study_id)["counts"] == {"ok": 16}
+    assert repeated(mortal, before) == []
+
+
+def test_the_death_of_a_study_leaves_the_service_alive_and_is_made_good(mortal: Server) -> None:
+    mortal.start()
+    study_id = mortal.post(long_study("wounded"))
+    before = wait_until(lambda: some_done(mortal))
+    assert mortal.process is not None
+    for child in psutil.Process(mortal.process.pid).children():
+        child.kill()
+    assert mortal.client.get("/health").status_code == 200
+    assert mortal.finished(study_id)["counts"] == {"ok": 16}
+    assert repeated(mortal, before) == []
+
+
+def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(mortal: Server) -> None:
+    mortal.start()
+    deadly = fake_study("deadly", behaviour="die")
+    deadly["sweep"] = {"friction": [0.1]}
+    deadly_id, next_id = mortal.post(deadly), mortal.post(fake_study("next"))
+    study = mortal.finished(deadly_id)
+    assert (study["state"], study["counts"]) == ("failed", {"error": 1})
+    assert "worker" in study["runs"][0]["message"]
+    assert mortal.finished(next_id)["state"] == "successful"
+
+
+def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:
+    mortal.data.mkdir(parents=True)
+    jobs = Jobs(mortal.data / "jobs.sqlite")
+    study = {"name": "old", "scene": "fake", "parameters": {}, "sweep": {}}
+    jobs.accept("a" * 32, study, ["b" * 32])
+    jobs.accept("c" * 32, study | {"parameters": {"gone": 1}}, ["d" * 32])
+    mortal.start()
+    assert "post it again" in mortal.finished("a" * 32)["message"]
+    refused = mortal.finished("c" * 32)
+    assert refused["state"] == "failed" and "parameters.gone" in refused["message"]
+
+
+def refusal(data: Path, **settings: str) -> str:
+    """Return the one line with which a service refuses to start."""
+    ended = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(free_port()), str(data)],
+        env=environment(Path(os.devnull)) | settings,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert ended.returncode == 2, ended.stderr
+    (line,) = ended.stderr.splitlines()
+    return line
+
+
+def test_a_second_service_on_the_same_directory_is_refused(mortal: Server) -> None:
+    mortal.start()
+    line = refusal(mortal.data, RESIDUA_LOCK_SECONDS="0.2")
+    assert "another service uses this directory" in line
+    assert mortal.client.get("/health").status_code == 200
+
+
+def test_bad_settings_are_refused_by_name(tmp_path: Path) -> None:
+    assert "RESIDUA_WORKERS = 'many'" in refusal(tmp_path / "data", RESIDUA_WORKERS="many")
+    file = tmp_path / "file"
+    file.touch()
+    assert str(file) in refusal(file)
+
+
+def test_an_open_event_stream_does_not_keep_the_service_from_stopping(mortal: Server) -> None:
+    mortal.start()
+    study_id = mortal.post(long_study("watched"))
+    with mortal.client.stream("GET", f"/studies/{study_id}/events") as stream:
+        next(stream.iter_lines())
+        mortal.stop()
