@@ -82,6 +82,10 @@ class _Frame:
     fields: dict[str, tuple[list[str], dict[str, Any]]] = field(default_factory=dict)
     small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        for name, kind in (("status", np.dtype(np.int8)), ("message", np.dtype(object))):
+            self._hold(name, kind)
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values on each sweep dimension."""
@@ -101,8 +105,11 @@ class _Frame:
             elif inner := [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]:
                 self.fields[name] = (inner, layout.attributes_of(name))
             else:
-                empty = np.full(self.shape, _absent(name, variable.dtype), dtype=variable.dtype)
-                self.small[name] = (empty, layout.attributes_of(name))
+                self._hold(name, variable.dtype)
+
+    def _hold(self, name: str, kind: np.dtype[Any]) -> None:
+        empty = np.full(self.shape, _absent(name, kind), dtype=kind)
+        self.small[name] = (empty, layout.attributes_of(name))
 
     def _learn_coordinate(self, name: str, values: np.ndarray) -> None:
         if values.dtype.kind not in "fi":

@@ -1,0 +1,189 @@
+"""The runs of a study side by side."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+
+from studies import Store, Study, StudyError, open_study
+from studies.combine import combine
+from studies.dataset import STATUSES
+from studies.reading import one_run
+from tests.studies.conftest import compute_here, fake_study
+from tests.studies.fakes import record
+
+ComputedStudy = tuple[Study, Store]
+
+
+def test_every_point_of_the_sweep_is_the_run_that_was_computed(computed: ComputedStudy) -> None:
+    study, store = computed
+    with open_study(store.directory) as together:
+        assert together["residual_stress"].dims[:3] == ("load_ratio", "friction", "hardening")
+        assert together.attrs["title"] == "fake"
+        assert json.loads(together.attrs["parameters"])["half_width"] == 50.0
+        for case in study.cases():
+            given = record(case.parameters)
+            one = together.sel(
+                load_ratio=case.values["load_ratio"], friction=case.values["friction"]
+            ).squeeze("hardening")
+            for name, (dimensions, values) in given.fields.items():
+                assert one[name].dims == dimensions
+                np.testing.assert_array_equal(one[name], values)
+            assert one["increments"].item() == 10
+            assert one["status"].item() == STATUSES.index("ok")
+        assert together["residual_stress"].attrs["units"] == "MPa"
+        assert together["status"].dtype == np.int8
+
+
+def test_text_axes_are_labels_and_come_after_the_usual_ones(store: Store) -> None:
+    study = fake_study(sweep={"state": ["plane_strain", "plane_stress"], "friction": [0.0, 0.1]})
+    compute_here(study, store)
+    with open_study(store.directory) as together:
+        assert together["plastic_strain"].dims == (
+            "load_ratio", "friction", "hardening", "state", "y", "x",
+        )  # fmt: skip
+        assert list(together["state"].values) == ["plane_strain", "plane_stress"]
+
+
+def test_labels_that_only_some_runs_have_are_joined_by_name(store: Store) -> None:
+    """The stress tensor has zz in plane strain only; xy must not land in its place."""
+    study = fake_study(sweep={"state": ["plane_stress", "plane_strain"]})
+    compute_here(study, store)
+    with open_study(store.directory) as together:
+        assert set(together["component"].values) == {"xx", "yy", "zz", "xy"}
+        for case in study.cases():
+            given = record(case.parameters)
+            there = list(given.coordinates["component"])
+            stress = together["residual_stress"].sel(state=case.values["state"]).squeeze()
+            np.testing.assert_array_equal(
+                stress.sel(component=there), given.fields["residual_stress"][1]
+            )
+        absent = together["residual_stress"].sel(state="plane_stress", component="zz")
+        assert absent.isnull().all()
+
+
+def test_grids_that_differ_stay_with_their_runs(store: Store) -> None:
+    study = fake_study(sweep={"half_width": [10.0, 50.0], "points": [4, 6]})
+    compute_here(study, store)
+    with open_study(store.directory) as together:
+        assert together["points"].dtype.kind == "i"
+        for case in study.cases():
+            given = record(case.parameters)
+            one = one_run(
+                together, {"half_width": case.values["half_width"], "points": case.values["points"]}
+            )
+            assert one["x"].dims == ("x",)
+            np.testing.assert_array_equal(one["x"], given.coordinates["x"])
+            np.testing.assert_array_equal(
+                one["residual_stress"], given.fields["residual_stress"][1]
+            )
+            edge = one["residual_stress"].sel(x=case.values["half_width"], method="nearest")
+            assert edge.sizes == {"component": 3, "y": case.values["points"] + 1}
+
+
+def test_grids_that_differ_by_rounding_are_one_grid(store: Store) -> None:
+    study = fake_study(sweep={"half_width": [50.0, 50.0 * (1 + 2e-16)]})
+    compute_here(study, store)
+    with open_study(store.directory) as together:
+        assert together["x"].dims == ("x",)
+        assert "x" in together.indexes
+
+
+@pytest.mark.parametrize(
+    ("trouble", "status", "message"),
+    [
+        ("limit", "limit_load", "flows at 0.75"),
+        ("bare", "not_converged", "increment 3"),
+        ("raise", "error", "ZeroDivisionError: the stiffness is gone"),
+        ("short", "error", "without a record"),
+    ],
+)
+def test_failed_points_are_nan_with_status_and_message(
+    store: Store, trouble: str, status: str, message: str
+) -> None:
+    compute_here(fake_study(trouble=trouble), store)
+    with open_study(store.directory) as together:
+        failed = together.sel(load_ratio=0.9)
+        assert (failed["status"] == STATUSES.index(status)).all()
+        assert all(message in text for text in failed["message"].values.flat)
+        assert failed["residual_stress"].isnull().all()
+        assert failed["increments"].isnull().all()
+        good = together.sel(load_ratio=0.3)
+        assert (good["status"] == STATUSES.index("ok")).all()
+        assert good["contact_pressure"].notnull().all()
+
+
+def test_runs_not_computed_are_missing(store: Store) -> None:
+    study = fake_study()
+    compute_here(study, store)
+    gone = next(study.cases())
+    store.run_path(gone.id).unlink()
+    combine(study, store, list(study.cases()))
+    with open_study(store.dataset_path(study.id)) as together:
+        statuses = together["status"].squeeze().values
+        assert STATUSES[statuses[0, 0]] == "missing"
+        assert [STATUSES[code] for code in statuses.flat[1:]] == ["ok"] * 3
+
+
+def test_a_study_of_which_nothing_is_computed_is_all_missing(store: Store) -> None:
+    study = fake_study()
+    store.save_study(study)
+    combine(study, store, list(study.cases()))
+    with open_study(store.directory) as together:
+        assert (together["status"] == STATUSES.index("missing")).all()
+
+
+def test_other_readers_agree(computed: ComputedStudy) -> None:
+    study, store = computed
+    with netCDF4.Dataset(store.dataset_path(study.id)) as file:
+        assert file["hardening"][:].tolist() == ["none"]
+        assert file["friction"][:].tolist() == [0.0, 0.4]
+        assert file["increments"][:].tolist() == [[[10], [10]], [[10], [10]]]
+        assert file["residual_stress"].chunking()[:3] == [1, 1, 1]
+
+
+def test_combining_45_runs_takes_seconds(store: Store) -> None:
+    sweep = {"load_ratio": [0.3, 0.5, 0.7], "friction": [i / 20 for i in range(15)]}
+    study = fake_study(sweep=sweep, points=100)
+    compute_here(study, store)
+    started = time.process_time()
+    combine(study, store, list(study.cases()))
+    assert time.process_time() - started < 3.0
+
+
+def test_open_study_takes_a_directory_a_study_or_a_file(computed: ComputedStudy) -> None:
+    study, store = computed
+    for path in (store.directory, store.study_directory(study.id), store.dataset_path(study.id)):
+        with open_study(str(path)) as together:
+            assert together.attrs["id"] == study.id
+            assert not together["residual_stress"].variable._in_memory
+
+
+def test_open_study_says_what_it_needs(store: Store, tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="must be a data set"):
+        open_study(tmp_path / "nowhere")
+    (tmp_path / "text.nc").write_text("not netCDF")
+    with pytest.raises(StudyError, match="must be a netCDF file"):
+        open_study(tmp_path / "text.nc")
+    for name in ("one", "two"):
+        compute_here(fake_study(name), store)
+    with pytest.raises(StudyError, match="several studies"):
+        open_study(store.directory)
+
+
+def test_one_run_prefers_what_succeeded_with_most_load_and_friction(store: Store) -> None:
+    compute_here(fake_study(trouble="limit"), store)
+    with open_study(store.directory) as together:
+        best = one_run(together)
+        assert (best["load_ratio"].item(), best["friction"].item()) == (0.3, 0.4)
+        with pytest.raises(StudyError, match="flows at 0.75"):
+            one_run(together, {"load_ratio": "0.9"})
+        with pytest.raises(StudyError, match="one of 0.0, 0.4"):
+            one_run(together, {"friction": "0.3"})
+        with pytest.raises(StudyError, match="one of load_ratio, friction, hardening"):
+            one_run(together, {"speed": "1"})

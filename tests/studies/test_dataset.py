@@ -1,0 +1,106 @@
+"""What the file of a run holds."""
+
+from __future__ import annotations
+
+import json
+
+import netCDF4
+import numpy as np
+import pytest
+
+from solver.record import Record, Status
+from studies import Store, Study, open_netcdf
+from studies.dataset import QUANTITIES, STATUSES, run_dataset
+from tests.studies.conftest import compute_here, fake_study
+from tests.studies.fakes import FAKE, record
+
+ComputedStudy = tuple[Study, Store]
+
+
+def test_a_run_has_the_usual_sweep_dimensions_of_size_one(computed: ComputedStudy) -> None:
+    study, store = computed
+    case = next(study.cases())
+    with open_netcdf(store.run_path(case.id)) as run:
+        assert run["residual_stress"].dims == (
+            "load_ratio", "friction", "hardening", "component", "y", "x",
+        )  # fmt: skip
+        assert run["residual_stress"].shape[:3] == (1, 1, 1)
+        assert run["load_ratio"].item() == 0.3
+        assert run["hardening"].item() == "none"
+        assert list(run["stage"].values) == ["loaded", "unloaded"]
+
+
+def test_stored_values_are_the_records_to_the_last_bit(computed: ComputedStudy) -> None:
+    study, store = computed
+    for case in study.cases():
+        given = record(case.parameters)
+        with open_netcdf(store.run_path(case.id)) as run:
+            for name, (dimensions, values) in given.fields.items():
+                kept = run[name].squeeze(["load_ratio", "friction", "hardening"])
+                assert kept.dims == dimensions
+                np.testing.assert_array_equal(kept, values)
+            for name, number in given.scalars.items():
+                assert run[name].item() == number
+
+
+def test_the_file_of_a_run_does_not_depend_on_the_study(store: Store) -> None:
+    swept = fake_study("swept", {"half_width": [10.0, 20.0]})
+    compute_here(swept, store)
+    (one, _) = swept.cases()
+    other = Store(store.directory / "other")
+    compute_here(fake_study("single", {"friction": [0.0]}, half_width=10.0), other)
+    with open_netcdf(store.run_path(one.id)) as a, open_netcdf(other.run_path(one.id)) as b:
+        assert a.drop_attrs(deep=False).identical(b.drop_attrs(deep=False))
+        assert a.attrs | {"created": ""} == b.attrs | {"created": ""}
+
+
+def test_every_number_has_a_long_name_and_known_ones_have_units(computed: ComputedStudy) -> None:
+    study, store = computed
+    with open_netcdf(store.run_path(next(study.cases()).id)) as run:
+        for name, variable in run.variables.items():
+            assert variable.attrs["long_name"], name
+        assert run["residual_stress"].attrs["units"] == "MPa"
+        assert run["x"].attrs["units"] == "mm"
+        assert run["friction"].attrs == {"long_name": "friction", "units": "1"}
+        assert run["status"].attrs["flag_meanings"].split() == list(STATUSES)
+        assert run["status"].attrs["standard_name"] == "status_flag"
+
+
+def test_provenance_is_in_the_attributes(computed: ComputedStudy) -> None:
+    study, store = computed
+    case = next(study.cases())
+    with open_netcdf(store.run_path(case.id)) as run:
+        assert run.attrs["Conventions"] == "CF-1.11"
+        assert run.attrs["id"] == case.id
+        assert json.loads(run.attrs["parameters"]) == case.values
+        assert set(json.loads(run.attrs["versions"])) == {
+            "solver", "numpy", "scipy", "scikit-fem", "xarray",
+        }  # fmt: skip
+        assert run.attrs["created"]
+        assert len(run.attrs["solver_source"]) == 32
+
+
+def test_counts_are_integers_with_a_fill_value_and_other_readers_agree(
+    computed: ComputedStudy,
+) -> None:
+    study, store = computed
+    with netCDF4.Dataset(store.run_path(next(study.cases()).id)) as file:
+        assert file["increments"].dtype == np.int32
+        assert file["increments"]._FillValue == -1
+        assert file["increments"][:].item() == 10
+        assert file["message"][:].item() == ""
+        assert file["residual_stress"].filters()["shuffle"]
+        assert file["residual_stress"].filters()["complevel"] == 1
+
+
+def test_a_dimension_without_coordinate_is_refused() -> None:
+    case = next(fake_study().cases())
+    lost = Record(
+        parameters=case.parameters, status=Status.OK, fields={"mises_loaded": (("x",), np.ones(3))}
+    )
+    with pytest.raises(ValueError, match="mises_loaded"):
+        run_dataset(FAKE, case, lost)
+
+
+def test_every_quantity_of_the_table_has_a_unit_that_is_si_or_one() -> None:
+    assert {each.units for each in QUANTITIES.values()} == {"1", "mm", "MPa", "s"}

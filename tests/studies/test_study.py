@@ -1,0 +1,243 @@
+"""What a study accepts, and how it names what it asks for."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import studies.identity
+from solver.scenes import SCENES
+from studies import Study, StudyError, scene_schema
+from studies.study import MAXIMUM_RUNS
+from tests.studies.conftest import fake_study
+
+ROOT = Path(__file__).parents[2]
+GOOD: dict[str, Any] = {
+    "name": "fake",
+    "scene": "fake",
+    "parameters": {"half_width": 20},
+    "sweep": {"friction": [0.0, 0.1], "load_ratio": [0.5, 0.3]},
+}
+
+
+def with_(**changes: Any) -> dict[str, Any]:
+    return GOOD | changes
+
+
+@pytest.mark.parametrize(
+    ("content", "field", "allowed"),
+    [
+        (with_(scene="fak"), "scene", "did you mean fake?"),
+        (with_(scene=None), "scene", "one of"),
+        (with_(scene=["fake"]), "scene", "one of"),
+        (with_(swep={}), "swep", "did you mean sweep?"),
+        (with_(name=".hidden"), "name", "not beginning with a dot"),
+        (with_(name="a/b"), "name", "1 to 80"),
+        (with_(name="a" * 81), "name", "1 to 80"),
+        (with_(name="a\n"), "name", "1 to 80"),
+        (with_(name=3), "name", "1 to 80"),
+        (with_(parameters={"frictoin": 0.1}), "parameters.frictoin", "did you mean friction?"),
+        (with_(sweep={"frictoin": [0.1]}), "sweep.frictoin", "did you mean friction?"),
+        (with_(parameters={"half_width": -1}), "parameters.half_width", "> 0 [mm]"),
+        (with_(parameters={"half_width": math.inf}), "parameters.half_width", "finite"),
+        (with_(parameters={"half_width": 10**400}), "parameters.half_width", "finite"),
+        (with_(parameters={"half_width": "20"}), "parameters.half_width", "a finite number"),
+        (with_(parameters={"half_width": True}), "parameters.half_width", "a finite number"),
+        (with_(parameters={"half_width": None}), "parameters.half_width", "a finite number"),
+        (with_(parameters={"half_width": {}}), "parameters.half_width", "a finite number"),
+        (with_(parameters={"points": 2.5}), "parameters.points", "an integer >= 2 and <= 400"),
+        (with_(parameters={"hardening": "soft"}), "parameters.hardening", "none, isotropic"),
+        (with_(parameters={"friction": 0.1}), "parameters.friction", "swept too"),
+        (with_(parameters=[1]), "parameters", "a table"),
+        (with_(sweep={"friction": [0.1, -0.1]}), "sweep.friction[1]", ">= 0 and <= 1"),
+        (with_(sweep={"friction": [0.1, math.nan]}), "sweep.friction[1]", "finite"),
+        (with_(sweep={"friction": [0, 0.1, 0.0]}), "sweep.friction[2]", "already at position 0"),
+        (with_(sweep={"friction": [0, -0.0]}), "sweep.friction[1]", "already at position 0"),
+        (with_(sweep={"friction": []}), "sweep.friction", "one value or more"),
+        (with_(sweep={"friction": 0.1}), "sweep.friction", "one value or more"),
+        (with_(sweep={"friction": "0.1"}), "sweep.friction", "one value or more"),
+        (with_(sweep="friction"), "sweep", "a table"),
+        (
+            with_(sweep={"friction": [0.5, 1.0]}, parameters={"state": "plane_strain"}),
+            "sweep.friction[1]",
+            "at most 0.9 in plane strain",
+        ),
+        (
+            with_(sweep={}, parameters={"state": "plane_strain", "friction": 1}),
+            "parameters.friction",
+            "at most 0.9 in plane strain",
+        ),
+        (["fake"], "study", "a table"),
+    ],
+)
+def test_bad_input_names_field_value_and_what_is_allowed(
+    content: Any, field: str, allowed: str
+) -> None:
+    with pytest.raises(StudyError) as caught:
+        Study.from_dict(content)
+    assert caught.value.field == field
+    assert allowed in caught.value.allowed
+    assert str(caught.value).startswith(f"{field} = ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_sweep_too_large_is_refused_before_it_is_expanded() -> None:
+    thousand = [(i + 1) / 1000 for i in range(1000)]
+    sweep = {"friction": thousand, "load_ratio": thousand, "half_width": thousand}
+    started = time.process_time()
+    with pytest.raises(StudyError) as caught:
+        Study.from_dict(with_(sweep=sweep, parameters={}))
+    assert time.process_time() - started < 1.0
+    assert caught.value.field == "sweep"
+    assert "1000000000" in str(caught.value)
+    assert str(MAXIMUM_RUNS) in caught.value.allowed
+
+
+def test_equal_content_has_equal_ids_however_it_is_written() -> None:
+    one = Study.from_dict(GOOD)
+    other = Study.from_dict(
+        {
+            "sweep": {"load_ratio": [0.5, 0.3], "friction": [-0.0, 1e-1]},
+            "parameters": {"half_width": 20.0, "seconds": 0},
+            "scene": "fake",
+            "name": "fake",
+        }
+    )
+    assert one.id == other.id
+    assert [case.id for case in one.cases()] == [case.id for case in other.cases()]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"name": "other"}, {"parameters": {"half_width": 21}}, {"sweep": {"friction": [0.0]}}],
+)
+def test_other_content_has_another_study_id(change: dict[str, Any]) -> None:
+    assert Study.from_dict(with_(**change)).id != Study.from_dict(GOOD).id
+
+
+def test_a_run_has_the_same_id_in_every_study() -> None:
+    swept = fake_study("swept", {"load_ratio": [0.3, 0.9], "half_width": [10, 20]}, friction=0.2)
+    single = fake_study("single", {"friction": [0.2]}, load_ratio=0.9, half_width=20.0)
+    (run,) = single.cases()
+    assert run.id in {case.id for case in swept.cases()}
+
+
+def test_a_changed_solver_makes_new_ids(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = Study.from_dict(GOOD)
+    ids = before.id, next(before.cases()).id
+    monkeypatch.setattr(studies.identity, "solver_hash", lambda: "0" * 32)
+    after = Study.from_dict(GOOD)
+    assert after.id != ids[0]
+    assert next(after.cases()).id != ids[1]
+
+
+def test_the_solver_hash_covers_every_source_and_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "solver"
+    (package / "inner").mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "inner" / "law.py").write_text("E = 1")
+    monkeypatch.setattr("solver.__file__", str(package / "__init__.py"))
+    source = studies.identity.solver_hash.__wrapped__
+    first = source()
+    (package / "inner" / "law.py").write_text("E = 2")
+    second = source()
+    (package / "inner" / "law.py").rename(package / "law.py")
+    assert len({first, second, source()}) == 3
+
+
+def test_axes_follow_the_scene_and_values_stay_as_written() -> None:
+    study = Study.from_dict(GOOD)
+    assert list(study.axes) == ["load_ratio", "friction"]
+    assert study.axes["load_ratio"] == [0.5, 0.3]
+    points = [(case.index, case.parameters.load_ratio) for case in study.cases()]
+    assert points == [((0, 0), 0.5), ((0, 1), 0.5), ((1, 0), 0.3), ((1, 1), 0.3)]
+    assert all(case.parameters.half_width == 20.0 for case in study.cases())
+
+
+def test_paths_hold_what_differs_in_the_branch_parameter_only_in_increasing_order() -> None:
+    paths = Study.from_dict(GOOD).paths()
+    assert len(paths) == 2
+    for path in paths:
+        assert [case.parameters.load_ratio for case in path.cases] == [0.3, 0.5]
+        assert len({case.parameters.friction for case in path.cases}) == 1
+    assert len({path.id for path in paths}) == 2
+
+
+def test_a_study_survives_its_dictionary_and_json() -> None:
+    study = Study.from_dict(GOOD)
+    again = Study.from_dict(json.loads(json.dumps(study.to_dict())))
+    assert again == study
+    assert again.id == study.id
+
+
+def test_a_study_without_sweep_is_one_run() -> None:
+    study = Study.from_dict({"name": "one", "scene": "fake"})
+    (case,) = study.cases()
+    assert study.size == 1
+    assert case.index == ()
+
+
+@pytest.mark.parametrize("text", ["name = ", "\x00", "a = 1\na = 2"])
+def test_a_file_that_is_not_toml_is_one_clear_error(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    with pytest.raises(StudyError, match="valid TOML"):
+        Study.from_toml(path)
+
+
+def test_a_file_that_is_not_utf8_or_not_there_is_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
+    with pytest.raises(StudyError, match="valid TOML"):
+        Study.from_toml(tmp_path / "latin.toml")
+    with pytest.raises(StudyError, match="cannot be read"):
+        Study.from_toml(tmp_path / "absent.toml")
+    with pytest.raises(StudyError, match="cannot be read"):
+        Study.from_toml(tmp_path)
+
+
+def test_the_error_survives_pickling() -> None:
+    import pickle
+
+    error = pickle.loads(pickle.dumps(StudyError("name", 3, "a text")))
+    assert (error.field, error.value, error.allowed) == ("name", 3, "a text")
+
+
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_every_scene_describes_its_parameters(name: str) -> None:
+    schema = scene_schema(name)
+    assert schema["additionalProperties"] is False
+    for parameter, known in schema["properties"].items():
+        assert known["description"], parameter
+        assert "default" in known, parameter
+
+
+def test_the_schema_carries_units_and_ranges() -> None:
+    friction = scene_schema("fake")["properties"]["friction"]
+    assert (friction["minimum"], friction["maximum"], friction["unit"]) == (0.0, 1.0, "1")
+    assert scene_schema("fake")["properties"]["half_width"]["unit"] == "mm"
+
+
+def test_the_ready_study_of_the_punch_is_45_runs_in_15_paths() -> None:
+    study = Study.from_toml(ROOT / "data" / "studies" / "punch.toml")
+    assert study.size == 45
+    assert len(study.paths()) == 15
+
+
+def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray() -> None:
+    code = (
+        "import sys, studies; studies.Study;"
+        "print([m for m in ('dask', 'distributed', 'matplotlib', 'xarray') if m in sys.modules])"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert answer.stdout.strip() == "[]"
