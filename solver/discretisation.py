@@ -123,6 +123,16 @@ class Discretisation:
         """Return stress, tangent and new state at all points."""
         return respond(self.strain(u), state, self.body.material, self.body.state)
 
+    def elastic_energy(self, strain: NDArray[np.float64]) -> float:
+        """Return twice the elastic energy of Mandel strain (4, n_points) [N mm]."""
+        C = elastic_stiffness(self.body.material, self.body.state)
+        return self.quadratic(strain, C[:, :, None])
+
+    def quadratic(self, strain: NDArray[np.float64], moduli: NDArray[np.float64]) -> float:
+        """Return the integral of ``strain moduli strain`` [N mm]; moduli (4, 4, n_points or 1)."""
+        stress = np.einsum("abp,bp->ap", np.broadcast_to(moduli, (4, 4, strain.shape[1])), strain)
+        return float((stress * strain).sum(axis=0) @ self.weights.ravel())
+
     def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
         weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)

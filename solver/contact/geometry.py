@@ -36,6 +36,7 @@ class Pairing:
     Attributes
     ----------
     area : (n,) integral of the hat over the part that faces the master [mm2]
+    length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
         nothing faces the vertex
     normal, tangent : pairs ``(slave, master)`` of (n, 2 n_nodes) derivative rows of gap and
@@ -43,6 +44,7 @@ class Pairing:
     """
 
     area: NDArray[np.float64]
+    length: NDArray[np.float64]
     gap: NDArray[np.float64]
     normal: tuple[NDArray[np.float64], NDArray[np.float64]]
     tangent: tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -199,11 +201,8 @@ def _integrate(
                 value = sign * (hat * N.T)[..., None] * direction.T
                 np.add.at(target[kind], (vertex[:, None], nodes), value.swapaxes(0, 1))
 
-    full = np.zeros(rows)
     length = np.linalg.norm(np.diff(slave.X[:, slave.vertices]), axis=0)
-    size = length * slave.measure[slave.edges[:, :2]].mean(axis=1) / 2
-    full[:-1] += size
-    full[1:] += size
+    full = _hat_sum(length * slave.measure[slave.edges[:, :2]].mean(axis=1) / 2)
     covered = area > _MIN_COVERED * full
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
     flat = [
@@ -211,7 +210,13 @@ def _integrate(
     ]
     return Pairing(
         area=np.where(covered, area, 0.0),
+        length=_hat_sum(length) / _hat_sum(np.ones_like(length)),
         gap=np.where(covered, gap * scale, np.inf),
         normal=(flat[0][0], flat[1][0]),
         tangent=(flat[0][1], flat[1][1]),
     )
+
+
+def _hat_sum(of_edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum over the one or two edges at each vertex."""
+    return np.append(of_edges, 0.0) + np.append(0.0, of_edges)

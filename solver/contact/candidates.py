@@ -1,0 +1,190 @@
+"""The contact points of a system at given displacements, as rows of one dense problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.complementarity import OPEN
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.geometry import Pairing
+    from solver.operators import Operator
+    from solver.system import ContactState, State, System
+
+_MARGIN = 2.0
+"""Vertices nearer than this many element lengths are candidates."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Derivative rows of all gaps (and slips) on the unknowns ``dofs`` of one part."""
+
+    dofs: NDArray[np.int64]
+    block: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """Vertices near contact; gaps first, then slips since the last converged state.
+
+    Attributes
+    ----------
+    vertices : for each interface, the slave vertices that are candidates
+    friction : (n,) coefficient; zero where the vertex had no contact before, since a newly
+        touching point starts without tangential force
+    motion : (n or 2n,) gap, and slip when there is friction [mm]
+    forces : the contact forces of the current iterate in the same order [N]
+    status : (n,) of the current iterate
+    rows : one a part, None for a part without contact surface
+    beyond : smallest gap of the vertices that are not candidates [mm]
+    """
+
+    vertices: tuple[NDArray[np.int64], ...]
+    friction: NDArray[np.float64]
+    motion: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    status: NDArray[np.int64]
+    rows: tuple[Rows | None, ...]
+    beyond: float
+
+    @property
+    def n(self) -> int:
+        """Number of candidate vertices."""
+        return len(self.friction)
+
+    def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+        """Return the nodal forces (size,) that contact forces exert on a part [N]."""
+        nodal = np.zeros(size)
+        rows = self.rows[part]
+        if rows is not None:
+            nodal[rows.dofs] = forces @ rows.block
+        return nodal
+
+    def of_part(self, part: int, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the gaps and slips that displacements ``u`` (n, ...) of a part make [mm]."""
+        rows = self.rows[part]
+        if rows is None:
+            return np.zeros((len(self.motion), *u.shape[1:]))
+        return np.asarray(rows.block @ u[rows.dofs])
+
+    def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
+        """Return W: how contact forces move the contact points [mm/N]."""
+        W = np.zeros((len(self.motion), len(self.motion)))
+        for operator, rows in zip(operators, self.rows, strict=True):
+            if rows is not None:
+                W += operator.compliance(rows.dofs, rows.block)
+        return W
+
+    def violation(self, stiffness: NDArray[np.float64]) -> float:
+        """Return the natural residual of the contact conditions, as a force [N].
+
+        ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -mu N, mu N)|``
+        with the stiffness k of the elastic contact points.
+        """
+        n, F, k = self.n, self.forces, stiffness
+        if n == 0:
+            return 0.0
+        N = F[:n]
+        worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
+        if len(F) > n:
+            bound = self.friction * np.maximum(N, 0)
+            wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
+            worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
+        return worst
+
+    def states(
+        self,
+        before: tuple[ContactState, ...],
+        forces: NDArray[np.float64],
+        status: NDArray[np.int64],
+    ) -> tuple[ContactState, ...]:
+        """Return the contact states that hold these forces and statuses."""
+        out, at = [], 0
+        for state, vertices in zip(before, self.vertices, strict=True):
+            here = slice(at, at + len(vertices))
+            at += len(vertices)
+            normal, tangential = np.zeros((2, len(state.normal)))
+            normal[vertices] = forces[: self.n][here]
+            if len(forces) > self.n:
+                tangential[vertices] = forces[self.n :][here]
+            statuses = np.full_like(state.status, OPEN)
+            statuses[vertices] = status[here]
+            out.append(replace(state, normal=normal, tangential=tangential, status=statuses))
+        return tuple(out)
+
+
+def no_candidates(system: System) -> Candidates:
+    """Return the empty set: bodies taken apart."""
+    empty = np.zeros(0)
+    none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
+    rows = tuple(None for _ in system.parts)
+    return Candidates(none, empty, empty, empty, empty.astype(int), rows, np.inf)
+
+
+def find_candidates(
+    system: System,
+    start: State,
+    u: tuple[NDArray[np.float64], ...],
+    contacts: tuple[ContactState, ...],
+) -> Candidates:
+    """Return the candidates at displacements ``u``; slips count from the state ``start``."""
+    pairings = [interface.pairing(u) for interface in system.interfaces]
+    vertices = [_near(p, c) for p, c in zip(pairings, contacts, strict=True)]
+    n = sum(len(v) for v in vertices)
+    frictional = any(interface.friction > 0 for interface in system.interfaces)
+    m = 2 * n if frictional else n
+    moved = [now - before for now, before in zip(u, start.u, strict=True)]
+    motion, friction, beyond = np.zeros(m), np.zeros(n), np.inf
+    pieces: list[list[Rows]] = [[] for _ in system.parts]
+    first = 0
+    for interface, pairing, at, before in zip(
+        system.interfaces, pairings, vertices, start.contacts, strict=True
+    ):
+        normal = slice(first, first + len(at))
+        tangent = slice(n + first, n + first + len(at))
+        first += len(at)
+        motion[normal] = pairing.gap[at]
+        beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
+        friction[normal] = np.where(before.touching[at], interface.friction, 0.0)
+        for side, (part, surface) in enumerate(interface.sides):
+            block = np.zeros((m, len(surface.dofs)))
+            block[normal] = pairing.normal[side][at]
+            if frictional:
+                block[tangent] = pairing.tangent[side][at]
+                motion[tangent] += block[tangent] @ moved[part][surface.dofs]
+            pieces[part].append(Rows(surface.dofs, block))
+
+    def gather(name: str) -> NDArray[np.float64]:
+        values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]
+        return np.concatenate([np.zeros(0), *values])
+
+    forces = gather("normal")
+    return Candidates(
+        vertices=tuple(vertices),
+        friction=friction,
+        motion=motion,
+        forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
+        status=gather("status").astype(np.int64),
+        rows=tuple(_join(p) for p in pieces),
+        beyond=float(beyond),
+    )
+
+
+def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:
+    near = (pairing.gap < _MARGIN * pairing.length) | (contact.normal > 0)
+    return np.flatnonzero(near & (pairing.area > 0))
+
+
+def _join(pieces: list[Rows]) -> Rows | None:
+    if not pieces:
+        return None
+    return Rows(
+        np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces])
+    )

@@ -1,0 +1,42 @@
+"""How far to go along a step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_EVALUATIONS = 10
+_SLACK = 0.2
+
+
+def search(slope: Callable[[float], float], start: float) -> float:
+    """Return the share of a step, in (0, 1], at which the energy stops falling.
+
+    In an increment of associated plasticity the energy is convex, and its slope along the step
+    rises through zero; a share is accepted when the slope has dropped to a fifth of ``start``
+    in size, or when the whole step still goes downhill. Tighter than usual, because in a
+    perfectly plastic body close to its limit a loose search leaves Newton's method creeping.
+
+    Parameters
+    ----------
+    slope : (share) -> minus the derivative of the energy along the step (Illinois iteration)
+    start : its value at share zero; where it is not positive the whole step is taken
+    """
+    share = 1.0
+    now = slope(share)
+    if start <= 0 or now >= -_SLACK * start:
+        return share
+    low, at_low, high, at_high = 0.0, start, 1.0, now
+    for _ in range(_EVALUATIONS):
+        ratio = at_low / (at_low - at_high)
+        share = low + (high - low) * min(max(ratio, 0.1), 0.9)
+        now = slope(share)
+        if abs(now) <= _SLACK * start:
+            break
+        if now > 0:
+            low, at_low, at_high = share, now, 0.5 * at_high
+        else:
+            high, at_low, at_high = share, 0.5 * at_low, now
+    return share

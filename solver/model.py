@@ -1,0 +1,70 @@
+"""Model = bodies + contact pairs: what is solved, checked as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from solver.body import Body
+from solver.errors import ModelError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactPair:
+    """Two boundaries that may touch.
+
+    Attributes
+    ----------
+    slave, master : ``(body name, boundary name)``. The slave is the body whose surface ends at
+        a corner, else the finer or yielding one; pressure lives on its vertices
+    friction : Coulomb coefficient; 0 leaves out the tangential unknowns
+    sliding : ``small`` pairs the surfaces where they are before loading, consistently with
+        small strains (and exactly linear between changes of status); ``finite`` pairs them
+        anew in every iteration
+    """
+
+    slave: tuple[str, str]
+    master: tuple[str, str]
+    friction: float = 0.0
+    sliding: Literal["small", "finite"] = "small"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.friction) and self.friction >= 0):
+            raise ModelError("friction", self.friction, "must be finite and at least 0")
+        if self.sliding not in ("small", "finite"):
+            raise ModelError("sliding", self.sliding, "must be small or finite")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Model:
+    """Bodies in contact.
+
+    Attributes
+    ----------
+    bodies : with different names and one common state
+    contacts : pairs of their boundaries
+    """
+
+    bodies: tuple[Body, ...]
+    contacts: tuple[ContactPair, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        if not names or len(set(names)) < len(names):
+            raise ModelError("bodies", names, "must be at least one, with different names")
+        states = {body.state for body in self.bodies}
+        if len(states) > 1:
+            raise ModelError("bodies.state", sorted(states), "must be the same for all bodies")
+        for contact in self.contacts:
+            for side, (name, boundary) in (("slave", contact.slave), ("master", contact.master)):
+                self.body(name, side).facets(boundary, side)
+
+    def body(self, name: str, field: str = "body") -> Body:
+        """Return the body called ``name``."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        allowed = "must be one of " + ", ".join(b.name for b in self.bodies)
+        raise ModelError(field, name, allowed)

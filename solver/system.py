@@ -1,0 +1,145 @@
+"""A model made ready to solve: its parts, their operators, its contact pairs, its states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver import surface
+from solver.contact.complementarity import OPEN, STICK
+from solver.contact.geometry import Pairing, pair
+from solver.operators import Operators
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.constitutive import PlasticState
+    from solver.discretisation import Discretisation
+    from solver.model import ContactPair, Model
+    from solver.surface import Surface
+
+
+@dataclass(frozen=True, slots=True)
+class ContactState:
+    """What a contact pair carries from one increment to the next, a value a slave vertex.
+
+    ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
+    surface's tangent; ``status`` as in `solver.contact.complementarity`; ``touching`` tells
+    whether the vertex had contact, so that its friction has a history.
+    """
+
+    normal: NDArray[np.float64]
+    tangential: NDArray[np.float64]
+    status: NDArray[np.int64]
+    touching: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A converged state of the whole system; never changed, only replaced.
+
+    ``load`` is the load factor, ``force_scale`` the largest force level met so far, to which
+    tolerances refer [N].
+    """
+
+    load: float
+    u: tuple[NDArray[np.float64], ...]
+    plastic: tuple[PlasticState, ...]
+    contacts: tuple[ContactState, ...]
+    force_scale: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """A contact pair on its two parts."""
+
+    slave: int
+    master: int
+    slave_surface: Surface
+    master_surface: Surface
+    friction: float
+    reference: Pairing | None
+
+    @property
+    def sides(self) -> tuple[tuple[int, Surface], tuple[int, Surface]]:
+        """Slave and master: part number and surface."""
+        return (self.slave, self.slave_surface), (self.master, self.master_surface)
+
+    def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
+        """Return gap, area and derivative rows at displacements ``u``."""
+        slave, master = u[self.slave], u[self.master]
+        if self.reference is not None:
+            on_slave, on_master = self.reference.normal
+            change = on_slave @ slave[self.slave_surface.dofs]
+            change += on_master @ master[self.master_surface.dofs]
+            return replace(self.reference, gap=self.reference.gap + change)
+        return pair(
+            self.slave_surface,
+            slave[self.slave_surface.dofs].reshape(-1, 2).T,
+            self.master_surface,
+            master[self.master_surface.dofs].reshape(-1, 2).T,
+        )
+
+
+def _interface(contact: ContactPair, parts: tuple[Discretisation, ...], names: list[str]) -> Interface:
+    sides = []
+    for name, boundary in (contact.slave, contact.master):
+        number = names.index(name)
+        sides.append((number, surface.extract(parts[number], boundary)))
+    (slave, slave_surface), (master, master_surface) = sides
+    reference = None
+    if contact.sliding == "small":
+        at_rest = [np.zeros_like(chain.X) for _, chain in sides]
+        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1])
+    return Interface(slave, master, slave_surface, master_surface, contact.friction, reference)
+
+
+class System:
+    """A model's parts, operators and interfaces, built once and shared by all its runs."""
+
+    def __init__(self, model: Model, linear_solver: str = "auto") -> None:
+        self.model = model
+        self.parts: tuple[Discretisation, ...] = tuple(b.discretisation for b in model.bodies)
+        self.operators = tuple(Operators(part, linear_solver) for part in self.parts)
+        names = [body.name for body in model.bodies]
+        self.interfaces = tuple(_interface(c, self.parts, names) for c in model.contacts)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Displacement unknowns of all parts."""
+        return sum(len(part.free) for part in self.parts)
+
+    @cached_property
+    def proportional(self) -> bool:
+        """Whether elastic states do not depend on how the load was brought on.
+
+        True without friction, and where all facing vertices touch before loading, so that
+        every status stays as it is while the load grows.
+        """
+        conforming = all(
+            (np.isinf(gap) | (np.abs(gap) < 1e-9 * np.ptp(i.slave_surface.X))).all()
+            for i in self.interfaces
+            for gap in [i.pairing(self.initial().u).gap]
+        )
+        return conforming or all(i.friction == 0 for i in self.interfaces)
+
+    def part(self, name: str) -> int:
+        """Return the number of the part called ``name``."""
+        return [body.name for body in self.model.bodies].index(name)
+
+    def initial(self) -> State:
+        """Return the unloaded, undeformed state."""
+        u = tuple(np.zeros(part.n) for part in self.parts)
+        contacts = []
+        for interface in self.interfaces:
+            gap = interface.pairing(u).gap
+            length = np.ptp(interface.slave_surface.X, axis=1).max()
+            touching = gap <= 1e-9 * length
+            n = len(gap)
+            contacts.append(
+                ContactState(np.zeros(n), np.zeros(n), np.where(touching, STICK, OPEN), touching)
+            )
+        return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))
