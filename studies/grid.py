@@ -7,7 +7,7 @@ import queue
 import tempfile
 import time
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +27,8 @@ Function = Callable[[Any, Report, Stopped], Any]
 
 _POLL = 0.2
 """Seconds between two looks at whether to stop, on either side."""
+_CONNECT = 10.0
+"""Seconds within which a scheduler must answer."""
 
 _CONFIGURATION = {
     # A task whose worker died is tried once more; a second death is the task's own doing.
@@ -89,7 +91,9 @@ class Grid:
             else:
                 address = self._scheduler
             try:
-                self._client = opening.enter_context(Client(address, set_as_default=False))
+                self._client = opening.enter_context(
+                    Client(address, set_as_default=False, timeout=_CONNECT)
+                )
             except (OSError, ValueError) as error:
                 raise GridLost(f"no scheduler answers at {address}: {error}") from error
             self._open = opening.pop_all()
@@ -117,31 +121,33 @@ class Grid:
         self._client.subscribe_topic(token, lambda event: inbox.put(Message(event[1])))
         call = partial(_call, function, token)
         keys = [f"sim-{uuid.uuid4().hex}" for _ in tasks]
-        futures = self._client.map(call, tasks, key=keys, pure=False)
-        waiting = {key: position for position, key in enumerate(keys)}
-        for future in futures:
+        futures = dict(zip(keys, self._client.map(call, tasks, key=keys, pure=False), strict=True))
+        positions = {key: position for position, key in enumerate(keys)}
+        for future in futures.values():
             future.add_done_callback(inbox.put)
         try:
             stopping = False
-            while waiting:
+            while futures:
                 if not stopping and should_stop():
                     stopping = True
                     stop.set()
-                    for key in self._drop_idle(futures):
-                        del waiting[key]
+                    for key in self._drop_idle(futures.values()):
+                        del futures[key]
                 try:
                     item = inbox.get(timeout=_POLL)
                 except queue.Empty:
                     continue
                 if isinstance(item, Message):
                     yield item
-                elif item.key in waiting:
-                    yield _finished(item, waiting.pop(item.key))
+                elif item.key in futures:
+                    yield _finished(item, positions[item.key])
+                    # Let go, or the task would be repeated if the worker died with the result.
+                    futures.pop(item.key).release()
         finally:
             self._client.unsubscribe_topic(token)
-            self._client.cancel(futures)
+            self._client.cancel(list(futures.values()))
 
-    def _drop_idle(self, futures: Sequence[Future]) -> list[str]:
+    def _drop_idle(self, futures: Iterable[Future]) -> list[str]:
         """Cancel the tasks that no worker has begun; return their keys."""
         begun = {key for keys in self._client.processing().values() for key in keys}
         idle = [each for each in futures if not each.done() and each.key not in begun]

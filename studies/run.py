@@ -114,6 +114,7 @@ def run_study(
         known = store.catalogue.rows(case.id for case in cases)
         done = {key for key, row in known.items() if resume or row["status"] == layout.OK}
         wanted = {case.id for case in cases} - done
+        store.discard(wanted & known.keys())
         work = _Work(study, store, wanted, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, scheduler, stop)

@@ -15,7 +15,7 @@ import fcntl
 import json
 import os
 import uuid
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -107,6 +107,12 @@ class Store:
                 if not each.is_scale
             }
             return layout.summary(run.attrs, values)
+
+    def discard(self, run_ids: Collection[str]) -> None:
+        """Delete runs that shall be computed again."""
+        for run_id in run_ids:
+            self.run_path(run_id).unlink(missing_ok=True)
+        self.catalogue.remove(run_ids)
 
     def rebuild_catalogue(self) -> int:
         """Make the catalogue anew from the files; return the number of runs."""

@@ -38,8 +38,8 @@ def walk(
 ) -> list[dict[str, Any]]:
     """Compute the runs of a path, and return their catalogue rows.
 
-    A run that is already there in full is left alone: a worker that took the path over from a
-    dead one continues where that stopped. When the path raises, the runs it still owed are
+    A run that is already there is left alone: a worker that took the path over from a dead one
+    continues where that stopped. When the path raises, the runs it still owed are
     written as broken, with the reason.
     """
     if task.source != solver_hash():
@@ -60,8 +60,8 @@ def walk(
 
     owed: dict[Any, Case] = {}
     for case in task.path.cases:
-        if store.run_path(case.id).exists() and _is_ok(row := store.read_row(case.id)):
-            keep(row)
+        if store.run_path(case.id).exists():
+            keep(store.read_row(case.id))
         else:
             owed[case.values[task.scene.branch]] = case
     reason = NO_RECORD
@@ -78,7 +78,3 @@ def walk(
     for case in owed.values():
         keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
     return rows
-
-
-def _is_ok(row: dict[str, Any]) -> bool:
-    return bool(row["status"] == layout.OK)

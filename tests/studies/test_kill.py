@@ -1,0 +1,115 @@
+"""Killed in mid study: nothing looks finished that is not, and nothing is computed twice."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from studies import Store, Study, open_netcdf, run_study
+from tests.studies.conftest import fake_study
+
+ROOT = Path(__file__).parents[2]
+RUNS = 12
+
+
+def start(study: Study, out: Path, directory: Path) -> subprocess.Popen[str]:
+    """Start ``residua run`` in a process group of its own."""
+    file = directory / "slow.toml"
+    fixed = "\n".join(f"{name} = {value!r}" for name, value in study.parameters.items())
+    file.write_text(
+        f'name = "{study.name}"\nscene = "fake"\n[parameters]\n{fixed}\n'
+        f"[sweep]\nfriction = {study.sweep['friction']}\n"
+    )
+    command = ["-m", "tests.studies.command", "run", str(file), "--out", str(out), "--workers", "2"]
+    return subprocess.Popen(
+        [sys.executable, *command],
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> tuple[Study, Store, Path]:
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    sweep = {"friction": [i / 20 for i in range(RUNS)]}
+    return fake_study("slow", sweep, mark=str(marks), seconds=0.6), Store(tmp_path / "out"), marks
+
+
+def finished(store: Store) -> list[Path]:
+    return list((store.directory / "runs").glob("*.nc"))
+
+
+def test_a_killed_parent_leaves_only_whole_runs_and_its_workers_die(
+    slow: tuple[Study, Store, Path], tmp_path: Path
+) -> None:
+    study, store, marks = slow
+    with start(study, store.directory, tmp_path) as parent:
+        wait_until(lambda: len(finished(store)) >= 3)
+        family = psutil.Process(parent.pid).children(recursive=True)
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    _, alive = psutil.wait_procs(family, timeout=10)
+    assert alive == []
+    done = finished(store)
+    assert 3 <= len(done) < RUNS
+    for path in done:
+        with open_netcdf(path) as run:
+            assert run.attrs["id"] == path.stem
+            assert run["residual_stress"].load().notnull().any()
+    assert not store.dataset_path(study.id).exists()
+    begun_before = len(list(marks.iterdir()))
+
+    outcome = run_study(study, store, workers=2)
+
+    assert outcome.counts == {"ok": RUNS}
+    assert len(outcome.computed) == RUNS - len(done)
+    assert len(list(marks.iterdir())) - begun_before == RUNS - len(done)
+    assert list(store.directory.rglob("*.part")) == []
+    assert store.catalogue.runs()[1] == RUNS
+
+
+def test_a_killed_worker_costs_only_the_path_it_was_on(
+    slow: tuple[Study, Store, Path],
+) -> None:
+    study, store, marks = slow
+    killed: list[int] = []
+
+    def kill_one_worker(event: object) -> None:
+        if not killed and len(finished(store)) >= 2:
+            killed.append(max(int(mark.name.split("-")[-1]) for mark in marks.iterdir()))
+            os.kill(killed[0], signal.SIGKILL)
+
+    outcome = run_study(study, store, workers=2, on_event=kill_one_worker)
+    assert killed
+    assert outcome.counts == {"ok": RUNS}
+    assert RUNS <= len(list(marks.iterdir())) <= RUNS + 1
+
+
+def test_ctrl_c_stops_cleanly(slow: tuple[Study, Store, Path], tmp_path: Path) -> None:
+    study, store, _ = slow
+    with start(study, store.directory, tmp_path) as parent:
+        wait_until(lambda: len(finished(store)) >= 2)
+        os.killpg(parent.pid, signal.SIGINT)  # a terminal sends it to the workers as well
+        output, errors = parent.communicate(timeout=20)
+    assert parent.returncode == 130
+    assert "missing" in output
+    assert "Traceback" not in output + errors
+    assert {path.stem for path in finished(store)} == {
+        row["id"] for row in store.catalogue.runs(status="ok")[0]
+    }
+    assert list(store.directory.rglob("*.part")) == []
