@@ -18,7 +18,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
-from studies import GridLost, Store, StoreBusy, Study, StudyError, run_study
+from service.store import open_store
+from studies import GridLost, StoreBusy, Study, StudyError, run_study
 
 STDIN = 0
 
@@ -83,7 +84,7 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         return
     outcome = run_study(
         study,
-        Store(Path(order["data"])),
+        open_store(Path(order["data"])),
         workers=order["workers"],
         scheduler=order["scheduler"],
         resume=not order["again"],

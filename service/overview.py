@@ -55,7 +55,7 @@ def _columns(job: Job) -> dict[str, Any]:
         "id": job.id,
         "name": job.study["name"],
         "scene": job.study["scene"],
-        "state": job.state,
+        "status": job.state,
         "message": job.message,
         "progress": round(job.progress, 1),
         "size": job.size,

@@ -26,7 +26,7 @@ class Window(BaseModel):
 class StudyFilter(Window):
     """Which studies are asked for."""
 
-    state: State | None = None
+    status: State | None = None
 
 
 class RunFilter(Window):
@@ -60,7 +60,7 @@ class StudySummary(BaseModel):
     id: str
     name: str
     scene: str
-    state: State
+    status: State
     message: str = Field(description="why it failed, or is not getting on")
     progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
     size: int = Field(description="number of runs")

@@ -48,7 +48,7 @@ def submit(
 @router.get("")
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
-    page, total = jobs.page(limit=which.limit, offset=which.offset, state=which.state)
+    page, total = jobs.page(limit=which.limit, offset=which.offset, state=which.status)
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 
@@ -83,7 +83,7 @@ async def events(
         if now != shown:
             yield ServerSentEvent(event="study", data=now.model_dump(mode="json"))
             shown = now
-        if now.state.final:
+        if now.status.final:
             return
         await asyncio.sleep(settings.poll_seconds)
 

@@ -21,6 +21,6 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture
 def mortal(tmp_path: Path) -> Iterator[Server]:
     """A service of the test's own, to be stopped and killed; not started yet."""
-    server = Server(tmp_path / "mortal")
+    server = Server(tmp_path / "mortal", workers=2)
     yield server
     server.close()

@@ -28,7 +28,6 @@ def environment(log: Path) -> dict[str, str]:
     return os.environ | {
         "PYTHONPATH": os.pathsep.join([str(ROOT), str(STARTUP)]),
         "FAKE_SCENE_LOG": str(log),
-        "RESIDUA_WORKERS": "2",
         "RESIDUA_POLL_SECONDS": "0.1",
         "RESIDUA_ATTEMPTS": "2",
     }
@@ -47,7 +46,7 @@ def wait_until(condition: Callable[[], Any], seconds: float = 30.0) -> Any:
     deadline = time.monotonic() + seconds
     while not (answer := condition()):
         assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.05)
+        time.sleep(0.1)
     return answer
 
 
@@ -56,6 +55,7 @@ class Server:
     """A service on the directory ``home``; may be stopped, killed and started again."""
 
     home: Path
+    workers: int = 1
     port: int = field(default_factory=free_port)
     process: subprocess.Popen[bytes] | None = None
 
@@ -79,7 +79,7 @@ class Server:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", PROGRAM, str(self.port), str(self.data)],
                 cwd=self.home,
-                env=environment(self.log),
+                env=environment(self.log) | {"RESIDUA_WORKERS": str(self.workers)},
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
@@ -126,7 +126,7 @@ class Server:
 
         def ended() -> dict[str, Any] | None:
             study = self.study(study_id)
-            return study if study["state"] not in ("accepted", "running") else None
+            return study if study["status"] not in ("accepted", "running") else None
 
         study: dict[str, Any] = wait_until(ended, seconds)
         return study

@@ -29,6 +29,25 @@ PROGRAMS = {
 }
 
 
+KEYS = {
+    "image", "build", "restart", "init", "command", "healthcheck", "volumes", "depends_on",
+    "ports", "stop_grace_period",
+}  # fmt: skip
+DURATION = re.compile(r"\d+s")
+
+
+def test_the_file_keeps_to_the_compose_specification() -> None:
+    assert set(COMPOSE) == {"name", "x-residua", "services", "volumes"}
+    for service in SERVICES.values():
+        assert set(service) <= KEYS
+        assert all(isinstance(word, str) for word in service["command"])
+        check = service["healthcheck"]
+        assert set(check) == {"test", "interval", "timeout", "start_period", "retries"}
+        assert isinstance(check["retries"], int)
+        spans = [check["interval"], check["timeout"], check["start_period"]]
+        assert all(DURATION.fullmatch(span) for span in spans)
+
+
 @pytest.mark.parametrize("name", ["scheduler", "worker", "service"])
 def test_every_service_restarts_and_is_watched(name: str) -> None:
     service = SERVICES[name]
@@ -136,7 +155,7 @@ def stage(tmp_path: Path) -> Iterator[Stage]:
 def test_the_three_processes_compute_a_posted_study(stage: Stage) -> None:
     with httpx.Client(base_url=f"http://127.0.0.1:{stage.ports['8000']}") as client:
         url = client.post("/studies", json=fake_study("composed")).headers["location"]
-        wait_until(lambda: client.get(url).json()["state"] == "successful", 60.0)
+        wait_until(lambda: client.get(url).json()["status"] == "successful", 60.0)
         fetched = stage.home / "fetched.nc"
         fetched.write_bytes(client.get(f"{url}/dataset.nc").content)
     with open_netcdf(fetched) as dataset:
@@ -153,5 +172,5 @@ def test_a_scheduler_that_restarts_costs_no_study(stage: Stage) -> None:
         for name in ("scheduler", "worker"):
             stage.processes[name].wait(timeout=30.0)
             stage.start(name)  # as the engine does, see test_every_service_restarts_and_is_watched
-        wait_until(lambda: client.get(url).json()["state"] == "successful", 60.0)
+        wait_until(lambda: client.get(url).json()["status"] == "successful", 60.0)
         assert client.get(url).json()["counts"] == {"ok": 8}

@@ -13,16 +13,15 @@ from typing import Any
 import psutil
 
 from service.jobs import Jobs
+from service.store import open_store
 from studies import open_netcdf
 from tests.architecture.sources import ROOT
 from tests.service.servers import PROGRAM, Server, environment, fake_study, free_port, wait_until
 
-WORKERS = 2
-
 
 def long_study(name: str) -> dict[str, Any]:
     """Return a study of sixteen runs in eight paths that takes some seconds."""
-    study = fake_study(name, seconds=0.4)
+    study = fake_study(name, seconds=0.3)
     study["sweep"]["friction"] = [i / 10 for i in range(8)]
     return study
 
@@ -64,10 +63,10 @@ def test_a_killed_service_takes_its_studies_up_again(mortal: Server) -> None:
     mortal.start()
     for study_id, runs in ((first, 16), (second, 4)):
         study = mortal.finished(study_id)
-        assert (study["state"], study["counts"]) == ("successful", {"ok": runs})
+        assert (study["status"], study["counts"]) == ("successful", {"ok": runs})
     assert len(stored(mortal)) == 20
     assert repeated(mortal, before) == []
-    assert len(mortal.computed()) <= 20 + WORKERS
+    assert len(mortal.computed()) <= 20 + mortal.workers
     assert not list(mortal.data.rglob("*.part"))
     assert not [process for process in orphans if process.is_running()]
     path = mortal.data / "studies" / first / "dataset.nc"
@@ -75,14 +74,16 @@ def test_a_killed_service_takes_its_studies_up_again(mortal: Server) -> None:
         assert bool(dataset["max_plastic_strain"].notnull().all())
 
 
-def test_a_stopped_service_ends_in_order_and_resumes(mortal: Server) -> None:
+def test_a_stopped_service_ends_in_order_though_it_is_watched_and_resumes(mortal: Server) -> None:
     mortal.start()
     study_id = mortal.post(long_study("stopped"))
     before = wait_until(lambda: some_done(mortal))
-    mortal.stop()
+    with mortal.client.stream("GET", f"/studies/{study_id}/events") as stream:
+        next(stream.iter_lines())
+        mortal.stop()
     assert 3 <= len(stored(mortal)) < 16
     mortal.start()
-    assert mortal.study(study_id)["state"] in ("accepted", "running")
+    assert mortal.study(study_id)["status"] in ("accepted", "running")
     assert mortal.finished(study_id)["counts"] == {"ok": 16}
     assert repeated(mortal, before) == []
 
@@ -105,9 +106,9 @@ def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(mortal: Se
     deadly["sweep"] = {"friction": [0.1]}
     deadly_id, next_id = mortal.post(deadly), mortal.post(fake_study("next"))
     study = mortal.finished(deadly_id)
-    assert (study["state"], study["counts"]) == ("failed", {"error": 1})
+    assert (study["status"], study["counts"]) == ("failed", {"error": 1})
     assert "worker" in study["runs"][0]["message"]
-    assert mortal.finished(next_id)["state"] == "successful"
+    assert mortal.finished(next_id)["status"] == "successful"
 
 
 def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:
@@ -119,7 +120,26 @@ def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:
     mortal.start()
     assert "post it again" in mortal.finished("a" * 32)["message"]
     refused = mortal.finished("c" * 32)
-    assert refused["state"] == "failed" and "parameters.gone" in refused["message"]
+    assert refused["status"] == "failed" and "parameters.gone" in refused["message"]
+
+
+INTERRUPTED_WRITER = """
+import os, sqlite3, sys
+connection = sqlite3.connect(sys.argv[1])
+connection.execute("PRAGMA cache_size = 1")
+connection.execute("BEGIN")
+for number in range(1000):
+    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, ""]
+    connection.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+os._exit(9)
+"""
+
+
+def test_a_catalogue_whose_writer_was_killed_can_be_read(tmp_path: Path) -> None:
+    catalogue = open_store(tmp_path).catalogue
+    subprocess.run([sys.executable, "-c", INTERRUPTED_WRITER, catalogue.path], check=False)
+    assert catalogue.path.with_name(f"{catalogue.path.name}-journal").exists()
+    assert open_store(tmp_path).catalogue.runs() == ([], 0)
 
 
 def refusal(data: Path, **settings: str) -> str:
@@ -150,11 +170,3 @@ def test_bad_settings_are_refused_by_name(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()
     assert str(file) in refusal(file)
-
-
-def test_an_open_event_stream_does_not_keep_the_service_from_stopping(mortal: Server) -> None:
-    mortal.start()
-    study_id = mortal.post(long_study("watched"))
-    with mortal.client.stream("GET", f"/studies/{study_id}/events") as stream:
-        next(stream.iter_lines())
-        mortal.stop()

@@ -182,7 +182,7 @@ def test_a_method_that_is_not_offered_is_named(service: Server) -> None:
         ("/runs?friction=nan", "friction"),
         ("/runs?friction=rough", "friction"),
         ("/runs?frictoin=0.1", "frictoin"),
-        ("/studies?state=happy", "state"),
+        ("/studies?status=happy", "status"),
     ],
 )
 def test_a_bad_query_is_refused_by_field(service: Server, path: str, field: str) -> None:

@@ -43,7 +43,7 @@ def test_simultaneous_posts_of_a_study_make_one_study(service: Server) -> None:
 def test_a_finished_study_counts_its_runs_and_names_their_place(
     service: Server, done: dict[str, Any]
 ) -> None:
-    assert (done["state"], done["progress"], done["counts"]) == ("successful", 100, {"ok": 4})
+    assert (done["status"], done["progress"], done["counts"]) == ("successful", 100, {"ok": 4})
     places = [(run["at"]["load_ratio"], run["at"]["friction"]) for run in done["runs"]]
     assert places == [(0.25, 0.0), (0.25, 0.3), (0.5, 0.0), (0.5, 0.3)]
     for run in done["runs"]:
@@ -65,7 +65,7 @@ def test_studies_come_in_pages_the_latest_first(service: Server, done: dict[str,
     assert everything["items"][0]["name"] == "later"
     page = service.client.get("/studies", params={"limit": 1, "offset": 1}).json()
     assert [study["id"] for study in page["items"]] == ids[1:2]
-    failed = service.client.get("/studies", params={"state": "failed"}).json()
+    failed = service.client.get("/studies", params={"status": "failed"}).json()
     assert done["id"] not in {study["id"] for study in failed["items"]}
 
 
@@ -93,7 +93,7 @@ def test_events_tell_the_story_to_its_end(service: Server) -> None:
     with service.client.stream("GET", f"/studies/{study_id}/events") as stream:
         assert stream.headers["content-type"].startswith("text/event-stream")
         story = [json.loads(line[5:]) for line in stream.iter_lines() if line.startswith("data:")]
-    assert story[-1]["state"] == "successful"
+    assert story[-1]["status"] == "successful"
     progress = [chapter["progress"] for chapter in story]
     assert progress == sorted(progress)
     assert progress[0] == 0 and progress[-1] == 100
@@ -106,20 +106,20 @@ def test_a_study_with_failed_runs_fails_and_a_retry_computes_only_those(service:
     shared["sweep"].pop("load_ratio")
     study_id = service.post(shared)
     failed = service.finished(study_id)
-    assert (failed["state"], failed["counts"]) == ("failed", {"ok": 2, "limit_load": 2})
+    assert (failed["status"], failed["counts"]) == ("failed", {"ok": 2, "limit_load": 2})
     assert failed["message"] == "2 of 4 runs: 2 limit_load"
     assert {run["message"] for run in failed["runs"] if run["status"] != "ok"} == {"no equilibrium"}
     before = len(service.computed())
     answer = service.client.post(f"/studies/{study_id}/retry")
-    assert (answer.status_code, answer.json()["state"]) == (202, "accepted")
-    assert service.finished(study_id)["state"] == "failed"
+    assert (answer.status_code, answer.json()["status"]) == (202, "accepted")
+    assert service.finished(study_id)["status"] == "failed"
     again = service.computed()[before:]
     assert len(again) == 2 and all('"limit"' in line for line in again)
 
 
 def test_a_path_that_raises_is_a_failed_run_with_its_reason(service: Server) -> None:
     study = service.finished(service.post(fake_study("raises", behaviour="raise")))
-    assert (study["state"], study["counts"]) == ("failed", {"error": 4})
+    assert (study["status"], study["counts"]) == ("failed", {"error": 4})
     assert "a defect of the scene" in study["runs"][0]["message"]
 
 
@@ -129,12 +129,12 @@ def test_a_dismissed_study_stops_and_keeps_its_finished_runs(service: Server) ->
     study_id = service.post(study)
     wait_until(lambda: service.study(study_id)["counts"].get("ok", 0) >= 2)
     answer = service.client.delete(f"/studies/{study_id}")
-    assert (answer.status_code, answer.json()["state"]) == (200, "dismissed")
+    assert (answer.status_code, answer.json()["status"]) == (200, "dismissed")
     assert service.client.delete(f"/studies/{study_id}").status_code == 200
     # The next study runs when the work on this one has ended.
     service.finished(service.post(fake_study("next")))
     left = service.study(study_id)
-    assert left["state"] == "dismissed"
+    assert left["status"] == "dismissed"
     assert left["counts"]["ok"] >= 2 and left["counts"]["pending"] >= 20
     path = Path(service.data / "studies" / study_id / "dataset.nc")
     with xr.open_dataset(path, engine="h5netcdf") as dataset:
@@ -146,13 +146,13 @@ def test_a_waiting_study_is_dismissed_without_being_computed(service: Server) ->
     busy = service.post(fake_study("busy", seconds=0.5))
     waiting = service.post(fake_study("waiting", seconds=0.05))
     assert service.client.post(f"/studies/{waiting}/retry").status_code == 409
-    assert service.client.delete(f"/studies/{waiting}").json()["state"] == "dismissed"
+    assert service.client.delete(f"/studies/{waiting}").json()["status"] == "dismissed"
     assert service.client.get(f"/studies/{waiting}/dataset.nc").status_code == 404
     service.finished(busy)
     assert service.study(waiting)["counts"] == {"pending": 4}
     assert service.client.delete(f"/studies/{busy}").status_code == 409
     service.client.post(f"/studies/{waiting}/retry")
-    assert service.finished(waiting)["state"] == "successful"
+    assert service.finished(waiting)["status"] == "successful"
 
 
 def test_runs_are_shared_between_studies(service: Server, done: dict[str, Any]) -> None:
