@@ -77,7 +77,9 @@ class Catalogue:
             if connection is None:
                 return [], 0
             (total,) = connection.execute(f"SELECT count(*) FROM runs {where}", values).fetchone()
-        page = self._select(f"{where} ORDER BY created, id LIMIT ? OFFSET ?", [*values, limit, offset])
+        page = self._select(
+            f"{where} ORDER BY created, id LIMIT ? OFFSET ?", [*values, limit, offset]
+        )
         return page, total
 
     def rows(self, run_ids: Iterable[str]) -> dict[str, Row]:

@@ -69,9 +69,11 @@ def _accept(answer: httpx.Response) -> None:
     answer.read()
     try:
         problem = answer.json()
-        reasons = [f"{each['field']} = {each['value']!r}: {each['allowed']}" for each in problem["errors"]]
-    except (ValueError, KeyError, TypeError):
-        reasons = []
+    except ValueError:
         problem = {}
+    reasons = [
+        f"{each['field']} = {each['value']!r}: {each['allowed']}"
+        for each in problem.get("errors", [])
+    ]
     detail = problem.get("detail") or f"{answer.status_code} {answer.reason_phrase}"
     raise Refused("\n".join(reasons) or detail)

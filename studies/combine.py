@@ -130,8 +130,8 @@ class _Frame:
         for name, values in self.axes.items():
             _write(file, name, (name,), _axis_array(values), layout.axis_attributes(scene, name))
         for name, labels in self.labels.items():
-            values = np.array(labels, dtype=object)
-            _write(file, name, (name,), values, layout.attributes_of(name))
+            texts = np.array(labels, dtype=object)
+            _write(file, name, (name,), texts, layout.attributes_of(name))
         for name, grid in self.grids.items():
             if name not in self.ragged:
                 _write(file, name, (name,), grid, layout.attributes_of(name))

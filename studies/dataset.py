@@ -45,7 +45,9 @@ class Quantity:
     def attributes(self) -> dict[str, str]:
         """CF attributes."""
         given = {
-            "long_name": self.long_name, "units": self.units, "standard_name": self.standard_name
+            "long_name": self.long_name,
+            "units": self.units,
+            "standard_name": self.standard_name,
         }
         return {key: value for key, value in given.items() if value}
 
@@ -98,7 +100,7 @@ LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
 
 def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
     """Return the CF attributes of a sweep axis, from the scene's own description."""
-    known = parameters_of(scene.parameters)[axis]
+    known = parameters_of(scene)[axis]
     given = {"long_name": known.description, "units": known.unit}
     return {key: value for key, value in given.items() if value}
 
@@ -112,7 +114,7 @@ def attributes_of(name: str) -> dict[str, str]:
 
 def usual_dimensions(scene: Scene) -> tuple[str, ...]:
     """Return the sweep dimensions every run of the scene has."""
-    known = parameters_of(scene.parameters)
+    known = parameters_of(scene)
     return tuple(name for name in USUAL_AXES if name in known)
 
 
@@ -215,9 +217,7 @@ def _frame(
             "status": (sweep, flag, attributes_of("status")),
             "message": (sweep, text, attributes_of("message")),
         },
-        coords={
-            name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep
-        },
+        coords={name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep},
         attrs=provenance(title, scene, case.values) | {"id": case.id},
     )
 
@@ -241,7 +241,9 @@ def _plain(name: str, number: float) -> float | None:
 @cache
 def _versions() -> dict[str, str]:
     names = ("numpy", "scipy", "scikit-fem", "xarray")
-    return {"solver": solver.__version__} | {name: importlib.metadata.version(name) for name in names}
+    return {"solver": solver.__version__} | {
+        name: importlib.metadata.version(name) for name in names
+    }
 
 
 @cache
@@ -251,7 +253,16 @@ def _commit() -> dict[str, str]:
     try:
         for command in (
             ["git", "-C", str(root), "ls-files", "--error-unmatch", "__init__.py"],
-            ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"],
+            [
+                "git",
+                "-C",
+                str(root),
+                "describe",
+                "--always",
+                "--dirty",
+                "--abbrev=40",
+                "--exclude=*",
+            ],
         ):
             answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
     except (OSError, subprocess.SubprocessError):

@@ -54,12 +54,10 @@ def cases(
     StudyError
         when the scene refuses a combination of parameters
     """
-    defaults = {name: known.default for name, known in parameters_of(scene.parameters).items()}
+    defaults = {name: known.default for name, known in parameters_of(scene).items()}
     positions = [range(len(values)) for values in axes.values()]
     for index in itertools.product(*positions):
-        point = {
-            name: values[i] for (name, values), i in zip(axes.items(), index, strict=True)
-        }
+        point = {name: values[i] for (name, values), i in zip(axes.items(), index, strict=True)}
         given = {**defaults, **fixed, **point}
         try:
             parameters = build(scene, given)

@@ -116,7 +116,7 @@ class Grid:
             when the scheduler is gone or has forgotten the tasks
         """
         token = uuid.uuid4().hex
-        inbox: queue.SimpleQueue[Message | Future] = queue.SimpleQueue()
+        inbox: queue.SimpleQueue[Message | Future[Any]] = queue.SimpleQueue()
         stop = Event(f"stop-{token}", client=self._client)
         self._client.subscribe_topic(token, lambda event: inbox.put(Message(event[1])))
         call = partial(_call, function, token)
@@ -147,12 +147,12 @@ class Grid:
             self._client.unsubscribe_topic(token)
             self._client.cancel(list(futures.values()))
 
-    def _drop_idle(self, futures: Iterable[Future]) -> list[str]:
+    def _drop_idle(self, futures: Iterable[Future[Any]]) -> list[str]:
         """Cancel the tasks that no worker has begun; return their keys."""
         begun = {key for keys in self._client.processing().values() for key in keys}
         idle = [each for each in futures if not each.done() and each.key not in begun]
         self._client.cancel(idle)
-        return [each.key for each in idle]
+        return [str(each.key) for each in idle]
 
 
 def _call(function: Function, token: str, task: Any) -> Any:
@@ -171,7 +171,7 @@ def _call(function: Function, token: str, task: Any) -> Any:
     return function(task, partial(worker.log_event, token), stopped)
 
 
-def _finished(future: Future, position: int) -> Finished:
+def _finished(future: Future[Any], position: int) -> Finished:
     try:
         return Finished(position, future.result())
     except FutureCancelledError as error:

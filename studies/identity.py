@@ -17,7 +17,11 @@ ID_PATTERN = re.compile(r"[0-9a-f]{32}")
 def canonical(value: Any) -> str:
     """Return JSON that is equal for equal content (key order, ``-0.0`` and spacing apart)."""
     return json.dumps(
-        _normalised(value), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
+        _normalised(value),
+        sort_keys=True,
+        separators=(",", ":"),
+        ensure_ascii=False,
+        allow_nan=False,
     )
 
 

@@ -75,11 +75,11 @@ def nearest(name: Any, names: Iterable[str]) -> str:
 
 
 @cache
-def parameters_of(kind: type[Any]) -> dict[str, Parameter]:
-    """Return the parameters a scene's parameter class declares, by name and in its order."""
-    hints = get_type_hints(kind, include_extras=True)
+def parameters_of(scene: Scene) -> dict[str, Parameter]:
+    """Return the parameters of a scene, by name, in the order in which it declares them."""
+    hints = get_type_hints(scene.parameters, include_extras=True)
     found = {}
-    for field in dataclasses.fields(kind):
+    for field in dataclasses.fields(scene.parameters):
         adapter: TypeAdapter[Any] = TypeAdapter(hints[field.name])
         marks = get_args(hints[field.name])[1:]
         found[field.name] = Parameter(
@@ -95,7 +95,7 @@ def parameters_of(kind: type[Any]) -> dict[str, Parameter]:
 
 def build(scene: Scene, values: Mapping[str, Any]) -> Any:
     """Return the scene's parameter object for normalised `values`; the scene checks the rest."""
-    known = parameters_of(scene.parameters)
+    known = parameters_of(scene)
     typed = {
         name: known[name].adapter.validate_json(json.dumps(value)) for name, value in values.items()
     }
@@ -106,7 +106,7 @@ def scene_schema(name: str) -> dict[str, Any]:
     """Return the JSON Schema of a scene's parameters, each with its ``unit``."""
     scene = scene_named(name)
     schema = TypeAdapter(scene.parameters).json_schema()
-    for parameter in parameters_of(scene.parameters).values():
+    for parameter in parameters_of(scene).values():
         if parameter.unit:
             schema["properties"][parameter.name]["unit"] = parameter.unit
     return {**schema, "additionalProperties": False}
@@ -128,4 +128,6 @@ def _describe(schema: Mapping[str, Any]) -> str:
     limits = [
         f"{relation} {schema[key]:g}" for key, relation in _RELATIONS.items() if key in schema
     ]
-    return " ".join([words.get(kind, f"of type {kind}"), *([" and ".join(limits)] if limits else [])])
+    return " ".join(
+        [words.get(kind, f"of type {kind}"), *([" and ".join(limits)] if limits else [])]
+    )

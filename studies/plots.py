@@ -141,9 +141,7 @@ def _component(run: xr.Dataset, values: xr.DataArray, component: str | None) -> 
 
 
 def _near(values: xr.DataArray, edge: float, zoom: float) -> xr.DataArray:
-    near = values.where(
-        (abs(values["x"] - edge) <= zoom) & (abs(values["y"]) <= zoom), drop=True
-    )
+    near = values.where((abs(values["x"] - edge) <= zoom) & (abs(values["y"]) <= zoom), drop=True)
     if min(near.shape) < 2:
         raise StudyError("zoom", zoom, "must be larger: it holds no points of the map")
     return near

@@ -59,7 +59,9 @@ class Progress:
         filled = round(_WIDTH * progress)
         failed = f", {self._failed} failed" if self._failed else ""
         bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
-        text = f"{bar} {100 * progress:3.0f} %  {self._seen} runs{failed}{self._remaining(progress)}"
+        text = (
+            f"{bar} {100 * progress:3.0f} %  {self._seen} runs{failed}{self._remaining(progress)}"
+        )
         print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)
 
     def _remaining(self, progress: float) -> str:

@@ -84,7 +84,9 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
         wanted = dict(selection) if selection else "any"
         raise StudyError("run", wanted, f"no such run succeeded: {'; '.join(reasons) or 'missing'}")
     numeric = [chosen[axis].dtype.kind in "fiu" for axis in axes]
-    best = max(ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)])
+    best = max(
+        ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
+    )
     return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
 
 

@@ -18,7 +18,7 @@ import uuid
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import xarray as xr
@@ -29,7 +29,7 @@ from studies.errors import StoreBusy
 from studies.identity import is_id
 from studies.study import Study
 
-ENGINE = "h5netcdf"
+ENGINE: Literal["h5netcdf"] = "h5netcdf"
 """netCDF backend of every file read or written here; safe with several threads."""
 
 

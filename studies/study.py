@@ -77,32 +77,28 @@ class Study(BaseModel):
     def _check(cls, content: dict[str, Any]) -> dict[str, Any]:
         for key in content:
             if key not in cls.model_fields:
-                known = ", ".join(cls.model_fields)
+                fields = ", ".join(cls.model_fields)
                 raise StudyError(
-                    str(key), content[key], f"is not one of {known}{nearest(key, cls.model_fields)}"
+                    str(key),
+                    content[key],
+                    f"must be one of {fields}{nearest(key, cls.model_fields)}",
                 )
         scene = scene_named(content.get("scene"))
-        known = parameters_of(scene.parameters)
+        known = parameters_of(scene)
         fixed = _table("parameters", content.get("parameters", {}), known)
         swept = _table("sweep", content.get("sweep", {}), known)
         _check_size(swept)
         for name in fixed:
             if name in swept:
                 raise StudyError(f"parameters.{name}", fixed[name], "is swept too: keep one")
-        study = {
-            "name": _checked_name(content.get("name")),
-            "scene": scene.name,
-            "parameters": {
-                name: known[name].normalise(value, f"parameters.{name}")
-                for name, value in fixed.items()
-            },
-            "sweep": {
-                name: _axis(known[name], swept[name]) for name in known if name in swept
-            },
+        name = _checked_name(content.get("name"))
+        parameters = {
+            key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
         }
-        for _ in design.cases(scene, study["parameters"], study["sweep"]):
+        sweep = {key: _axis(known[key], swept[key]) for key in known if key in swept}
+        for _ in design.cases(scene, parameters, sweep):
             pass  # building a case is how the scene checks combinations of parameters
-        return study
+        return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": sweep}
 
     @cached_property
     def id(self) -> str:
@@ -116,7 +112,7 @@ class Study(BaseModel):
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
-        known = parameters_of(SCENES[self.scene].parameters)
+        known = parameters_of(SCENES[self.scene])
         defaults = {name: p.default for name, p in known.items() if name not in self.sweep}
         return defaults | self.parameters
 
@@ -146,9 +142,7 @@ class Study(BaseModel):
 def _checked_name(name: Any) -> str:
     if isinstance(name, str) and _NAME.fullmatch(name):
         return name
-    raise StudyError(
-        "name", name, "must be 1 to 80 of A-Z a-z 0-9 . _ -, not beginning with a dot"
-    )
+    raise StudyError("name", name, "must be 1 to 80 of A-Z a-z 0-9 . _ -, not beginning with a dot")
 
 
 def _table(field: str, content: Any, known: Mapping[str, Parameter]) -> dict[str, Any]:
@@ -156,11 +150,8 @@ def _table(field: str, content: Any, known: Mapping[str, Parameter]) -> dict[str
         raise StudyError(field, content, "must be a table of parameters")
     for name, value in content.items():
         if name not in known:
-            raise StudyError(
-                f"{field}.{name}",
-                value,
-                f"the scene has no such parameter (it has {', '.join(known)}){nearest(name, known)}",
-            )
+            allowed = f"the scene has no such parameter; it has {', '.join(known)}"
+            raise StudyError(f"{field}.{name}", value, allowed + nearest(name, known))
     return dict(content)
 
 

@@ -67,7 +67,7 @@ def scenes_table() -> str:
 def scene_table(name: str) -> str:
     """Return a line for each parameter of a scene: default, what is allowed, what it means."""
     scene = scene_named(name)
-    known = parameters_of(scene.parameters).values()
+    known = parameters_of(scene).values()
     lines = [["parameter", "default", "allowed", "meaning"]]
     lines += [[each.name, _text(each.default), each.allowed, each.description] for each in known]
     return f"{scene.name}: {scene.summary}\n\n{_table(lines)}"

@@ -44,9 +44,7 @@ class FakeParameters:
             raise ModelError("friction", self.friction, "at most 0.9 in plane strain")
 
 
-def path(
-    parameters: FakeParameters, values: Sequence[float], monitor: Monitor
-) -> Iterator[Record]:
+def path(parameters: FakeParameters, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
     """Yield a record for each load ratio, after some increments."""
     if parameters.mark:
         name = f"{parameters.friction}-{time.time_ns()}-{os.getpid()}"

@@ -181,9 +181,9 @@ def test_one_run_prefers_what_succeeded_with_most_load_and_friction(store: Store
     with open_study(store.directory) as together:
         best = one_run(together)
         assert (best["load_ratio"].item(), best["friction"].item()) == (0.3, 0.4)
-        with pytest.raises(StudyError, match="flows at 0.75"):
+        with pytest.raises(StudyError, match=r"flows at 0.75"):
             one_run(together, {"load_ratio": "0.9"})
-        with pytest.raises(StudyError, match="one of 0.0, 0.4"):
+        with pytest.raises(StudyError, match=r"one of 0.0, 0.4"):
             one_run(together, {"friction": "0.3"})
-        with pytest.raises(StudyError, match="one of load_ratio, friction, hardening"):
+        with pytest.raises(StudyError, match=r"one of load_ratio, friction, hardening"):
             one_run(together, {"speed": "1"})

@@ -75,6 +75,9 @@ def test_a_lost_scheduler_is_told_apart_from_failed_runs(
     assert len(outcome.computed) < 3
 
 
-def test_no_scheduler_at_the_address_is_one_clear_error(store: Store) -> None:
-    with pytest.raises(GridLost, match="no scheduler answers at tcp://127.0.0.1:1"):
+def test_no_scheduler_at_the_address_is_one_clear_error(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.grid._CONNECT", 1.0)
+    with pytest.raises(GridLost, match=r"no scheduler answers at tcp://127.0.0.1:1"):
         run_study(fake_study(), store, scheduler="tcp://127.0.0.1:1")

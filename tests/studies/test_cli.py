@@ -1,0 +1,244 @@
+"""The command ``residua``: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from studies import Store, Study, StudyEvent
+from studies.cli import main
+from studies.progress import Progress
+from tests.studies.conftest import compute_here, fake_study
+
+StudyFile = Callable[..., Path]
+PNG = b"\x89PNG\r\n"
+
+
+def test_run_prints_a_table_and_writes_data_and_picture(
+    study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(study_file()), "--out", str(out), "--workers", "1"]) == 0
+    printed = capsys.readouterr()
+    lines = printed.out.splitlines()
+    assert lines[0].split()[:5] == ["load", "ratio", "friction", "status", "peak"]
+    assert lines[1].split() == ["[MPa]", "[s]"]
+    assert [line.split()[:3] for line in lines[2:6]] == [
+        ["0.3", "0", "ok"], ["0.3", "0.4", "ok"], ["0.9", "0", "ok"], ["0.9", "0.4", "ok"],
+    ]  # fmt: skip
+    written = [Path(line.split()[1]) for line in lines if line.startswith("wrote")]
+    assert [path.suffix for path in written] == [".nc", ".png"]
+    assert written[1].read_bytes().startswith(PNG)
+    assert "\r" not in printed.err, "no bar where nobody watches"
+    assert len(printed.err.splitlines()) == 4
+
+
+def test_run_with_failed_runs_lists_them_and_returns_1(
+    study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["run", str(study_file(trouble="limit")), "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--workers", "1"]) == 1
+    printed = capsys.readouterr()
+    assert printed.err.count("flows at 0.75") == 4, "as it happens, and in the list at the end"
+    assert "2 ok, 2 limit_load" in printed.out
+    assert main([*arguments, "--resume"]) == 1
+    assert "0 computed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (
+            'name = "a"\nscene = "fake"\n[sweep]\nfriction = [0.1, -0.2]',
+            "residua: sweep.friction[1] = -0.2: must be a finite number >= 0 and <= 1",
+        ),
+        ('name = "a"\nscene = "bal"', "residua: scene = 'bal': must be one of "),
+        ("name = ", "residua: file = "),
+    ],
+)
+def test_bad_input_is_one_line_and_returns_2(
+    study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, line: str
+) -> None:
+    assert main(["run", str(study_file(text)), "--out", str(tmp_path / "out")]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith(line)
+    assert printed.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "a.toml", "--workers", "0"]])
+def test_a_wrong_command_line_returns_2(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert "usage: residua" in capsys.readouterr().err
+
+
+def test_a_busy_directory_is_one_line_and_returns_1(
+    study_file: StudyFile, store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with store.writing():
+        assert main(["run", str(study_file()), "--out", str(store.directory)]) == 1
+    assert "another process computes here" in capsys.readouterr().err
+
+
+def test_scenes_tells_ranges_units_and_defaults(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenes"]) == 0
+    assert "fake" in capsys.readouterr().out
+    assert main(["scenes", "fake"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (half_width,) = [line for line in lines if line.startswith("half_width")]
+    assert half_width.split() == [
+        "half_width", "50", "a", "finite", "number", ">", "0", "[mm]", "half-width",
+    ]  # fmt: skip
+    assert main(["scenes", "fak"]) == 2
+    assert "did you mean fake?" in capsys.readouterr().err
+
+
+def test_show_takes_a_run_a_study_or_a_directory(
+    computed: tuple[Study, Store], capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, store = computed
+    case = next(study.cases())
+    assert main(["show", str(store.run_path(case.id))]) == 0
+    details = capsys.readouterr().out
+    assert "friction" in details
+    assert "peak_residual_tension" in details
+    for path in (store.directory, store.dataset_path(study.id)):
+        assert main(["show", str(path)]) == 0
+        assert capsys.readouterr().out.count(" ok ") == study.size
+    assert main(["show", str(store.directory / "nowhere")]) == 2
+
+
+def test_plot_draws_any_field_of_any_run(
+    computed: tuple[Study, Store], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, store = computed
+    picture = tmp_path / "a.png"
+    select = ["--select", "friction=0.4", "load_ratio=0.3"]
+    arguments = ["plot", str(store.directory), "--out", str(picture)]
+    assert main([*arguments, *select, "--component", "yy", "--zoom", "30"]) == 0
+    assert picture.read_bytes().startswith(PNG)
+    single = ["plot", str(store.run_path(next(study.cases()).id)), "--out", str(picture)]
+    assert main([*single, "--field", "contact_pressure"]) == 0
+    capsys.readouterr()
+    for wrong, named in [
+        (["--select", "friction=0.3"], "friction = '0.3': must be one of 0.0, 0.4"),
+        (["--select", "friction"], "must be AXIS=VALUE"),
+        (["--field", "colour"], "must be one of residual_stress, plastic_strain"),
+        (["--component", "zz"], "must be one of xx, yy, xy"),
+        (["--field", "plastic_strain", "--component", "xx"], "leave it out"),
+        (["--zoom", "0.1"], "must be larger"),
+    ]:
+        assert main([*arguments, *wrong]) == 2
+        assert named in capsys.readouterr().err
+
+
+def test_plot_of_a_study_without_success_says_why(
+    store: Store, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compute_here(fake_study(sweep={"load_ratio": [0.9]}, trouble="limit"), store)
+    assert main(["plot", str(store.directory), "--out", str(tmp_path / "a.png")]) == 2
+    assert "flows at 0.75" in capsys.readouterr().err
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_the_bar_stays_on_one_line_and_counts_failures() -> None:
+    study, screen = fake_study(), Terminal()
+    bar = Progress(study, screen)
+    for number, case in enumerate(study.cases(), start=1):
+        status = "ok" if number < 4 else "limit_load"
+        bar(StudyEvent(kind="run", progress=number / 4, path="", run=case.id, status=status))
+    bar.close()
+    drawn = screen.getvalue()
+    assert drawn.count("\n") == 1
+    assert "100 %  4 runs, 1 failed" in drawn.split("\r")[-1]
+
+
+class FakeService(BaseHTTPRequestHandler):
+    """Answers as the service does."""
+
+    def do_POST(self) -> None:
+        study = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        if study["scene"] == "fake":
+            self.answer(201, {"id": "1" * 32, **study})
+        else:
+            errors = [{"field": "scene", "value": study["scene"], "allowed": "must be fake"}]
+            self.answer(422, {"title": "Bad study", "detail": "scene", "errors": errors})
+
+    def do_GET(self) -> None:
+        if self.path.endswith("/dataset.nc"):
+            self.answer(200, b"data")
+        elif self.path.endswith("1" * 32):
+            self.answer(200, {"status": "running", "progress": 40})
+        else:
+            self.answer(404, {"detail": "no such study"})
+
+    def do_DELETE(self) -> None:
+        self.answer(200, {"status": "dismissed"})
+
+    def answer(self, status: int, content: Any) -> None:
+        body = content if isinstance(content, bytes) else json.dumps(content).encode()
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *arguments: Any) -> None:
+        pass
+
+
+@pytest.fixture
+def url() -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), FakeService) as server:
+        threading.Thread(target=server.serve_forever).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def test_the_client_submits_watches_fetches_and_cancels(
+    url: str, study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["submit", str(study_file()), "--url", url]) == 0
+    study_id = capsys.readouterr().out.strip()
+    assert study_id == "1" * 32
+    assert main(["status", study_id, "--url", url]) == 0
+    assert capsys.readouterr().out.split() == ["running", "40", "%"]
+    target = tmp_path / "got.nc"
+    assert main(["fetch", study_id, "--url", url, "--out", str(target)]) == 0
+    assert target.read_bytes() == b"data"
+    assert main(["cancel", study_id, "--url", url]) == 0
+
+
+def test_the_client_says_what_the_service_refused(
+    url: str, study_file: StudyFile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = study_file('name = "a"\nscene = "bal"')
+    assert main(["submit", str(wrong), "--url", url]) == 2
+    assert capsys.readouterr().err == "residua: scene = 'bal': must be fake\n"
+    assert main(["status", "2" * 32, "--url", url]) == 2
+    assert capsys.readouterr().err == "residua: no such study\n"
+    assert main(["status", "2" * 32, "--url", "http://127.0.0.1:1"]) == 1
+    assert "http://127.0.0.1:1" in capsys.readouterr().err
+    assert main(["submit", "absent.toml", "--url", url]) == 2
+
+
+def test_no_number_in_a_table_is_nan(store: Store, capsys: pytest.CaptureFixture[str]) -> None:
+    compute_here(fake_study(trouble="limit"), store)
+    assert main(["show", str(store.directory)]) == 0
+    assert str(math.nan) not in capsys.readouterr().out
