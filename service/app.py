@@ -49,7 +49,11 @@ def create_app(settings: Settings) -> FastAPI:
             os.close(lock)
 
     app = FastAPI(
-        title="Residua", version=solver.__version__, description=DESCRIPTION, lifespan=lifespan
+        title="Residua",
+        version=solver.__version__,
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        responses=errors.ANSWERS,
     )
     app.state.settings = settings
     app.state.store = open_store(settings.data)

@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
+from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from studies import StudyError
@@ -34,14 +35,38 @@ STATUS: dict[type[Exception], HTTPStatus] = {
 }
 
 
+MEDIA_TYPE = "application/problem+json"
+
+
+class ProblemDocument(BaseModel):
+    """What went wrong, in the form of RFC 9457."""
+
+    type: str = "about:blank"
+    title: str
+    status: int
+    detail: str
+    instance: str
+    errors: list[dict[str, Any]] = Field(description="for each bad input: field, value, allowed")
+
+
+ANSWERS: dict[int | str, dict[str, Any]] = {
+    code: {
+        "description": "Problem",
+        "content": {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}},
+    }
+    for code in ("4XX", "5XX")
+}
+"""How the description of the service announces its errors."""
+
+
 class Problem(Response):
-    """A response of type ``application/problem+json``."""
+    """A response that carries a problem document."""
 
-    media_type = "application/problem+json"
+    media_type = MEDIA_TYPE
 
-    def render(self, content: Any) -> bytes:
+    def render(self, content: ProblemDocument) -> bytes:
         """Encode in ASCII: what a client sent may hold lone surrogates."""
-        return json.dumps(content, allow_nan=False).encode("ascii")
+        return json.dumps(content.model_dump(), allow_nan=False).encode("ascii")
 
 
 def problem(
@@ -52,18 +77,14 @@ def problem(
     headers: dict[str, str] | None = None,
 ) -> Problem:
     """Return the problem document for one failed request."""
-    return Problem(
-        {
-            "type": "about:blank",
-            "title": status.phrase,
-            "status": status.value,
-            "detail": detail,
-            "instance": request.url.path,
-            "errors": list(errors),
-        },
-        status_code=status.value,
-        headers=headers,
+    document = ProblemDocument(
+        title=status.phrase,
+        status=status.value,
+        detail=detail,
+        instance=request.url.path,
+        errors=list(errors),
     )
+    return Problem(document, status_code=status.value, headers=headers)
 
 
 def shown(value: object) -> str | int | float | bool | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
@@ -22,7 +22,8 @@ def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
     return RunPage(total=total, items=[Run(**row) for row in rows])
 
 
-@router.api_route("/{run_id}.nc", methods=["GET", "HEAD"], responses=NETCDF)
+@router.head("/{run_id}.nc", include_in_schema=False)
+@router.get("/{run_id}.nc", responses=NETCDF)
 def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     """Return the data set of a run."""
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
@@ -40,7 +41,7 @@ def draw_map(
 ) -> Response:
     """Draw a field of a run around the contact."""
     tag = maps.tag(store.run_path(run["id"]), query)
-    headers: dict[str, Any] = {"etag": tag, "cache-control": "no-cache"}
+    headers = {"etag": tag, "cache-control": "no-cache"}
     if request.headers.get("if-none-match") == tag:
         return Response(status_code=304, headers=headers)
     picture = maps.draw(store.run_path(run["id"]), query)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Query, Request, Response
 from fastapi.responses import FileResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import WithJsonSchema
 
 from service import overview
 from service.dependencies import TheJob, TheJobs, TheRunner, TheSettings, TheStore
@@ -27,10 +28,12 @@ EXAMPLE = {
     "sweep": {"load_ratio": [0.3, 0.5714], "friction": [0.0, 0.3]},
 }
 
+SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
+
 
 @router.post("", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}})
 def submit(
-    content: Annotated[dict[str, Any], Body(examples=[EXAMPLE])],
+    content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
     jobs: TheJobs,
     request: Request,
     response: Response,
@@ -88,7 +91,8 @@ async def events(
         await asyncio.sleep(settings.poll_seconds)
 
 
-@router.api_route("/{study_id}/dataset.nc", methods=["GET", "HEAD"], responses=NETCDF)
+@router.head("/{study_id}/dataset.nc", include_in_schema=False)
+@router.get("/{study_id}/dataset.nc", responses=NETCDF)
 def dataset(job: TheJob, store: TheStore) -> FileResponse:
     """Return the combined data set of a study that has come to an end."""
     path = store.dataset_path(job.id)

@@ -13,6 +13,7 @@ from fastapi import FastAPI
 
 from service.app import create_app
 from service.settings import Settings
+from studies import Study
 from tests.service.servers import Server, fake_study
 
 UNKNOWN = "0" * 32
@@ -215,6 +216,36 @@ def test_a_defect_shows_nothing_of_its_inside(app: FastAPI) -> None:
     answer = ask(app, "/broken")
     problem(answer, 500)
     assert "secret" not in answer.text and "Traceback" not in answer.text
+
+
+def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> None:
+    description = json.loads(ask(app, "/openapi.json").text)
+    assert {
+        "/studies",
+        "/studies/{study_id}",
+        "/studies/{study_id}/retry",
+        "/studies/{study_id}/events",
+        "/studies/{study_id}/dataset.nc",
+        "/runs",
+        "/runs/{run_id}",
+        "/runs/{run_id}.nc",
+        "/runs/{run_id}/map.png",
+        "/scenes",
+        "/scenes/{name}",
+        "/health",
+    } == set(description["paths"])
+    for operations in description["paths"].values():
+        for operation in operations.values():
+            assert "application/problem+json" in operation["responses"]["4XX"]["content"]
+            assert "422" not in operation["responses"]
+
+
+def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
+    post = json.loads(ask(app, "/openapi.json").text)["paths"]["/studies"]["post"]
+    schema = post["requestBody"]["content"]["application/json"]["schema"]
+    assert set(schema["properties"]) == {"name", "scene", "parameters", "sweep"}
+    (example,) = schema["examples"]
+    assert Study.from_dict(example).size == 4
 
 
 def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI) -> None:

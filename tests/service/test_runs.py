@@ -96,13 +96,6 @@ def test_a_map_that_cannot_be_drawn_is_refused_by_field(
     assert allowed in error["allowed"]
 
 
-def test_a_run_without_fields_has_no_map(service: Server) -> None:
-    study = service.finished(service.post(fake_study("empty", behaviour="limit")))
-    answer = service.client.get(f"/runs/{study['runs'][0]['id']}/map.png")
-    assert answer.status_code == 422
-    assert len(answer.json()["errors"]) == 1
-
-
 def test_a_scene_describes_its_parameters(service: Server) -> None:
     names = [scene["name"] for scene in service.client.get("/scenes").json()]
     assert "punch" in names

@@ -117,10 +117,12 @@ def test_a_study_with_failed_runs_fails_and_a_retry_computes_only_those(service:
     assert len(again) == 2 and all('"limit"' in line for line in again)
 
 
-def test_a_path_that_raises_is_a_failed_run_with_its_reason(service: Server) -> None:
+def test_a_path_that_raises_gives_failed_runs_with_a_reason_and_no_map(service: Server) -> None:
     study = service.finished(service.post(fake_study("raises", behaviour="raise")))
     assert (study["status"], study["counts"]) == ("failed", {"error": 4})
     assert "a defect of the scene" in study["runs"][0]["message"]
+    answer = service.client.get(f"/runs/{study['runs'][0]['id']}/map.png")
+    assert answer.status_code == 422 and len(answer.json()["errors"]) == 1
 
 
 def test_a_dismissed_study_stops_and_keeps_its_finished_runs(service: Server) -> None:
