@@ -72,24 +72,7 @@ class Grid:
 
     def __enter__(self) -> Self:
         with ExitStack() as opening:
-            if self._scheduler is None:
-                scratch = opening.enter_context(
-                    tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True)
-                )
-                opening.enter_context(dask.config.set(_CONFIGURATION))
-                address: Any = opening.enter_context(
-                    LocalCluster(
-                        n_workers=self._workers,
-                        threads_per_worker=1,
-                        processes=True,
-                        host="127.0.0.1",
-                        dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
-                        local_directory=scratch,
-                        silence_logs=logging.CRITICAL,
-                    )
-                )
-            else:
-                address = self._scheduler
+            address = self._scheduler or self._own_workers(opening)
             try:
                 self._client = opening.enter_context(
                     Client(address, set_as_default=False, timeout=_CONNECT)
@@ -98,6 +81,29 @@ class Grid:
                 raise GridLost(f"no scheduler answers at {address}: {error}") from error
             self._open = opening.pop_all()
         return self
+
+    def _own_workers(self, opening: ExitStack) -> LocalCluster:
+        scratch = opening.enter_context(
+            tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True)
+        )
+        opening.enter_context(dask.config.set(_CONFIGURATION))
+        try:
+            return opening.enter_context(
+                LocalCluster(
+                    n_workers=self._workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
+                    local_directory=scratch,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        except RuntimeError as error:
+            raise RuntimeError(
+                "worker processes did not start; they import the calling script anew, so it must "
+                "do its work under: if __name__ == '__main__':"
+            ) from error
 
     def __exit__(self, *reason: object) -> None:
         self._open.close()

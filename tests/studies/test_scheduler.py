@@ -57,8 +57,9 @@ def test_a_running_scheduler_computes_the_study(
 
 
 def test_a_lost_scheduler_is_told_apart_from_failed_runs(
-    cluster: tuple[str, subprocess.Popen[bytes]], store: Store
+    cluster: tuple[str, subprocess.Popen[bytes]], store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("studies.grid._CONNECT", 3.0)
     address, scheduler = cluster
     study = fake_study(sweep={"friction": [0.0, 0.1, 0.2]}, seconds=1.0)
 
