@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, Self
 
 import dask
-from distributed import Client, Event, Future, LocalCluster, get_worker
+from distributed import Client, Event, Future, KilledWorker, LocalCluster, get_worker
 from distributed.client import FutureCancelledError
 
 from studies.errors import GridLost
@@ -27,6 +27,8 @@ Function = Callable[[Any, Report, Stopped], Any]
 
 _POLL = 0.2
 """Seconds between two looks at whether to stop, on either side."""
+_WORKER_DIED = "the worker process died each time it was on this path"
+
 _CONNECT = 10.0
 """Seconds within which a scheduler must answer."""
 
@@ -182,5 +184,7 @@ def _finished(future: Future[Any], position: int) -> Finished:
         return Finished(position, future.result())
     except FutureCancelledError as error:
         raise GridLost(f"the scheduler dropped the tasks: {error}") from error
+    except KilledWorker:
+        return Finished(position, error=RuntimeError(_WORKER_DIED))
     except Exception as error:
         return Finished(position, error=error)

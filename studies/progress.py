@@ -30,6 +30,7 @@ class Progress:
         self._names = {case.id: _place(study, case.values) for case in study.cases()}
         self._started = time.monotonic()
         self._begun: float | None = None
+        self._progress = 0.0
         self._drawn = 0.0
         self._seen = 0
         self._failed = 0
@@ -46,16 +47,19 @@ class Progress:
                 line = f"{100 * event.progress:3.0f} %  {event.status}  {self._names[event.run]}"
                 print(line + reason, file=self._stream, flush=True)
         now = time.monotonic()
-        if self._bar and (now - self._drawn > _REDRAW or event.progress >= 1.0):
+        self._progress = event.progress
+        if self._bar and now - self._drawn > _REDRAW:
             self._drawn = now
-            self._draw(event.progress)
+            self._draw()
 
     def close(self) -> None:
-        """Leave the bar's line."""
-        if self._bar and self._seen:
+        """Draw the bar a last time and leave its line."""
+        if self._bar and self._begun is not None:
+            self._draw()
             print(file=self._stream)
 
-    def _draw(self, progress: float) -> None:
+    def _draw(self) -> None:
+        progress = self._progress
         filled = round(_WIDTH * progress)
         failed = f", {self._failed} failed" if self._failed else ""
         bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"

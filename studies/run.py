@@ -13,13 +13,11 @@ from typing import Any
 from solver.scenes import SCENES
 from studies import dataset as layout
 from studies.combine import combine
-from studies.design import Case, Path
+from studies.design import Path
 from studies.identity import solver_hash
 from studies.store import Store
 from studies.study import Study
 from studies.task import PathTask, walk
-
-WORKER_DIED = "the worker process died twice on this path"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,13 +202,9 @@ class _Work:
 
     def _give_up(self, task: PathTask, error: Exception) -> None:
         """Record the runs of a path whose task did not survive."""
-        reason = WORKER_DIED if type(error).__name__ == "KilledWorker" else str(error)
-        left = [case for case in task.path.cases if not self._is_kept(case)]
-        broken = (layout.broken_dataset(task.scene, case, reason) for case in left)
+        left = [case for case in task.path.cases if case.id not in self.computed]
+        broken = (layout.broken_dataset(task.scene, case, str(error)) for case in left)
         self._keep(task.path.id, [self.store.write_run(dataset) for dataset in broken])
-
-    def _is_kept(self, case: Case) -> bool:
-        return case.id in self.computed
 
     def _progress(self) -> float:
         """Return the fraction of the study that is done, runs found finished included."""

@@ -56,7 +56,7 @@ def test_one_path_in_trouble_does_not_take_the_others_with_it(troubled: Troubled
     assert messages["limit_load"] == "flows at 0.75"
     assert {message for _, status, message in outcome.failed if status == "error"} == {
         "ZeroDivisionError: the stiffness is gone",
-        "the worker process died twice on this path",
+        "the worker process died each time it was on this path",
     }
     assert store.catalogue.runs(scene="fake")[1] == study.size
 
