@@ -1,3 +1,44 @@
-"""Elastic-plastic bodies in frictional contact, and the residual stress they keep."""
+"""Elastic-plastic bodies in frictional contact, and the residual stress they keep.
+
+`Body` (mesh + element + state + `Material` + supports + pressure) and `ContactPair` make a
+`Model`; a `System` is the model discretised; a `Path` walks its load in increments, each solved
+with plasticity outside and contact inside, and releases it; a `Solution` or, for the named
+`SCENES`, a `Record` is what remains. Numbers are in N, mm, MPa; tension is positive; y is up.
+"""
+
+from solver.audit import Audit
+from solver.body import Body
+from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
+from solver.material import Material
+from solver.model import ContactPair, Model
+from solver.outcome import Tolerances
+from solver.path import Branch, Path, PathControl
+from solver.record import Record, Status
+from solver.scenes import SCENES, Scene
+from solver.solution import Solution, solve
+from solver.system import System
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "SCENES",
+    "Audit",
+    "Body",
+    "Branch",
+    "ContactPair",
+    "LimitLoad",
+    "Material",
+    "Model",
+    "ModelError",
+    "NotConverged",
+    "Path",
+    "PathControl",
+    "Record",
+    "Scene",
+    "Solution",
+    "SolverError",
+    "Status",
+    "System",
+    "Tolerances",
+    "solve",
+]

@@ -137,7 +137,8 @@ class Discretisation:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
         weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)
         forces = np.matmul(weighted, self._flat_B)[:, 0]
-        return np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
+        nodal = np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
+        return np.asarray(nodal, dtype=float)
 
     # -- stiffness ---------------------------------------------------------------------------
 
@@ -162,9 +163,7 @@ class Discretisation:
         unique, slot = np.unique(key[kept], return_inverse=True)
         m = len(self.active)
         indptr = np.searchsorted(unique, np.arange(m + 1, dtype=np.int64) * m)
-        upper = sparse.csr_array(
-            (np.zeros(len(unique)), unique % m, indptr), shape=(m, m)
-        )
+        upper = sparse.csr_array((np.zeros(len(unique)), unique % m, indptr), shape=(m, m))
         place = np.full(len(key), len(unique))
         place[kept] = slot
         return upper, place.reshape(len(local), -1)
@@ -175,7 +174,7 @@ class Discretisation:
         upper, place = self._pattern
         size = upper.nnz + 1
         data = np.bincount(place[elements].ravel(), weights=matrices.ravel(), minlength=size)
-        return data[:-1]
+        return np.asarray(data[:-1], dtype=float)
 
     @property
     def pattern(self) -> sparse.csr_array:

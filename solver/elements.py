@@ -46,9 +46,7 @@ ELEMENTS: dict[str, ElementType] = {
         quadratic=False,
         mean_dilatation=True,
     ),
-    "tri6": ElementType(
-        element=ElementTriP2(), cells="tri", order=2, full_order=4, quadratic=True
-    ),
+    "tri6": ElementType(element=ElementTriP2(), cells="tri", order=2, full_order=4, quadratic=True),
     "tri3": ElementType(
         element=ElementTriP1(), cells="tri", order=1, full_order=1, quadratic=False
     ),

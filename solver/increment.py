@@ -25,9 +25,9 @@ import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.complementarity import OPEN, ContactProblem, solve_contact
-from solver.errors import SolverError
 from solver.line_search import search
 from solver.linear import Singular
+from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.system import State
 
 if TYPE_CHECKING:
@@ -42,61 +42,6 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _BLENDS = (0.0, 0.02, 0.1, 0.3, 1.0)
-_FLOWING = 0.02
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerances:
-    """When an increment counts as converged.
-
-    Attributes
-    ----------
-    residual : out-of-balance force over the largest force level met so far
-    contact : violation of the contact conditions as a force, over the same level
-    iterations : most Newton iterations before the increment is given up
-    """
-
-    residual: float = 1e-8
-    contact: float = 1e-7
-    iterations: int = 40
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Converged:
-    """A converged increment.
-
-    ``iterations`` of Newton; ``elastic`` when no point yielded; ``pivoted`` and ``blended``
-    count the iterations whose inner problem needed the fallback or a blended tangent.
-    """
-
-    state: State
-    responses: tuple[Response, ...]
-    iterations: int
-    elastic: bool
-    residual: float
-    pivoted: int
-    blended: int
-
-
-class Yielded(SolverError):
-    """An increment that was to stay elastic did not."""
-
-
-class IncrementFailed(SolverError):
-    """The increment did not converge.
-
-    ``stiffness`` is the share of the elastic stiffness that was left along the last step;
-    next to nothing means that the structure flows.
-    """
-
-    def __init__(self, message: str, stiffness: float) -> None:
-        super().__init__(message)
-        self.stiffness = stiffness
-
-    @property
-    def flowing(self) -> bool:
-        """Whether the last step was a plastic mechanism."""
-        return self.stiffness < _FLOWING
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,9 +187,7 @@ class Increment:
                 offset=motion,
                 friction=candidates.friction,
                 A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-                balance=np.concatenate(
-                    [R.T @ r for R, r in zip(floating, residuals, strict=True)]
-                ),
+                balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
             ),
             candidates.status,
         )
@@ -299,7 +242,17 @@ class Increment:
     ) -> Converged:
         contacts = candidates.states(contacts, candidates.forces, candidates.status)
         contacts = tuple(replace(c, touching=c.status != OPEN) for c in contacts)
+        work, least = 0.0, 0.0
+        for part, response, before in zip(
+            self.system.parts, responses, self.start.plastic, strict=True
+        ):
+            flow = response.state.plastic_strain - before.plastic_strain
+            back = 2 / 3 * part.body.material.kinematic_modulus * response.state.plastic_strain
+            work += float((response.stress * flow).sum(axis=0) @ part.weights.ravel())
+            least = min(least, float(((response.stress - back) * flow).sum(axis=0).min()))
         return Converged(
+            plastic_work=work,
+            dissipation=least,
             state=State(self.load, u, tuple(r.state for r in responses), contacts, scale),
             responses=responses,
             iterations=iterations,

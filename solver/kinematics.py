@@ -59,9 +59,7 @@ def strain_operator(
     return B.reshape(n_elements, n_points, 4, 2 * n_nodes)
 
 
-def mean_dilatation(
-    B: NDArray[np.float64], weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def mean_dilatation(B: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return B with its volumetric part averaged over each element (B-bar).
 
     T.J.R. Hughes, The Finite Element Method (1987), section 4.5: removes the locking of

@@ -60,9 +60,7 @@ def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") ->
     )
 
 
-def mapped(
-    mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> Mesh:
+def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Mesh:
     """Return a quadrilateral mesh with curved quadratic edges, its points moved by ``function``.
 
     ``function`` takes and returns coordinates (2, n); boundary names are kept. It must keep

@@ -22,9 +22,7 @@ class Operator(Protocol):
     def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return displacements (n,) for nodal forces (n,)."""
 
-    def compliance(
-        self, dofs: NDArray[np.int64], rows: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on the unknowns ``dofs``."""
 
 
@@ -41,9 +39,7 @@ class Factored:
         u[self._part.active] = self._solver.solve(force[self._part.active])
         return u
 
-    def compliance(
-        self, dofs: NDArray[np.int64], rows: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
         columns = np.zeros((self._part.n, len(rows)))
         columns[dofs] = rows.T
@@ -58,9 +54,7 @@ class Elastic(Factored):
         solver.factorise(part.elastic_data)
         self._surfaces: dict[bytes, NDArray[np.float64]] = {}
 
-    def compliance(
-        self, dofs: NDArray[np.int64], rows: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
         key = dofs.tobytes()
         if key not in self._surfaces:

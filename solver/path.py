@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged
-from solver.increment import Converged, Increment, IncrementFailed, Tolerances, Yielded
+from solver.increment import Increment
+from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.system import State
 
 if TYPE_CHECKING:
@@ -54,13 +55,20 @@ class PathControl:
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """What a path has cost: Newton iterations of each increment, cuts, seconds of CPU."""
+    """What a path has cost and done.
+
+    Newton iterations of each increment, cuts, iterations that needed the inner fallback or a
+    blended tangent, CPU seconds, plastic work [N mm], least plastic dissipation at a point of an
+    increment [N mm/mm3].
+    """
 
     iterations: tuple[int, ...] = ()
     cuts: int = 0
     pivoted: int = 0
     blended: int = 0
     seconds: float = 0.0
+    plastic_work: float = 0.0
+    dissipation: float = 0.0
 
     def plus(self, converged: Converged) -> Tally:
         """Return the tally with one more increment."""
@@ -69,6 +77,8 @@ class Tally:
             iterations=(*self.iterations, converged.iterations),
             pivoted=self.pivoted + converged.pivoted,
             blended=self.blended + converged.blended,
+            plastic_work=self.plastic_work + converged.plastic_work,
+            dissipation=min(self.dissipation, converged.dissipation),
         )
 
 
@@ -135,9 +145,7 @@ class Path:
             tally = (loaded or trunk).tally
             now = loaded.now if loaded else None
             return Branch(load=load, tally=tally, loaded=now, error=failure)
-        return Branch(
-            load=load, tally=unloaded.tally, loaded=loaded.now, unloaded=unloaded.now
-        )
+        return Branch(load=load, tally=unloaded.tally, loaded=loaded.now, unloaded=unloaded.now)
 
     def _start(self) -> _Point:
         state = self.system.initial()
@@ -244,7 +252,5 @@ def extrapolate(before: State | None, now: State, load: float) -> State | None:
     return replace(
         now,
         u=tuple(n + share * (n - b) for b, n in zip(before.u, now.u, strict=True)),
-        contacts=tuple(
-            contact(b, n) for b, n in zip(before.contacts, now.contacts, strict=True)
-        ),
+        contacts=tuple(contact(b, n) for b, n in zip(before.contacts, now.contacts, strict=True)),
     )

@@ -84,7 +84,7 @@ def extract(part: Discretisation, boundary: str) -> Surface:
     edges = np.hstack(columns)
     nodes, local = np.unique(edges, return_inverse=True)
     X = part.X[:, nodes]
-    measure = 2 * np.pi * X[0] if body.state == "axisymmetric" else np.full(
-        len(nodes), body.thickness
+    measure = (
+        2 * np.pi * X[0] if body.state == "axisymmetric" else np.full(len(nodes), body.thickness)
     )
     return Surface(nodes, local.reshape(edges.shape), X, measure)

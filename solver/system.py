@@ -16,9 +16,10 @@ from solver.operators import Operators
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.constitutive import PlasticState
+    from solver.constitutive import PlasticState, Response
     from solver.discretisation import Discretisation
     from solver.model import ContactPair, Model
+    from solver.outcome import Converged
     from solver.surface import Surface
 
 
@@ -84,7 +85,9 @@ class Interface:
         )
 
 
-def _interface(contact: ContactPair, parts: tuple[Discretisation, ...], names: list[str]) -> Interface:
+def _interface(
+    contact: ContactPair, parts: tuple[Discretisation, ...], names: list[str]
+) -> Interface:
     sides = []
     for name, boundary in (contact.slave, contact.master):
         number = names.index(name)
@@ -129,6 +132,18 @@ class System:
     def part(self, name: str) -> int:
         """Return the number of the part called ``name``."""
         return [body.name for body in self.model.bodies].index(name)
+
+    def full(self, name: str) -> Discretisation:
+        """Return the whole body called ``name``."""
+        return self.parts[self.part(name)]
+
+    def displacement(self, name: str, state: State) -> NDArray[np.float64]:
+        """Return the displacements (n,) of a whole body [mm]."""
+        return state.u[self.part(name)]
+
+    def response(self, name: str, converged: Converged) -> Response:
+        """Return stress and internal variables at the points of a whole body."""
+        return converged.responses[self.part(name)]
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""

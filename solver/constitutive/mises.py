@@ -46,9 +46,7 @@ def yield_function(
     return np.linalg.norm(relative_stress(stress, state, material), axis=0) / SQRT23 - radius
 
 
-def radial_return(
-    strain: NDArray[np.float64], state: PlasticState, material: Material
-) -> Response:
+def radial_return(strain: NDArray[np.float64], state: PlasticState, material: Material) -> Response:
     """Return stress and consistent tangent where all strain components are given.
 
     Plane strain, axisymmetry (4 components) and three dimensions (6 components).
@@ -97,7 +95,7 @@ def radial_return(
     deviator = np.eye(n_components) - np.outer(one, one) / 3.0
     reduction = 2 * G * dgamma / size[at]
     theta_bar = 2 * G / (2 * G + 2 / 3 * (Hi + Hk)) - reduction
-    tangent[:, :, at] -= 2 * G * (
-        reduction * deviator[:, :, None] + theta_bar * n[:, None] * n[None]
+    tangent[:, :, at] -= (
+        2 * G * (reduction * deviator[:, :, None] + theta_bar * n[:, None] * n[None])
     )
     return Response(stress, tangent, PlasticState(plastic_strain, accumulated), yielding)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from solver.material import Material
 
-_IN_PLANE = [0, 1, 3]
+_IN_PLANE = np.array([0, 1, 3])
 _MODES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]]) / np.sqrt(2.0)
 _P = np.array([1 / 3, 1.0, 1.0])[:, None]
 _MAX_ITERATIONS = 50

@@ -185,6 +185,4 @@ def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:
 def _join(pieces: list[Rows]) -> Rows | None:
     if not pieces:
         return None
-    return Rows(
-        np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces])
-    )
+    return Rows(np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces]))

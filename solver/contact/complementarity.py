@@ -74,9 +74,7 @@ class ContactSolution:
     pivoted: bool
 
 
-def solve_contact(
-    problem: ContactProblem, start: NDArray[np.int64]
-) -> ContactSolution | None:
+def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
     """Return the solution, or None when there is none (or none was found).
 
     ``start`` (n,) is the status to begin with, usually that of the iteration before.
@@ -201,9 +199,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     return None
 
 
-def _given_bound(
-    problem: ContactProblem, bound: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def _given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return the forces when |T| <= bound is given: a convex problem, by Lemke's method.
 
     z = (N, tau, back), w = (gap, fore, sigma) with tau = T + bound, sigma = bound - T and

@@ -146,9 +146,7 @@ def pair(
         return position, n / np.linalg.norm(n, axis=0)
 
     middle, n = on_slave(edge, (start + end) / 2)
-    eta, distance = _project_on_master(
-        xm, master.edges[None], middle[:, :, None], n[:, :, None]
-    )
+    eta, distance = _project_on_master(xm, master.edges[None], middle[:, :, None], n[:, :, None])
     distance = np.where(np.abs(eta) <= 1 + 1e-6, np.abs(distance), np.inf)
     partner = distance.argmin(axis=1)
     facing = np.isfinite(distance[np.arange(len(edge)), partner])
@@ -205,9 +203,7 @@ def _integrate(
     full = _hat_sum(length * slave.measure[slave.edges[:, :2]].mean(axis=1) / 2)
     covered = area > _MIN_COVERED * full
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
-    flat = [
-        (side * scale[:, None, None]).reshape(2, rows, -1) for side in (on_slave, on_master)
-    ]
+    flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in (on_slave, on_master)]
     return Pairing(
         area=np.where(covered, area, 0.0),
         length=_hat_sum(length) / _hat_sum(np.ones_like(length)),

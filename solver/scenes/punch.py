@@ -1,49 +1,180 @@
-"""Elastic-plastic punch pressed on an elastic-plastic half-plane."""
+"""Elastic-plastic punch pressed on an elastic-plastic half-plane, and released.
+
+A square-cornered punch of half-width a and a half-plane of the same material, symmetric about
+x = 0, so that half of it is meshed. Uniform pressure on top of the punch is raised to
+``load_ratio * yield_stress`` and removed. The punch is held by contact alone.
+
+The outer dimensions are not given in the source; they are parameters here, and large enough not
+to matter next to the contact.
+
+P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
-from annotated_types import Gt, Interval, Unit
+import numpy as np
+from annotated_types import Interval, Unit
 
+from solver.audit import cut_force
+from solver.body import Body
+from solver.elements import element_type
+from solver.mesh import graded, grid
+from solver.model import ContactPair, Model
+from solver.path import Branch, Path, PathControl
 from solver.record import Record
+from solver.scenes.harvest import Harvest, Layout
+from solver.scenes.parameters import Friction, Length, MaterialParameters, Ratio, described
 from solver.scenes.scene import Monitor, Scene
+from solver.system import System
 
-
-def described(default: Any, description: str) -> Any:
-    """Return a dataclass field with its default and its description."""
-    return field(default=default, metadata={"description": description})
+_LARGEST = 0.08  # of a, under the punch
+_HALF_PLANE_LARGEST = 1.0
+_PUNCH_LARGEST = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PunchParameters:
-    """Parameters of the punch scene (N, mm, MPa)."""
+class PunchParameters(MaterialParameters):
+    """Parameters of the punch (N, mm, MPa)."""
 
-    load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(
-        0.5714, "mean pressure on the punch / yield stress"
+    load_ratio: Ratio = described(0.5714, "mean pressure on the punch / yield stress")
+    friction: Friction = described(0.0, "Coulomb friction coefficient")
+    state: Literal["plane_stress", "plane_strain", "axisymmetric"] = described(
+        "plane_stress", "two-dimensional state; axisymmetric is a flat-ended cylinder"
     )
-    friction: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
-        0.0, "Coulomb friction coefficient"
+    half_width: Length = described(50.0, "half-width a of the punch")
+    punch_height: Annotated[float, Interval(ge=0.5, le=20.0), Unit("1")] = described(
+        2.0, "height of the punch / a"
     )
-    hardening: Literal["none", "isotropic", "kinematic", "mixed"] = described(
-        "none", "hardening rule of the yielding bodies"
+    half_plane_size: Annotated[float, Interval(ge=2.0, le=1000.0), Unit("1")] = described(
+        8.0, "width and depth of the half-plane / a"
     )
-    hardening_ratio: Annotated[float, Interval(ge=0.0, lt=1.0), Unit("1")] = described(
-        0.024, "slope Eu of the uniaxial hardening branch / Young's modulus"
+    punch_stiffness: Annotated[float, Interval(ge=1e-4, le=1e4), Unit("1")] = described(
+        1.0, "Young's modulus of the punch / that of the half-plane"
     )
-    yield_stress: Annotated[float, Gt(0.0), Unit("MPa")] = described(
-        350.0, "uniaxial yield stress Re"
+    elastic_punch: bool = described(False, "whether the punch never yields")
+    smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = described(
+        1e-3, "smallest element side, at the corner / a"
     )
-    half_width: Annotated[float, Gt(0.0), Unit("mm")] = described(50.0, "punch half-width a")
+    growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = described(
+        1.4, "ratio of neighbouring element sides away from the corner"
+    )
+    element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
+        "quad8", "element of both bodies"
+    )
+    load_step: Annotated[float, Interval(ge=1e-4, le=1.0), Unit("1")] = described(
+        0.05, "largest increment of load_ratio"
+    )
+    unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(5, "increments of unloading")
+
+
+def model(parameters: PunchParameters) -> Model:
+    """Return the half model: bodies, supports, pressure and contact."""
+    a, h, growth = (
+        parameters.half_width,
+        parameters.smallest_element * parameters.half_width,
+        parameters.growth,
+    )
+    size = parameters.half_plane_size * a
+    under = a - graded(a, h, growth, _LARGEST * a)[::-1]
+    beyond = a + graded(size - a, h, growth, _HALF_PLANE_LARGEST * a)
+    up = graded(parameters.punch_height * a, h, growth, _PUNCH_LARGEST * a)
+    down = -graded(size, h, growth, _HALF_PLANE_LARGEST * a)[::-1]
+    cells = element_type(parameters.element).cells
+    punch = Body(
+        name="punch",
+        mesh=grid(under, up, cells),
+        material=parameters.material(parameters.punch_stiffness, elastic=parameters.elastic_punch),
+        state=parameters.state,
+        element=parameters.element,
+        supports={"left": "x"},
+        pressure={"top": parameters.yield_stress},
+    )
+    half_plane = Body(
+        name="half_plane",
+        mesh=grid(np.concatenate([under, beyond[1:]]), down, cells),
+        material=parameters.material(),
+        state=parameters.state,
+        element=parameters.element,
+        supports={"left": "x", "bottom": "y"},
+    )
+    contact = ContactPair(
+        slave=("punch", "bottom"),
+        master=("half_plane", "top"),
+        friction=parameters.friction,
+    )
+    return Model(bodies=(punch, half_plane), contacts=(contact,))
+
+
+def layout(parameters: PunchParameters) -> Layout:
+    """Return where the punch is looked at: a function of its dimensions, not of its mesh."""
+    a = parameters.half_width
+    height = min(1.0, parameters.punch_height) * a
+    inside = np.unique(np.concatenate([[0.005, 0.01, 0.028, 0.05, 0.1],
+                                       np.geomspace(5e-4, 1.0, 67)]))  # fmt: skip
+    outside = np.geomspace(5e-4, 0.98, 40)
+    return Layout(
+        x=np.linspace(0.0, 1.75 * a, 141),
+        y=np.linspace(-1.5 * a, height, 201),
+        depth=np.concatenate([[0.0], a * np.geomspace(1e-3, 1.9, 80)]),
+        station=a * np.array([0.0, 0.5, 0.9, 0.972, 0.995, 1.0]),
+        s=a * np.concatenate([1.0 - inside[::-1], [1.0], 1.0 + outside]),
+        profile_body="half_plane",
+        surfaces={"punch": "bottom", "half_plane": "top"},
+    )
+
+
+def _extra(harvest: Harvest, branch: Branch) -> dict[str, float]:
+    """Return the figures this scene is judged by."""
+    loaded, unloaded, system = branch.loaded, branch.unloaded, harvest.system
+    assert loaded is not None
+    assert unloaded is not None
+    a = float(system.interfaces[0].slave_surface.X[0].max())
+    s = harvest.layout.s
+    out = {}
+    for body, distance in (("half_plane", 0.005), ("punch", 0.028)):
+        sigma = harvest.on_surface(body, unloaded)[0]
+        at = int(np.argmin(np.abs(s - a * (1 - distance))))
+        out[f"residual_x_{body}"] = float(sigma[at])
+    for body, name in (("punch", "punch"), ("half_plane", "half_plane")):
+        response = unloaded.responses[system.part(body)]
+        out[f"max_plastic_strain_{name}"] = float(response.state.accumulated.max())
+    # the free side of the punch carries no sigma_x: what remains is error
+    punch = system.part("punch")
+    nodes = system.parts[punch].boundary_nodes("right")
+    side = harvest.stress(punch, unloaded)[0, nodes]
+    yield_stress = system.parts[system.part("half_plane")].body.material.yield_stress
+    out["audit_free_surface"] = float(np.abs(side).max() / yield_stress)
+    depth = float(-system.parts[system.part("half_plane")].X[1].min())
+    line = np.concatenate([[0.0], np.geomspace(1e-5 * a, depth * (1 - 1e-9), 4000)])
+    cut = np.stack([np.full_like(line, 0.5 * a), -line])
+    stress = unloaded.responses[system.part("half_plane")].stress
+    out["audit_self_equilibrium"] = abs(cut_force(system, system.part("half_plane"), stress, cut))
+    return out
 
 
 def path(
     parameters: PunchParameters, values: Sequence[float], monitor: Monitor
 ) -> Iterator[Record]:
-    """Yield one record for each load ratio."""
-    raise SystemExit("the path of the punch is being written")
+    """Yield one record for each load ratio, in increasing order."""
+    ratios = sorted(replace(parameters, load_ratio=v).load_ratio for v in values)
+    system = System(model(parameters))
+    harvest = Harvest(system, layout(parameters))
+    control = PathControl(load_step=parameters.load_step, unload_steps=parameters.unload_steps)
+    expected = ratios[-1] / control.load_step + len(ratios) * (control.unload_steps + 1)
+    done = 0
+
+    def report(load: float, message: str) -> None:
+        nonlocal done
+        done += 1
+        monitor(min(done / expected, 0.99), message)
+
+    for ratio, branch in zip(ratios, Path(system, control, report).branches(ratios), strict=True):
+        yield harvest.record(replace(parameters, load_ratio=ratio), branch, _extra)
+    monitor(1.0, "done")
 
 
 PUNCH = Scene(

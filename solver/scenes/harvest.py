@@ -1,0 +1,212 @@
+"""Turns the end of a branch into the labelled arrays of a record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.audit import audit, contact_pressure
+from solver.errors import LimitLoad
+from solver.fields import Sampler, recovery, von_mises
+from solver.kinematics import COMPONENTS, to_tensor
+from solver.record import Record, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from solver.outcome import Converged
+    from solver.path import Branch, Tally
+    from solver.system import System
+
+    Array = NDArray[np.float64]
+
+STAGES = ("loaded", "unloaded")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Where a scene is looked at; independent of its mesh, so that runs can be compared.
+
+    Attributes
+    ----------
+    x, y : map grid [mm]
+    depth, station : profiles go down to ``depth`` below the surface at x = ``station`` [mm]
+    s : positions along the contact surface from its centre [mm]
+    profile_body : the body whose profiles are taken
+    surfaces : body -> boundary that is its contact surface, in the order of the dimension
+    """
+
+    x: Array
+    y: Array
+    depth: Array
+    station: Array
+    s: Array
+    profile_body: str
+    surfaces: dict[str, str]
+
+    @property
+    def coordinates(self) -> dict[str, Any]:
+        """The record's coordinates."""
+        return {
+            "component": np.array(COMPONENTS),
+            "stage": np.array(STAGES),
+            "body": np.array(list(self.surfaces)),
+            "x": self.x,
+            "y": self.y,
+            "depth": self.depth,
+            "station": self.station,
+            "s": self.s,
+        }
+
+
+class Harvest:
+    """Samples one system; the interpolation is set up once for all its runs."""
+
+    def __init__(self, system: System, layout: Layout) -> None:
+        self.system = system
+        self.layout = layout
+        X, Y = np.meshgrid(layout.x, layout.y)
+        S, D = np.meshgrid(layout.station, -layout.depth, indexing="ij")
+        grid, lines = np.stack([X.ravel(), Y.ravel()]), np.stack([S.ravel(), D.ravel()])
+        surface = np.stack([layout.s, np.zeros_like(layout.s)])
+        self._recover = [recovery(part) for part in system.parts]
+        self._map = [Sampler(part, grid) for part in system.parts]
+        self._lines = Sampler(system.parts[system.part(layout.profile_body)], lines)
+        self._surface = {
+            name: Sampler(system.parts[system.part(name)], surface) for name in layout.surfaces
+        }
+
+    def record(
+        self,
+        parameters: object,
+        branch: Branch,
+        extra: Callable[[Harvest, Branch], dict[str, float]],
+    ) -> Record:
+        """Return the record of a branch; ``extra`` adds the scene's own scalars."""
+        scalars = self._cost(branch.tally)
+        if branch.error or branch.loaded is None or branch.unloaded is None:
+            limit = isinstance(branch.error, LimitLoad)
+            return Record(
+                parameters=parameters,
+                status=Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED,
+                message=str(branch.error),
+                coordinates=self.layout.coordinates,
+                scalars=scalars,
+            )
+        check = audit(self.system, branch.loaded, branch.unloaded, branch.tally.dissipation)
+        scalars |= dict(check.figures) | self._scalars(branch.loaded, branch.unloaded)
+        scalars |= {"plastic_work": branch.tally.plastic_work} | extra(self, branch)
+        return Record(
+            parameters=parameters,
+            status=Status.OK if check.passed else Status.AUDIT_FAILED,
+            message="; ".join(check.violations + check.warnings),
+            coordinates=self.layout.coordinates,
+            fields=self._fields(branch.loaded, branch.unloaded),
+            scalars=scalars,
+        )
+
+    # -- nodal fields --------------------------------------------------------------------------
+
+    def stress(self, part: int, converged: Converged) -> Array:
+        """Return recovered nodal stress (4, n_nodes), Mandel [MPa]."""
+        return np.asarray((self._recover[part] @ converged.responses[part].stress.T).T)
+
+    def plastic(self, part: int, converged: Converged) -> Array:
+        """Return recovered equivalent plastic strain (n_nodes,), not below zero."""
+        strain = self._recover[part] @ converged.responses[part].state.accumulated
+        return np.maximum(strain, 0.0)
+
+    def on_surface(self, body: str, converged: Converged) -> Array:
+        """Return surface stress (4, n_s) of a body, tensor components [MPa]."""
+        nodal = self.stress(self.system.part(body), converged)
+        return to_tensor(self._surface[body](nodal))
+
+    # -- the record's variables ----------------------------------------------------------------
+
+    def _fields(self, loaded: Converged, unloaded: Converged) -> dict[str, Any]:
+        layout, parts = self.layout, range(len(self.system.parts))
+        shape = (len(layout.y), len(layout.x))
+
+        def on_map(values: Callable[[int], Array]) -> Array:
+            out: Array | None = None
+            for part, sampler in zip(parts, self._map, strict=True):
+                here = sampler(values(part))
+                out = here if out is None else np.where(np.isnan(out), here, out)
+            assert out is not None
+            return out.reshape(*out.shape[:-1], *shape)
+
+        residual = on_map(lambda part: self.stress(part, unloaded))
+        below = self.system.part(layout.profile_body)
+        lines = (len(layout.station), len(layout.depth))
+        profile = self._lines(self.stress(below, unloaded)).reshape(4, *lines)
+        contact = [self._contact(c) for c in (loaded, unloaded)]
+        surface = np.stack([self.on_surface(body, unloaded) for body in layout.surfaces])
+        return {
+            "residual_stress": (("component", "y", "x"), to_tensor(residual)),
+            "residual_mises": (("y", "x"), von_mises(residual)),
+            "plastic_strain": (("y", "x"), on_map(lambda part: self.plastic(part, unloaded))),
+            "mises_loaded": (("y", "x"), von_mises(on_map(lambda p: self.stress(p, loaded)))),
+            "residual_profile": (
+                ("station", "component", "depth"),
+                to_tensor(profile).swapaxes(0, 1),
+            ),
+            "plastic_strain_profile": (
+                ("station", "depth"),
+                self._lines(self.plastic(below, unloaded)).reshape(lines),
+            ),
+            "surface_residual": (("body", "component", "s"), surface),
+            **{
+                name: (("stage", "s"), np.stack([c[k] for c in contact]))
+                for k, name in enumerate(("contact_pressure", "contact_shear", "contact_gap"))
+            },
+        }
+
+    def _contact(self, converged: Converged) -> tuple[Array, Array, Array]:
+        """Return pressure, shear and gap along s, NaN where there is no slave surface."""
+        interface, state = self.system.interfaces[0], converged.state
+        pressure, shear = contact_pressure(self.system, state, 0)
+        gap = interface.pairing(state.u).gap
+        chain = interface.slave_surface
+        x = chain.X[0, chain.vertices]
+        order = np.argsort(x)
+
+        def along(values: Array) -> Array:
+            found = np.interp(self.layout.s, x[order], values[order], left=np.nan, right=np.nan)
+            return np.asarray(found)
+
+        return along(pressure), along(shear), along(gap)
+
+    def _scalars(self, loaded: Converged, unloaded: Converged) -> dict[str, float]:
+        strains = [response.state.accumulated for response in unloaded.responses]
+        most = int(np.argmax([s.max() for s in strains]))
+        part = self.system.parts[most]
+        where = part.points.reshape(2, -1)[1, strains[most].argmax()]
+        residual = [self.stress(p, unloaded)[:3] for p in range(len(self.system.parts))]
+        pressure, _ = contact_pressure(self.system, loaded.state, 0)
+        chain = self.system.interfaces[0].slave_surface
+        closed = loaded.state.contacts[0].normal > 0
+        x = np.abs(chain.X[0, chain.vertices])
+        return {
+            "contact_half_width": float(x[closed].max(initial=0.0)),
+            "peak_contact_pressure": float(pressure.max()),
+            "max_plastic_strain": float(strains[most].max()),
+            "depth_of_max_plastic_strain": float(-where) if strains[most].max() > 0 else np.nan,
+            "peak_residual_tension": float(max(r.max() for r in residual)),
+            "peak_residual_compression": float(min(r.min() for r in residual)),
+        }
+
+    def _cost(self, tally: Tally) -> dict[str, float]:
+        return {
+            "increments": len(tally.iterations),
+            "cut_increments": tally.cuts,
+            "iterations": sum(tally.iterations),
+            "median_iterations": float(np.median(tally.iterations)) if tally.iterations else 0.0,
+            "inner_fallbacks": tally.pivoted,
+            "blended_tangents": tally.blended,
+            "cpu_seconds": tally.seconds,
+            "degrees_of_freedom": self.system.n_unknowns,
+        }

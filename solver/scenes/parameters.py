@@ -1,0 +1,107 @@
+"""Parameters that scenes share, and how a parameter is described."""
+
+from __future__ import annotations
+
+import math
+import operator
+import typing
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
+
+from solver.errors import ModelError
+from solver.material import Material
+
+
+def described(default: Any, description: str) -> Any:
+    """Return a dataclass field with its default and its description."""
+    return field(default=default, metadata={"description": description})
+
+
+Ratio = Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")]
+Friction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
+HardeningRatio = Annotated[float, Interval(ge=0.0, le=0.9), Unit("1")]
+Fraction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
+Stress = Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")]
+Length = Annotated[float, Interval(gt=0.0, le=1e6), Unit("mm")]
+Poisson = Annotated[float, Interval(ge=0.0, le=0.4999), Unit("1")]
+Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaterialParameters:
+    """The material every scene asks for."""
+
+    hardening: Hardening = described("none", "hardening rule of the yielding bodies")
+    hardening_ratio: HardeningRatio = described(
+        0.024, "slope Eu of the uniaxial hardening branch / Young's modulus"
+    )
+    isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
+    yield_stress: Stress = described(350.0, "uniaxial yield stress Re")
+    youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
+    poisson_ratio: Poisson = described(0.3, "Poisson ratio")
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Material:
+        """Return the material, with ``stiffness`` times Young's modulus."""
+        return Material(
+            youngs_modulus=self.youngs_modulus * stiffness,
+            poisson_ratio=self.poisson_ratio,
+            yield_stress=math.inf if elastic else self.yield_stress,
+            hardening=self.hardening,
+            hardening_ratio=self.hardening_ratio,
+            isotropic_fraction=self.isotropic_fraction,
+        )
+
+
+def check(parameters: Any) -> None:
+    """Raise `ModelError` for the first field that breaks its annotation."""
+    hints = typing.get_type_hints(type(parameters), include_extras=True)
+    for item in fields(parameters):
+        value, hint = getattr(parameters, item.name), hints[item.name]
+        if typing.get_origin(hint) is Literal:
+            choices = typing.get_args(hint)
+            if value not in choices:
+                raise ModelError(item.name, value, "must be one of " + ", ".join(choices))
+            continue
+        kind, *limits = typing.get_args(hint) or (hint,)
+        if kind is bool:
+            if not isinstance(value, bool):
+                raise ModelError(item.name, value, "must be true or false")
+            continue
+        wanted = "an integer" if kind is int else "a number"
+        number = isinstance(value, int if kind is int else (int, float))
+        if isinstance(value, bool) or not number or not math.isfinite(value):
+            raise ModelError(item.name, value, f"must be {wanted}")
+        bounds = [bound for limit in limits for bound in _bounds(limit)]
+        if not all(_holds(bound, value) for bound in bounds):
+            allowed = " and ".join(_words(bound) for bound in bounds)
+            raise ModelError(item.name, value, "must be " + allowed)
+
+
+def _bounds(limit: Any) -> list[Any]:
+    if isinstance(limit, Interval):
+        return [part for part in limit if part is not None]
+    return [limit] if isinstance(limit, (Ge, Gt, Le, Lt)) else []
+
+
+_TESTS: dict[type, tuple[str, str, Callable[[float, float], bool]]] = {
+    Ge: ("ge", "at least", operator.ge),
+    Gt: ("gt", "greater than", operator.gt),
+    Le: ("le", "at most", operator.le),
+    Lt: ("lt", "less than", operator.lt),
+}
+
+
+def _holds(bound: Any, value: float) -> bool:
+    name, _, test = _TESTS[type(bound)]
+    return test(value, getattr(bound, name))
+
+
+def _words(bound: Any) -> str:
+    name, words, _ = _TESTS[type(bound)]
+    return f"{words} {getattr(bound, name):g}"
