@@ -9,10 +9,12 @@ that starts after a crash waits for it.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
 import threading
+import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -27,21 +29,16 @@ OUTDATED = "the solver has changed since the study was accepted: post it again"
 
 
 class Outlet:
-    """The way out for events, one JSON text a line; threads may share it."""
+    """The way out for events, one JSON text a line."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
-        self.lock = threading.Lock()
 
     def send(self, kind: str, content: Mapping[str, Any]) -> None:
         """Write one event; that nobody reads any more is no reason to fail."""
-        line = json.dumps({"kind": kind, "content": content})
-        with self.lock:
-            try:
-                self.stream.write(line + "\n")
-                self.stream.flush()
-            except BrokenPipeError:
-                pass
+        with contextlib.suppress(BrokenPipeError):
+            self.stream.write(json.dumps({"kind": kind, "content": content}) + "\n")
+            self.stream.flush()
 
 
 def claim_stdout() -> Outlet:
@@ -63,14 +60,20 @@ def read_order() -> dict[str, Any]:
     return order
 
 
-def watch_stdin() -> threading.Event:
-    """Return an event that is set when the other end of the standard input closes."""
+def watch_stdin(grace: float) -> threading.Event:
+    """Return an event that is set when the other end of the standard input closes.
+
+    A process that has not ended ``grace`` seconds later ends itself: a service that died cannot
+    kill it, and the next one waits for its lock.
+    """
     stop = threading.Event()
 
     def watch() -> None:
         # Not through sys.stdin: at exit the interpreter would wait for its buffer's lock.
         os.read(STDIN, 1)
         stop.set()
+        time.sleep(grace)
+        os._exit(1)
 
     threading.Thread(target=watch, name="stop-watch", daemon=True).start()
     return stop
@@ -99,7 +102,7 @@ def main() -> None:
     outlet = claim_stdout()
     order = read_order()
     try:
-        compute(order, outlet, watch_stdin())
+        compute(order, outlet, watch_stdin(order["grace"]))
     except StudyError as error:
         outlet.send("refused", {"reason": str(error)})
     except (GridLost, StoreBusy) as error:

@@ -87,6 +87,11 @@ def problem(
     return Problem(document, status_code=status.value, headers=headers)
 
 
+def status_of(exc: Exception) -> HTTPStatus:
+    """Return the status of an exception, that of its nearest ancestor in the table."""
+    return next(STATUS[kind] for kind in type(exc).__mro__ if kind in STATUS)
+
+
 def shown(value: object) -> str | int | float | bool | None:
     """Return an offending value as JSON can carry it, cut to a readable length."""
     if value is None or isinstance(value, bool):
@@ -125,7 +130,7 @@ def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field."""
     error = {"field": exc.field, "value": shown(exc.value), "allowed": exc.allowed}
     detail = f"{exc.field}: {exc.allowed}"
-    return problem(request, STATUS[type(exc)], detail, [error])
+    return problem(request, status_of(exc), detail, [error])
 
 
 def on_validation_error(request: Request, exc: RequestValidationError) -> Problem:
@@ -139,7 +144,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 
 def on_plain_error(request: Request, exc: NotFound | Conflict) -> Problem:
     """Answer an error that is told in one sentence."""
-    return problem(request, STATUS[type(exc)], str(exc))
+    return problem(request, status_of(exc), str(exc))
 
 
 def on_http_error(request: Request, exc: HTTPException) -> Problem:

@@ -206,7 +206,7 @@ class Jobs:
             if not job.state.final:
                 raise Conflict(f"the study is {job.state}: wait for its end or dismiss it first")
             connection.execute(
-                "UPDATE job SET state = ?, message = '', again = 1,"
+                "UPDATE job SET state = ?, message = '', progress = 0, again = 1,"
                 f" started = NULL, finished = NULL, turn = {NEXT_TURN} WHERE id = ?",
                 (State.ACCEPTED, job_id),
             )

@@ -139,6 +139,7 @@ class Runner:
             "workers": self.settings.workers,
             "scheduler": self.settings.scheduler,
             "again": job.again,
+            "grace": self.settings.grace_seconds,
         }
         assert child.stdin is not None
         child.stdin.write(json.dumps(order).encode() + b"\n")

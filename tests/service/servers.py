@@ -56,6 +56,7 @@ class Server:
 
     home: Path
     workers: int = 1
+    settings: dict[str, str] = field(default_factory=dict)
     port: int = field(default_factory=free_port)
     process: subprocess.Popen[bytes] | None = None
 
@@ -79,7 +80,7 @@ class Server:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", PROGRAM, str(self.port), str(self.data)],
                 cwd=self.home,
-                env=environment(self.log) | {"RESIDUA_WORKERS": str(self.workers)},
+                env=environment(self.log) | {"RESIDUA_WORKERS": str(self.workers)} | self.settings,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,

@@ -21,7 +21,7 @@ from tests.service.servers import PROGRAM, Server, environment, fake_study, free
 
 def long_study(name: str) -> dict[str, Any]:
     """Return a study of sixteen runs in eight paths that takes some seconds."""
-    study = fake_study(name, seconds=0.3)
+    study = fake_study(name, seconds=0.2)
     study["sweep"]["friction"] = [i / 10 for i in range(8)]
     return study
 
@@ -54,6 +54,15 @@ def children(server: Server) -> list[psutil.Process]:
     return psutil.Process(server.process.pid).children(recursive=True)
 
 
+def alive(processes: list[psutil.Process]) -> list[psutil.Process]:
+    """Return those that still run; an ended one may wait for its parent to notice."""
+    return [
+        process
+        for process in processes
+        if process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    ]
+
+
 def test_a_killed_service_takes_its_studies_up_again(mortal: Server) -> None:
     mortal.start()
     first, second = (mortal.post(long_study("first")), mortal.post(fake_study("second")))
@@ -68,7 +77,7 @@ def test_a_killed_service_takes_its_studies_up_again(mortal: Server) -> None:
     assert repeated(mortal, before) == []
     assert len(mortal.computed()) <= 20 + mortal.workers
     assert not list(mortal.data.rglob("*.part"))
-    assert not [process for process in orphans if process.is_running()]
+    wait_until(lambda: not alive(orphans))
     path = mortal.data / "studies" / first / "dataset.nc"
     with open_netcdf(path) as dataset:
         assert bool(dataset["max_plastic_strain"].notnull().all())
@@ -109,6 +118,22 @@ def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(mortal: Se
     assert (study["status"], study["counts"]) == ("failed", {"error": 1})
     assert "worker" in study["runs"][0]["message"]
     assert mortal.finished(next_id)["status"] == "successful"
+
+
+def test_a_study_that_hangs_keeps_neither_a_stopped_nor_a_killed_service(mortal: Server) -> None:
+    mortal.settings = {"RESIDUA_GRACE_SECONDS": "1"}
+    mortal.start()
+    study_id = mortal.post(fake_study("hangs", behaviour="hang"))
+    wait_until(mortal.computed)
+    mortal.stop()
+    mortal.start()
+    wait_until(lambda: len(mortal.computed()) >= 3)
+    orphans = children(mortal)
+    mortal.kill()
+    mortal.start()
+    wait_until(lambda: not alive(orphans))
+    assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
+    assert mortal.finished(mortal.post(fake_study("next")))["status"] == "successful"
 
 
 def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:

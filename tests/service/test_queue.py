@@ -49,8 +49,9 @@ def test_a_retried_job_waits_behind_the_others(jobs: Jobs) -> None:
     for name in "ab":
         jobs.accept(name, STUDY, ["run"])
     assert taken(jobs) == "a"
+    jobs.note("a", 100.0)
     jobs.finish("a", State.FAILED, "reason")
-    assert jobs.retry("a").again
+    assert (jobs.retry("a").again, jobs.get("a").progress) == (True, 0)
     assert taken(jobs) == "b"
 
 

@@ -39,7 +39,7 @@ class FakeParameters:
     seconds: Annotated[float, Interval(ge=0.0, le=60.0), Unit("s")] = field(
         default=0.0, metadata={"description": "time one run takes"}
     )
-    behaviour: Literal["good", "limit", "raise", "die"] = field(
+    behaviour: Literal["good", "limit", "raise", "die", "hang"] = field(
         default="good", metadata={"description": "how runs end"}
     )
 
@@ -67,6 +67,8 @@ def record(parameters: FakeParameters) -> Record:
             raise ZeroDivisionError("a defect of the scene")
         case "die":
             os._exit(9)
+        case "hang":
+            time.sleep(600.0)
         case "limit":
             return Record(parameters=parameters, status=Status.LIMIT_LOAD, message="no equilibrium")
     x, y = np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 0.0, 4)
