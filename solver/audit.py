@@ -99,13 +99,15 @@ def audit(
     """
     state = loaded.state
     scale = state.force_scale or 1.0
-    length = max(float(np.ptp(part.X, axis=1).max()) for part in system.parts)
+    wholes = [system.full(body.name) for body in system.model.bodies]
+    length = max(float(np.ptp(part.X, axis=1).max()) for part in wholes)
     figures = {"audit_residual": max(loaded.residual, unloaded.residual)}
     figures |= _contact_figures(system, state)
 
     worst, shear = 0.0, 0.0
     errors = {"loaded": [0.0, 0.0], "residual": [0.0, 0.0]}
-    for part, *responses in zip(system.parts, loaded.responses, unloaded.responses, strict=True):
+    for part in wholes:
+        responses = [system.response(part.body.name, c) for c in (loaded, unloaded)]
         material = part.body.material
         for kind, response in zip(errors, responses, strict=True):
             for k, energy in enumerate(error_estimate(part, response.stress)):
@@ -154,7 +156,7 @@ def audit(
     )
     if figures["audit_dissipation"] < -_YIELD * yield_stress:
         violations.append(f"plastic dissipation is negative: {least_dissipation:.2e}")
-    largest = max(float(p.accumulated.max()) for p in unloaded.state.plastic)
+    largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
     warnings = (
         (f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is stretched",)
         if largest > _LARGE_STRAIN
@@ -164,14 +166,14 @@ def audit(
 
 
 def cut_force(
-    system: System, part: int, stress: NDArray[np.float64], where: NDArray[np.float64]
+    system: System, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
 ) -> float:
     """Return the normal force on a plane cut over the integral of its magnitude.
 
     ``where`` (2, n) are points along the straight cut; ``stress`` (4, n_points) Mandel. Zero for
     a residual stress that holds itself, but for the discretisation error.
     """
-    p = system.parts[part]
+    p = system.full(body)
     along = where[:, -1] - where[:, 0]
     length = float(np.linalg.norm(along))
     n = np.array([along[1], -along[0]]) / length

@@ -35,6 +35,7 @@ class Body:
     thickness : of plane bodies [mm]
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
     pressure : boundary name -> pressure at load factor one, positive when pushing [MPa]
+    condense : reduce the body to its contact surfaces where its material is elastic
     """
 
     name: str
@@ -46,6 +47,7 @@ class Body:
     thickness: float = 1.0
     supports: Mapping[str, str] = field(default_factory=dict)
     pressure: Mapping[str, float] = field(default_factory=dict)
+    condense: bool = True
 
     def __post_init__(self) -> None:
         if self.state not in STATES:

@@ -12,11 +12,20 @@ from skfem import CellBasis, FacetBasis
 from solver import kinematics
 from solver.constitutive import PlasticState, Response, elastic_stiffness, respond
 from solver.elements import element_type
+from solver.operators import Operators
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.body import Body
+
+
+def choose_pins(rigid: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the unknowns of ``free`` less as many as hold the rigid motions (n, n_rigid)."""
+    if not rigid.shape[1]:
+        return free
+    pivots = linalg.qr(rigid[free].T, mode="r", pivoting=True)[1]
+    return np.setdiff1d(free, free[pivots[: rigid.shape[1]]])
 
 
 class Discretisation:
@@ -50,7 +59,7 @@ class Discretisation:
         self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
         self.dofs = self.dofs.reshape(nodes.shape[1], -1)
         self.points = np.asarray(self.basis.global_coordinates())
-        values = np.array([np.broadcast_to(b[0].value, self.basis.dx.shape)
+        values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
         self.weights = self.basis.dx * self._measure(self.points)
@@ -79,7 +88,7 @@ class Discretisation:
             weight = basis.dx * self._measure(np.asarray(basis.global_coordinates()))
             normal = np.asarray(basis.normals)
             for shape, nodes in zip(basis.basis, basis.element_dofs, strict=True):
-                force = -pressure * (normal * shape[0].value * weight).sum(axis=-1)
+                force = -pressure * (normal * np.asarray(shape[0]) * weight).sum(axis=-1)
                 np.add.at(load, 2 * nodes, force[0])
                 np.add.at(load, 2 * nodes + 1, force[1])
         return load
@@ -101,12 +110,12 @@ class Discretisation:
             left = linalg.null_space(motions[fixed], rcond=1e-9)
             motions = motions @ left
         self.rigid = motions
-        pins = np.zeros(0, dtype=int)
-        if motions.shape[1]:
-            pivots = linalg.qr(motions[free].T, mode="r", pivoting=True)[1]
-            pins = free[pivots[: motions.shape[1]]]
-        self.active = np.setdiff1d(free, pins)
         self.free = free
+        self.active = choose_pins(motions, free)
+
+    def operators(self, linear_solver: str) -> Operators:
+        """Return the operators of this part."""
+        return Operators(self, linear_solver)
 
     # -- the law at all points ---------------------------------------------------------------
 
@@ -123,22 +132,34 @@ class Discretisation:
         """Return stress, tangent and new state at all points."""
         return respond(self.strain(u), state, self.body.material, self.body.state)
 
-    def elastic_energy(self, strain: NDArray[np.float64]) -> float:
-        """Return twice the elastic energy of Mandel strain (4, n_points) [N mm]."""
-        C = elastic_stiffness(self.body.material, self.body.state)
-        return self.quadratic(strain, C[:, :, None])
-
-    def quadratic(self, strain: NDArray[np.float64], moduli: NDArray[np.float64]) -> float:
-        """Return the integral of ``strain moduli strain`` [N mm]; moduli (4, 4, n_points or 1)."""
-        stress = np.einsum("abp,bp->ap", np.broadcast_to(moduli, (4, 4, strain.shape[1])), strain)
-        return float((stress * strain).sum(axis=0) @ self.weights.ravel())
-
     def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
         weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)
         forces = np.matmul(weighted, self._flat_B)[:, 0]
         nodal = np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
         return np.asarray(nodal, dtype=float)
+
+    def residual(
+        self, load: float, u: NDArray[np.float64], response: Response
+    ) -> NDArray[np.float64]:
+        """Return external minus internal forces (n,), contact forces left out [N]."""
+        del u
+        return load * self.load - self.internal_force(response.stress)
+
+    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+        strain, weight = self.strain(step), self.weights.ravel()
+        C = elastic_stiffness(self.body.material, self.body.state)
+        tangent = np.einsum("ap,abp,bp->p", strain, response.tangent, strain) @ weight
+        elastic = (strain * (C @ strain)).sum(axis=0) @ weight
+        return float(tangent), float(elastic)
+
+    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+        """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
+        flow = response.state.plastic_strain - before.plastic_strain
+        back = 2 / 3 * self.body.material.kinematic_modulus * response.state.plastic_strain
+        work = (response.stress * flow).sum(axis=0) @ self.weights.ravel()
+        return float(work), float(((response.stress - back) * flow).sum(axis=0).min())
 
     # -- stiffness ---------------------------------------------------------------------------
 
@@ -190,6 +211,13 @@ class Discretisation:
     def elastic_data(self) -> NDArray[np.float64]:
         """Values of the elastic stiffness on `pattern`."""
         return self._scatter(slice(None), self._elastic_elements)
+
+    def elastic_matrix(self) -> sparse.csr_array:
+        """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
+        rows = np.broadcast_to(self.dofs[:, :, None], self._elastic_elements.shape)
+        columns = np.broadcast_to(self.dofs[:, None, :], rows.shape)
+        entries = (self._elastic_elements.ravel(), (rows.ravel(), columns.ravel()))
+        return sparse.csr_array(entries, shape=(self.n, self.n))
 
     def tangent_data(self, response: Response) -> NDArray[np.float64]:
         """Return the values of the consistent tangent on `pattern`.

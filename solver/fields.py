@@ -135,7 +135,9 @@ def error_estimate(part: Discretisation, stress: NDArray[np.float64]) -> tuple[f
     """
     smooth = recovery(part) @ stress.T
     nodes = part.basis.element_dofs
-    shapes = np.array([np.broadcast_to(b[0].value, part.weights.shape) for b in part.basis.basis])
+    shapes = np.array(
+        [np.broadcast_to(np.asarray(b[0]), part.weights.shape) for b in part.basis.basis]
+    )
     back = np.einsum("iep,iec->cep", shapes, smooth[nodes]).reshape(len(stress), -1)
     nu, E = part.body.material.poisson_ratio, part.body.material.youngs_modulus
     weight = part.weights.ravel()

@@ -93,7 +93,7 @@ class Increment:
         step: _Step | None = None
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
-            residuals = self._residuals(responses)
+            residuals = self._residuals(u, responses)
             scale, error, violation = self._errors(residuals, candidates)
             if not (np.isfinite(error) and np.isfinite(violation)):
                 break
@@ -121,11 +121,11 @@ class Increment:
             for part, ui, plastic in zip(self.system.parts, u, self.start.plastic, strict=True)
         )
 
-    def _residuals(self, responses: Sequence[Response]) -> Vectors:
+    def _residuals(self, u: Vectors, responses: Sequence[Response]) -> Vectors:
         """Return external minus internal forces of each part, contact forces left out."""
         return tuple(
-            self.load * part.load - part.internal_force(response.stress)
-            for part, response in zip(self.system.parts, responses, strict=True)
+            part.residual(self.load, ui, response)
+            for part, ui, response in zip(self.system.parts, u, responses, strict=True)
         )
 
     def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
@@ -223,7 +223,7 @@ class Increment:
             nonlocal trial
             moved = tuple(ui + share * du for ui, du in zip(u, step.u, strict=True))
             trial = moved, self._respond(moved)
-            return along(share, self._residuals(trial[1]))
+            return along(share, self._residuals(*trial))
 
         share = search(slope, along(0.0, residuals))
         return share, *trial
@@ -242,17 +242,15 @@ class Increment:
     ) -> Converged:
         contacts = candidates.states(contacts, candidates.forces, candidates.status)
         contacts = tuple(replace(c, touching=c.status != OPEN) for c in contacts)
-        work, least = 0.0, 0.0
-        for part, response, before in zip(
-            self.system.parts, responses, self.start.plastic, strict=True
-        ):
-            flow = response.state.plastic_strain - before.plastic_strain
-            back = 2 / 3 * part.body.material.kinematic_modulus * response.state.plastic_strain
-            work += float((response.stress * flow).sum(axis=0) @ part.weights.ravel())
-            least = min(least, float(((response.stress - back) * flow).sum(axis=0).min()))
+        spent = [
+            part.plastic_work(before, response)
+            for part, before, response in zip(
+                self.system.parts, self.start.plastic, responses, strict=True
+            )
+        ]
         return Converged(
-            plastic_work=work,
-            dissipation=least,
+            plastic_work=sum(work for work, _ in spent),
+            dissipation=min(0.0, *(least for _, least in spent)),
             state=State(self.load, u, tuple(r.state for r in responses), contacts, scale),
             responses=responses,
             iterations=iterations,
@@ -266,12 +264,12 @@ class Increment:
         """Return the tangent stiffness along the last step over the elastic one."""
         if step is None:
             return 1.0
-        work = elastic = 0.0
-        for part, du, response in zip(self.system.parts, step.u, responses, strict=True):
-            strain = part.strain(du)
-            work += part.quadratic(strain, response.tangent)
-            elastic += part.elastic_energy(strain)
-        return work / elastic if elastic > 0 else 1.0
+        forms = [
+            part.stiffness_along(du, response)
+            for part, du, response in zip(self.system.parts, step.u, responses, strict=True)
+        ]
+        tangent, elastic = (sum(form[k] for form in forms) for k in (0, 1))
+        return tangent / elastic if elastic > 0 else 1.0
 
 
 def _norm(vectors: Sequence[NDArray[np.float64]]) -> float:

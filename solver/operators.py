@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from solver import linear
 
@@ -87,3 +88,32 @@ class Operators:
             data = (1 - blend) * data + blend * self._part.elastic_data
         self._solver.factorise(data)
         return Factored(self._part, self._solver)
+
+
+class Dense:
+    """The inverse of a small dense stiffness on the unknowns ``active`` of ``n``."""
+
+    def __init__(self, stiffness: NDArray[np.float64], active: NDArray[np.int64], n: int) -> None:
+        inverse = cho_solve(cho_factor(stiffness), np.eye(len(stiffness)))
+        self._inverse = np.zeros((n, n))
+        self._inverse[np.ix_(active, active)] = 0.5 * (inverse + inverse.T)
+
+    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `Operator`."""
+        return np.asarray(self._inverse @ force)
+
+    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `Operator`."""
+        return np.asarray(rows @ self._inverse[np.ix_(dofs, dofs)] @ rows.T)
+
+
+class Fixed:
+    """The operators of a part whose stiffness never changes."""
+
+    def __init__(self, operator: Operator) -> None:
+        self.elastic = operator
+
+    def tangent(self, response: Response, blend: float) -> Operator:
+        """Return the one operator."""
+        del response, blend
+        return self.elastic

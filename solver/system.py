@@ -11,13 +11,14 @@ import numpy as np
 from solver import surface
 from solver.contact.complementarity import OPEN, STICK
 from solver.contact.geometry import Pairing, pair
-from solver.operators import Operators
+from solver.discretisation import Discretisation
+from solver.substructure import Substructure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.body import Body
     from solver.constitutive import PlasticState, Response
-    from solver.discretisation import Discretisation
     from solver.model import ContactPair, Model
     from solver.outcome import Converged
     from solver.surface import Surface
@@ -85,13 +86,36 @@ class Interface:
         )
 
 
+Part = Discretisation | Substructure
+
+
+def _surfaces(model: Model) -> dict[tuple[str, str], Surface]:
+    """Return the surfaces of all pairs in the numbering of the whole bodies."""
+    return {
+        side: surface.extract(model.body(side[0]).discretisation, side[1])
+        for contact in model.contacts
+        for side in (contact.slave, contact.master)
+    }
+
+
+def _part(body: Body, surfaces: dict[tuple[str, str], Surface], linear_solver: str) -> Part:
+    own = [chain for (name, _), chain in surfaces.items() if name == body.name]
+    if body.material.elastic and body.condense and own:
+        return Substructure(body.discretisation, own, linear_solver)
+    return body.discretisation
+
+
 def _interface(
-    contact: ContactPair, parts: tuple[Discretisation, ...], names: list[str]
+    contact: ContactPair,
+    parts: tuple[Part, ...],
+    names: list[str],
+    surfaces: dict[tuple[str, str], Surface],
 ) -> Interface:
     sides = []
-    for name, boundary in (contact.slave, contact.master):
-        number = names.index(name)
-        sides.append((number, surface.extract(parts[number], boundary)))
+    for side in (contact.slave, contact.master):
+        number, chain = names.index(side[0]), surfaces[side]
+        part = parts[number]
+        sides.append((number, part.surface(chain) if isinstance(part, Substructure) else chain))
     (slave, slave_surface), (master, master_surface) = sides
     reference = None
     if contact.sliding == "small":
@@ -105,10 +129,15 @@ class System:
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
         self.model = model
-        self.parts: tuple[Discretisation, ...] = tuple(b.discretisation for b in model.bodies)
-        self.operators = tuple(Operators(part, linear_solver) for part in self.parts)
+        surfaces = _surfaces(model)
+        self.parts: tuple[Part, ...] = tuple(
+            _part(body, surfaces, linear_solver) for body in model.bodies
+        )
+        self.operators = tuple(part.operators(linear_solver) for part in self.parts)
         names = [body.name for body in model.bodies]
-        self.interfaces = tuple(_interface(c, self.parts, names) for c in model.contacts)
+        self.interfaces = tuple(
+            _interface(contact, self.parts, names, surfaces) for contact in model.contacts
+        )
 
     @property
     def n_unknowns(self) -> int:
@@ -135,15 +164,21 @@ class System:
 
     def full(self, name: str) -> Discretisation:
         """Return the whole body called ``name``."""
-        return self.parts[self.part(name)]
+        return self.model.body(name).discretisation
 
     def displacement(self, name: str, state: State) -> NDArray[np.float64]:
         """Return the displacements (n,) of a whole body [mm]."""
-        return state.u[self.part(name)]
+        number = self.part(name)
+        part, u = self.parts[number], state.u[number]
+        return part.expand(u, state.load) if isinstance(part, Substructure) else u
 
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body."""
-        return converged.responses[self.part(name)]
+        number = self.part(name)
+        if isinstance(self.parts[number], Substructure):
+            whole = self.full(name)
+            return whole.respond(self.displacement(name, converged.state), whole.virgin())
+        return converged.responses[number]
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""

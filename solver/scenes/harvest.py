@@ -73,12 +73,11 @@ class Harvest:
         S, D = np.meshgrid(layout.station, -layout.depth, indexing="ij")
         grid, lines = np.stack([X.ravel(), Y.ravel()]), np.stack([S.ravel(), D.ravel()])
         surface = np.stack([layout.s, np.zeros_like(layout.s)])
-        self._recover = [recovery(part) for part in system.parts]
-        self._map = [Sampler(part, grid) for part in system.parts]
-        self._lines = Sampler(system.parts[system.part(layout.profile_body)], lines)
-        self._surface = {
-            name: Sampler(system.parts[system.part(name)], surface) for name in layout.surfaces
-        }
+        wholes = {body.name: system.full(body.name) for body in system.model.bodies}
+        self._recover = {name: recovery(part) for name, part in wholes.items()}
+        self._map = {name: Sampler(part, grid) for name, part in wholes.items()}
+        self._lines = Sampler(wholes[layout.profile_body], lines)
+        self._surface = {name: Sampler(wholes[name], surface) for name in layout.surfaces}
 
     def record(
         self,
@@ -111,36 +110,36 @@ class Harvest:
 
     # -- nodal fields --------------------------------------------------------------------------
 
-    def stress(self, part: int, converged: Converged) -> Array:
+    def stress(self, body: str, converged: Converged) -> Array:
         """Return recovered nodal stress (4, n_nodes), Mandel [MPa]."""
-        return np.asarray((self._recover[part] @ converged.responses[part].stress.T).T)
+        points = self.system.response(body, converged).stress
+        return np.asarray((self._recover[body] @ points.T).T)
 
-    def plastic(self, part: int, converged: Converged) -> Array:
+    def plastic(self, body: str, converged: Converged) -> Array:
         """Return recovered equivalent plastic strain (n_nodes,), not below zero."""
-        strain = self._recover[part] @ converged.responses[part].state.accumulated
-        return np.maximum(strain, 0.0)
+        points = self.system.response(body, converged).state.accumulated
+        return np.maximum(self._recover[body] @ points, 0.0)
 
     def on_surface(self, body: str, converged: Converged) -> Array:
         """Return surface stress (4, n_s) of a body, tensor components [MPa]."""
-        nodal = self.stress(self.system.part(body), converged)
-        return to_tensor(self._surface[body](nodal))
+        return to_tensor(self._surface[body](self.stress(body, converged)))
 
     # -- the record's variables ----------------------------------------------------------------
 
     def _fields(self, loaded: Converged, unloaded: Converged) -> dict[str, Any]:
-        layout, parts = self.layout, range(len(self.system.parts))
+        layout = self.layout
         shape = (len(layout.y), len(layout.x))
 
-        def on_map(values: Callable[[int], Array]) -> Array:
+        def on_map(values: Callable[[str], Array]) -> Array:
             out: Array | None = None
-            for part, sampler in zip(parts, self._map, strict=True):
-                here = sampler(values(part))
+            for body, sampler in self._map.items():
+                here = sampler(values(body))
                 out = here if out is None else np.where(np.isnan(out), here, out)
             assert out is not None
             return out.reshape(*out.shape[:-1], *shape)
 
-        residual = on_map(lambda part: self.stress(part, unloaded))
-        below = self.system.part(layout.profile_body)
+        residual = on_map(lambda body: self.stress(body, unloaded))
+        below = layout.profile_body
         lines = (len(layout.station), len(layout.depth))
         profile = self._lines(self.stress(below, unloaded)).reshape(4, *lines)
         contact = [self._contact(c) for c in (loaded, unloaded)]
@@ -148,8 +147,8 @@ class Harvest:
         return {
             "residual_stress": (("component", "y", "x"), to_tensor(residual)),
             "residual_mises": (("y", "x"), von_mises(residual)),
-            "plastic_strain": (("y", "x"), on_map(lambda part: self.plastic(part, unloaded))),
-            "mises_loaded": (("y", "x"), von_mises(on_map(lambda p: self.stress(p, loaded)))),
+            "plastic_strain": (("y", "x"), on_map(lambda body: self.plastic(body, unloaded))),
+            "mises_loaded": (("y", "x"), von_mises(on_map(lambda body: self.stress(body, loaded)))),
             "residual_profile": (
                 ("station", "component", "depth"),
                 to_tensor(profile).swapaxes(0, 1),
@@ -181,11 +180,12 @@ class Harvest:
         return along(pressure), along(shear), along(gap)
 
     def _scalars(self, loaded: Converged, unloaded: Converged) -> dict[str, float]:
-        strains = [response.state.accumulated for response in unloaded.responses]
-        most = int(np.argmax([s.max() for s in strains]))
-        part = self.system.parts[most]
-        where = part.points.reshape(2, -1)[1, strains[most].argmax()]
-        residual = [self.stress(p, unloaded)[:3] for p in range(len(self.system.parts))]
+        names = [body.name for body in self.system.model.bodies]
+        strains = {n: self.system.response(n, unloaded).state.accumulated for n in names}
+        most = max(names, key=lambda name: strains[name].max())
+        points = self.system.full(most).points.reshape(2, -1)
+        where = points[1, strains[most].argmax()]
+        residual = [self.stress(name, unloaded)[:3] for name in names]
         pressure, _ = contact_pressure(self.system, loaded.state, 0)
         chain = self.system.interfaces[0].slave_surface
         closed = loaded.state.contacts[0].normal > 0

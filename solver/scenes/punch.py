@@ -117,8 +117,9 @@ def layout(parameters: PunchParameters) -> Layout:
                                        np.geomspace(5e-4, 1.0, 67)]))  # fmt: skip
     outside = np.geomspace(5e-4, 0.98, 40)
     return Layout(
-        x=np.linspace(0.0, 1.75 * a, 141),
-        y=np.linspace(-1.5 * a, height, 201),
+        # centres of cells, so that no row or column lies on a boundary of the bodies
+        x=a * (np.arange(140) + 0.5) / 80,
+        y=a * (np.arange(-120, round(80 * height / a)) + 0.5) / 80,
         depth=np.concatenate([[0.0], a * np.geomspace(1e-3, 1.9, 80)]),
         station=a * np.array([0.0, 0.5, 0.9, 0.972, 0.995, 1.0]),
         s=a * np.concatenate([1.0 - inside[::-1], [1.0], 1.0 + outside]),
@@ -139,20 +140,19 @@ def _extra(harvest: Harvest, branch: Branch) -> dict[str, float]:
         sigma = harvest.on_surface(body, unloaded)[0]
         at = int(np.argmin(np.abs(s - a * (1 - distance))))
         out[f"residual_x_{body}"] = float(sigma[at])
-    for body, name in (("punch", "punch"), ("half_plane", "half_plane")):
-        response = unloaded.responses[system.part(body)]
-        out[f"max_plastic_strain_{name}"] = float(response.state.accumulated.max())
+    for body in ("punch", "half_plane"):
+        strain = system.response(body, unloaded).state.accumulated
+        out[f"max_plastic_strain_{body}"] = float(strain.max())
     # the free side of the punch carries no sigma_x: what remains is error
-    punch = system.part("punch")
-    nodes = system.parts[punch].boundary_nodes("right")
-    side = harvest.stress(punch, unloaded)[0, nodes]
-    yield_stress = system.parts[system.part("half_plane")].body.material.yield_stress
-    out["audit_free_surface"] = float(np.abs(side).max() / yield_stress)
-    depth = float(-system.parts[system.part("half_plane")].X[1].min())
+    nodes = system.full("punch").boundary_nodes("right")
+    side = harvest.stress("punch", unloaded)[0, nodes]
+    below = system.full("half_plane")
+    out["audit_free_surface"] = float(np.abs(side).max() / below.body.material.yield_stress)
+    depth = float(-below.X[1].min())
     line = np.concatenate([[0.0], np.geomspace(1e-5 * a, depth * (1 - 1e-9), 4000)])
     cut = np.stack([np.full_like(line, 0.5 * a), -line])
-    stress = unloaded.responses[system.part("half_plane")].stress
-    out["audit_self_equilibrium"] = abs(cut_force(system, system.part("half_plane"), stress, cut))
+    stress = system.response("half_plane", unloaded).stress
+    out["audit_self_equilibrium"] = abs(cut_force(system, "half_plane", stress, cut))
     return out
 
 
