@@ -41,7 +41,7 @@ def free_port() -> int:
         return port
 
 
-def wait_until(condition: Callable[[], Any], seconds: float = 30.0) -> Any:
+def wait_until(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
     """Return the first true answer of ``condition``."""
     deadline = time.monotonic() + seconds
     while not (answer := condition()):
@@ -122,7 +122,7 @@ class Server:
         content: dict[str, Any] = answer.json()
         return content
 
-    def finished(self, study_id: str, seconds: float = 60.0) -> dict[str, Any]:
+    def finished(self, study_id: str, seconds: float = 90.0) -> dict[str, Any]:
         """Wait for the end of a study, and return where it stands."""
 
         def ended() -> dict[str, Any] | None:
