@@ -22,8 +22,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from solver.contact.lemke import lemke
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -207,6 +205,9 @@ def _given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray
     solution where one exists. Rigid motions are eliminated by a principal pivot on as many
     closed points as there are motions.
     """
+    # compiled, and rarely needed: only who comes here pays for importing the compiler
+    from solver.contact.lemke import lemke
+
     n, k = problem.n, len(problem.balance)
     # scaled so that forces and gaps are of order one
     force, length = _scales(problem)

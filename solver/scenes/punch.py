@@ -112,14 +112,14 @@ def model(parameters: PunchParameters) -> Model:
 def layout(parameters: PunchParameters) -> Layout:
     """Return where the punch is looked at: a function of its dimensions, not of its mesh."""
     a = parameters.half_width
-    height = min(1.0, parameters.punch_height) * a
+    height = min(0.6, parameters.punch_height) * a
     inside = np.unique(np.concatenate([[0.005, 0.01, 0.028, 0.05, 0.1],
                                        np.geomspace(5e-4, 1.0, 67)]))  # fmt: skip
     outside = np.geomspace(5e-4, 0.98, 40)
     return Layout(
         # centres of cells, so that no row or column lies on a boundary of the bodies
-        x=a * (np.arange(140) + 0.5) / 80,
-        y=a * (np.arange(-120, round(80 * height / a)) + 0.5) / 80,
+        x=a * (np.arange(160) + 0.5) / 100,
+        y=a * (np.arange(-100, round(100 * height / a)) + 0.5) / 100,
         depth=np.concatenate([[0.0], a * np.geomspace(1e-3, 1.9, 80)]),
         station=a * np.array([0.0, 0.5, 0.9, 0.972, 0.995, 1.0]),
         s=a * np.concatenate([1.0 - inside[::-1], [1.0], 1.0 + outside]),
