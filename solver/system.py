@@ -7,11 +7,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import null_space
 
 from solver import surface
 from solver.contact.complementarity import OPEN, STICK
 from solver.contact.geometry import Pairing, pair
 from solver.discretisation import Discretisation
+from solver.errors import ModelError
 from solver.substructure import Substructure
 
 if TYPE_CHECKING:
@@ -138,6 +140,31 @@ class System:
         self.interfaces = tuple(
             _interface(contact, self.parts, names, surfaces) for contact in model.contacts
         )
+
+        self._check_held()
+
+    def _check_held(self) -> None:
+        """Raise `ModelError` when a body has a rigid motion that nothing resists."""
+        sizes = [part.rigid.shape[1] for part in self.parts]
+        ends = np.cumsum(sizes)
+        rows = []
+        for interface in self.interfaces:
+            pairing = interface.pairing(tuple(np.zeros(part.n) for part in self.parts))
+            for kind in (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]:
+                A = np.zeros((len(pairing.area), ends[-1]))
+                for (number, chain), block in zip(interface.sides, kind, strict=True):
+                    columns = slice(ends[number] - sizes[number], ends[number])
+                    A[:, columns] += block @ self.parts[number].rigid[chain.dofs]
+                rows.append(A)
+        A = np.vstack([np.zeros((0, ends[-1])), *rows])
+        loose = null_space(A, rcond=1e-9) if len(A) else np.eye(ends[-1])
+        for part, size, end in zip(self.parts, sizes, ends, strict=True):
+            if size and np.abs(loose[end - size : end]).max(initial=0.0) > 1e-6:
+                raise ModelError(
+                    "supports",
+                    dict(part.body.supports),
+                    f"body {part.body.name!r} can move freely: support it, or hold it by contact",
+                )
 
     @property
     def n_unknowns(self) -> int:

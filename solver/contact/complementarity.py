@@ -176,7 +176,9 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     """
     n, mu = problem.n, problem.friction
     force, _ = _scales(problem)
-    bound = np.zeros(n)
+    held = np.linalg.matrix_rank(problem.A[:n]) == len(problem.balance)
+    # motions that friction alone can hold need some of it from the start
+    bound = np.zeros(n) if held else mu * force / n
     for _ in range(_MAX_PASSES):
         F = _given_bound(problem, bound)
         if F is None:
@@ -203,7 +205,7 @@ def _given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray
     z = (N, tau, back), w = (gap, fore, sigma) with tau = T + bound, sigma = bound - T and
     slip = fore - back: the matrix is positive semidefinite, so the method ends with a
     solution where one exists. Rigid motions are eliminated by a principal pivot on as many
-    closed points as there are motions.
+    contact forces as there are motions.
     """
     # compiled, and rarely needed: only who comes here pays for importing the compiler
     from solver.contact.lemke import lemke
@@ -227,7 +229,7 @@ def _given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray
         A = np.zeros((n + 2 * m, k))
         A[: n + m] = problem.A[rows] / shape
         balance = problem.balance / (force * shape) - A[n : n + m].T @ limit
-        held = linalg.qr(A[:n].T, mode="r", pivoting=True)[1][:k]
+        held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
         eliminated = _eliminate(M, r, A, A.T, balance, held)
         if eliminated is None:
             return None
