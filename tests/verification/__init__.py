@@ -1,0 +1,1 @@
+"""Closed forms, rates of convergence, and the physics of the named scenes."""

@@ -1,0 +1,208 @@
+"""Exact solutions that the solver is measured against (N, mm, MPa)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi, sin, sqrt
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+Array = NDArray[np.float64]
+
+
+def plane_strain_modulus(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Return E / (1 - nu^2)."""
+    return youngs_modulus / (1 - poisson_ratio**2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HertzLine:
+    """A parabolic cylinder on a half-plane, frictionless.
+
+    ``force`` per unit thickness [N/mm], relative ``radius`` [mm], ``modulus`` E* with
+    1/E* the sum of (1 - nu^2)/E of both bodies. K.L. Johnson, Contact Mechanics (1985), 4.43-45.
+    """
+
+    force: float
+    radius: float
+    modulus: float
+
+    @property
+    def half_width(self) -> float:
+        """a [mm]."""
+        return sqrt(4 * self.force * self.radius / (pi * self.modulus))
+
+    @property
+    def peak_pressure(self) -> float:
+        """p0 [MPa]."""
+        return 2 * self.force / (pi * self.half_width)
+
+    def pressure(self, x: Array) -> Array:
+        """Return the contact pressure at ``x`` from the centre."""
+        return self.peak_pressure * np.sqrt(np.maximum(0.0, 1 - (x / self.half_width) ** 2))
+
+
+def flat_punch_pressure(x: Array, half_width: float) -> Array:
+    """Return pressure / mean pressure under a rigid frictionless flat punch (Johnson, 2.64)."""
+    return 2 / (pi * np.sqrt(1 - (x / half_width) ** 2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThickSphere:
+    """A thick-walled elastic, perfectly plastic sphere under internal pressure.
+
+    Exact at any Poisson ratio. R. Hill, The Mathematical Theory of Plasticity (1950), V.2.
+    ``front`` is the radius to which the wall yields.
+    """
+
+    inner: float
+    outer: float
+    yield_stress: float
+    front: float
+
+    @property
+    def pressure(self) -> float:
+        """Internal pressure that brings the plastic front to where it is [MPa]."""
+        return -float(self.loaded(np.array(self.inner))[0])
+
+    @property
+    def reverse_yield_pressure(self) -> float:
+        """Pressure above which releasing it yields the bore again [MPa]."""
+        return 4 / 3 * self.yield_stress * (1 - (self.inner / self.outer) ** 3)
+
+    def elastic(self, r: Array, pressure: float) -> tuple[Array, Array]:
+        """Return radial and hoop stress of the elastic sphere."""
+        share = pressure / ((self.outer / self.inner) ** 3 - 1)
+        ratio = (self.outer / r) ** 3
+        return share * (1 - ratio), share * (1 + ratio / 2)
+
+    def loaded(self, r: Array) -> tuple[Array, Array]:
+        """Return radial and hoop stress under pressure."""
+        Y, b, c = self.yield_stress, self.outer, self.front
+        plastic = -2 * Y * (np.log(c / r) + (1 - (c / b) ** 3) / 3)
+        outside = 2 / 3 * Y * (c / b) ** 3
+        radial = np.where(r < c, plastic, outside * (1 - (b / r) ** 3))
+        return radial, np.where(r < c, plastic + Y, outside * (1 + (b / r) ** 3 / 2))
+
+    def residual(self, r: Array) -> tuple[Array, Array]:
+        """Return radial and hoop stress after release, which is elastic."""
+        elastic = self.elastic(r, self.pressure)
+        radial, hoop = (a - b for a, b in zip(self.loaded(r), elastic, strict=True))
+        return radial, hoop
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThickCylinder:
+    """A thick-walled perfectly plastic cylinder in plane strain, incompressible, von Mises.
+
+    R. Hill, The Mathematical Theory of Plasticity (1950), V.3; exact for Poisson ratio 1/2 only.
+    """
+
+    inner: float
+    outer: float
+    yield_stress: float
+    front: float
+
+    @property
+    def pressure(self) -> float:
+        """Internal pressure that brings the plastic front to where it is [MPa]."""
+        return -float(self.loaded(np.array(self.inner))[0])
+
+    def elastic(self, r: Array, pressure: float) -> tuple[Array, Array]:
+        """Return radial and hoop stress of the elastic cylinder (Lamé)."""
+        share = pressure / ((self.outer / self.inner) ** 2 - 1)
+        ratio = (self.outer / r) ** 2
+        return share * (1 - ratio), share * (1 + ratio)
+
+    def loaded(self, r: Array) -> tuple[Array, Array]:
+        """Return radial and hoop stress under pressure."""
+        k, b, c = self.yield_stress / sqrt(3), self.outer, self.front
+        plastic = -k * (2 * np.log(c / r) + 1 - (c / b) ** 2)
+        outside = k * (c / b) ** 2
+        radial = np.where(r < c, plastic, outside * (1 - (b / r) ** 2))
+        return radial, np.where(r < c, plastic + 2 * k, outside * (1 + (b / r) ** 2))
+
+    def residual(self, r: Array) -> tuple[Array, Array]:
+        """Return radial and hoop stress after release, which is elastic."""
+        elastic = self.elastic(r, self.pressure)
+        radial, hoop = (a - b for a, b in zip(self.loaded(r), elastic, strict=True))
+        return radial, hoop
+
+
+def prandtl_pressure(yield_stress: float) -> float:
+    """Return the limit pressure of a strip on a half-plane, (2 + pi) k for von Mises."""
+    return (2 + pi) * yield_stress / sqrt(3)
+
+
+def dundurs_lee_power() -> float:
+    """Return s of stress ~ r^(s-1) at the edge of a square punch, equal materials, no friction.
+
+    J. Dundurs, M.S. Lee, J. Elasticity 2 (1972) 109-112.
+    """
+    return float(
+        brentq(
+            lambda s: cos(pi * s) * (sin(s * pi / 2) ** 2 - s**2) + sin(pi * s) ** 2 / 2, 0.55, 0.95
+        )
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Wedge:
+    """Williams' stress function ``r^(s+1) F(angle)`` of a wedge, four coefficients.
+
+    Rows of coefficients give the angular parts of the stresses and of 2 G u.
+    """
+
+    s: float
+    kappa: float
+
+    @classmethod
+    def plane_strain(cls, s: float, poisson_ratio: float) -> Self:
+        """Return the wedge in plane strain."""
+        return cls(s, 3 - 4 * poisson_ratio)
+
+    def rows(self, angle: float) -> tuple[Array, Array, Array]:
+        """Return rows of hoop stress, shear stress and hoop displacement at ``angle``."""
+        s = self.s
+        p, m = (s + 1) * angle, (s - 1) * angle
+        F = np.array([cos(p), sin(p), cos(m), sin(m)])
+        dF = np.array([-(s + 1) * sin(p), (s + 1) * cos(p), -(s - 1) * sin(m), (s - 1) * cos(m)])
+        hoop = s * (s + 1) * F
+        shear = -s * dF
+        biharmonic = np.array([0.0, 0.0, sin(m), -cos(m)])  # conjugate of the harmonic part
+        displacement = -dF - (self.kappa + 1) * biharmonic
+        return hoop, shear, displacement
+
+
+def corner_power(friction: float, poisson_ratio: float = 0.3) -> float:
+    """Return s of stress ~ r^(s-1) at the edge of a square punch that slides outwards.
+
+    Equal materials, plane strain, slip of the punch away from its centre everywhere. M.
+    Comninou, J. Appl. Math. Phys. (ZAMP) 27 (1976) 493-499; here the zero of the determinant of
+    Williams' eigenproblem. The edge is the origin, the contact along angle pi, the half-plane
+    below (angle -pi..0, its free surface at 0) and the punch above the contact (pi/2..pi, its
+    free side at pi/2).
+    """
+
+    def determinant(s: float) -> float:
+        wedge = _Wedge.plane_strain(s, poisson_ratio)
+        A = np.zeros((8, 8))
+        for row, angle, half in ((0, 0.0, slice(0, 4)), (2, pi / 2, slice(4, 8))):
+            A[row, half], A[row + 1, half], _ = wedge.rows(angle)
+        below, above = wedge.rows(-pi), wedge.rows(pi)
+        for row in range(3):
+            A[4 + row, :4], A[4 + row, 4:] = below[row], -above[row]
+        # at the face sigma_rt = sigma_xy, which draws the half-plane along with the punch, to +x:
+        # sigma_xy = friction * pressure = -friction * sigma_tt
+        A[7, :4] = below[1] + friction * below[0]
+        return float(np.linalg.det(A))
+
+    return float(brentq(determinant, 0.52, 0.95))
+
+
+def log_slope(x: Array, y: Array) -> float:
+    """Return the least-squares slope of log y over log x."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
