@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _BLENDS = (0.0, 0.02, 0.1, 0.3, 1.0)
+_PATIENCE = 15
+"""Iterations without a smaller residual before an increment is given up."""
+_DIVERGED = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +94,15 @@ class Increment:
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
         step: _Step | None = None
+        best, since_best = np.inf, 0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
             scale, error, violation = self._errors(residuals, candidates)
-            if not (np.isfinite(error) and np.isfinite(violation)):
+            since_best = 0 if error < best else since_best + 1
+            best = min(best, error)
+            hopeless = since_best > _PATIENCE or error > _DIVERGED * best
+            if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
             if balanced and candidates.beyond >= 0 and (iteration or not self.load):

@@ -105,6 +105,15 @@ class _Point:
     tally: Tally
 
 
+class _Stopped(Exception):
+    """A path has ended: why, and its last point."""
+
+    def __init__(self, error: NotConverged, point: _Point) -> None:
+        super().__init__(str(error))
+        self.error = error
+        self.point = point
+
+
 class Path:
     """The loading path of one system."""
 
@@ -129,8 +138,8 @@ class Path:
                 step = round(trunk.now.state.load / self.control.load_step) + 1
                 try:
                     trunk = self._advance(trunk, step * self.control.load_step)
-                except NotConverged as failure:
-                    error = failure
+                except _Stopped as stopped:
+                    error, trunk = stopped.error, stopped.point
             if error is not None:
                 yield Branch(load=load, tally=trunk.tally, error=error)
                 continue
@@ -141,10 +150,10 @@ class Path:
         try:
             loaded = self._advance(trunk, load)
             unloaded = self._unload(loaded)
-        except NotConverged as failure:
-            tally = (loaded or trunk).tally
+        except _Stopped as stopped:
             now = loaded.now if loaded else None
-            return Branch(load=load, tally=tally, loaded=now, error=failure)
+            tally = stopped.point.tally
+            return Branch(load=load, tally=tally, loaded=now, error=stopped.error)
         return Branch(load=load, tally=unloaded.tally, loaded=loaded.now, unloaded=unloaded.now)
 
     def _start(self) -> _Point:
@@ -204,10 +213,10 @@ class Path:
                 ).solve()
             except IncrementFailed as failure:
                 tally = replace(point.tally, cuts=point.tally.cuts + 1)
-                point = replace(point, tally=tally, before=None)
+                point = replace(point, tally=self._timed(tally), before=None)
                 step = (load - state.load) / 2
                 if abs(step) < least * (1 - _ROUNDING):
-                    raise _ended(failure, state.load, load) from failure
+                    raise _Stopped(_ended(failure, state.load, load), point) from failure
                 continue
             point = _Point(converged, state, self._timed(point.tally.plus(converged)))
             self._report(load, f"load {load:.4g}: {converged.iterations} iterations")
