@@ -1,0 +1,167 @@
+"""The frictional contact problem on a dense compliance, against its own conditions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.contact.complementarity import (
+    BACKWARD,
+    FORWARD,
+    OPEN,
+    STICK,
+    ContactProblem,
+    solve_contact,
+)
+from solver.contact.lemke import lemke
+
+
+def half_plane_compliance(n, coupling, seed):
+    """A compliance like that of n neighbouring points: logarithmic, normal and slip coupled."""
+    rng = np.random.default_rng(seed)
+    x = np.sort(rng.uniform(0.0, 1.0, n)) + 0.02 * np.arange(n)
+    distance = np.abs(x[:, None] - x[None, :])
+    flexible = np.log(4.0 / (distance + 0.05))
+    sign = coupling * np.sign(x[:, None] - x[None, :])
+    return x, np.block([[flexible, sign], [-sign.T * -1, flexible]])
+
+
+def instance(seed, friction, *, rigid=0, frictional=True, n=12, coupling=0.3):
+    rng = np.random.default_rng(seed)
+    x, W = half_plane_compliance(n, coupling, seed)
+    W = 0.5 * (W + W.T) + 1e-3 * np.eye(2 * n)
+    gap = rng.uniform(-1.0, 1.0, n) if not rigid else rng.uniform(0.0, 1.0, n)
+    m = 2 * n if frictional else n
+    offset = np.concatenate([gap, 0.5 * rng.standard_normal(n)])[:m]
+    A = np.zeros((2 * n, 2))
+    A[:n, 0] = 1.0  # approach
+    A[:n, 1] = x - x.mean()  # tilt
+    balance = np.array([-2.0 * n / 12, 0.02 * rng.standard_normal()])
+    return ContactProblem(
+        W=W[:m, :m],
+        offset=offset,
+        friction=np.full(n, friction),
+        A=A[:m, :rigid],
+        balance=balance[:rigid],
+    )
+
+
+def natural_residual(problem, solution):
+    """Largest violation of the contact conditions and of the balance, relative."""
+    n, F = problem.n, solution.forces
+    motion = problem.offset + problem.W @ F + problem.A @ solution.rigid
+    stiffness = 1 / np.diag(problem.W)
+    N = F[:n]
+    worst = [np.abs(N - np.maximum(0.0, N - stiffness[:n] * motion[:n])).max()]
+    if problem.frictional:
+        bound = problem.friction * np.maximum(N, 0.0)
+        wanted = np.clip(F[n:] - stiffness[n:] * motion[n:], -bound, bound)
+        worst.append(np.abs(F[n:] - wanted).max())
+    worst.append(np.abs(problem.balance + problem.A.T @ F).max(initial=0.0))
+    return max(worst) / max(np.abs(F).max(), 1e-30)
+
+
+@pytest.mark.parametrize("rigid", [0, 1, 2])
+def test_frictionless_solutions_satisfy_the_contact_conditions(rigid):
+    closed = 0
+    for seed in range(60):
+        problem = instance(seed, 0.0, rigid=rigid, frictional=False)
+        solution = solve_contact(problem, np.full(problem.n, OPEN))
+        assert solution is not None
+        if solution.forces.any():
+            closed += 1
+            assert natural_residual(problem, solution) < 1e-8
+    assert closed > 50
+
+
+@pytest.mark.parametrize("rigid", [0, 1, 2])
+@pytest.mark.parametrize("friction", [0.1, 0.4, 0.8])
+def test_frictional_solutions_satisfy_coulombs_law(friction, rigid):
+    seen = set()
+    for seed in range(60):
+        problem = instance(seed, friction, rigid=rigid)
+        solution = solve_contact(problem, np.full(problem.n, OPEN))
+        assert solution is not None
+        assert natural_residual(problem, solution) < 1e-8
+        seen |= set(solution.status.tolist())
+    assert seen == {OPEN, STICK, FORWARD, BACKWARD}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_the_answer_does_not_depend_on_where_the_active_sets_start(friction):
+    """Unique for weak coupling; the fallback, where a start needs it, gives the same forces."""
+    pivoted = 0
+    for seed in range(40):
+        problem = instance(seed, friction, coupling=0.1)
+        rng = np.random.default_rng(seed + 1000)
+        answers = []
+        for _ in range(8):
+            solution = solve_contact(problem, rng.integers(0, 4 if friction else 2, problem.n))
+            assert solution is not None
+            pivoted += solution.pivoted
+            answers.append(solution.forces)
+        scale = np.abs(answers[0]).max()
+        assert max(np.abs(a - answers[0]).max() for a in answers) < 1e-8 * scale
+    print("pivoted", pivoted)
+
+
+def test_the_fallback_satisfies_the_conditions_where_active_sets_cycle():
+    pivoted = 0
+    for seed in range(300):
+        problem = instance(seed, 0.6, coupling=0.6)
+        solution = solve_contact(problem, np.full(problem.n, STICK))
+        if solution is not None and solution.pivoted:
+            pivoted += 1
+            assert natural_residual(problem, solution) < 1e-8
+    print("pivoted", pivoted)
+    assert pivoted >= 3
+
+
+def test_a_load_that_pulls_a_floating_body_off_has_no_solution():
+    problem = instance(0, 0.0, rigid=1, frictional=False)
+    pulled = ContactProblem(
+        W=problem.W, offset=problem.offset, friction=problem.friction, A=problem.A, balance=-problem.balance
+    )
+    assert solve_contact(pulled, np.full(problem.n, STICK)) is None
+
+
+def test_no_contact_points_balance_no_load_only():
+    def empty(k):
+        return ContactProblem(
+            W=np.zeros((0, 0)),
+            offset=np.zeros(0),
+            friction=np.zeros(0),
+            A=np.zeros((0, k)),
+            balance=np.zeros(k),
+        )
+
+    nothing = np.zeros(0, dtype=int)
+    solution = solve_contact(empty(0), nothing)
+    assert solution is not None
+    assert solution.forces.size == 0
+    assert solve_contact(empty(1), nothing) is None
+
+
+def test_the_data_given_are_not_changed():
+    problem = instance(3, 0.4, rigid=2)
+    start = np.full(problem.n, OPEN)
+    before = [a.copy() for a in (problem.W, problem.offset, problem.A, problem.balance, start)]
+    assert solve_contact(problem, start) is not None
+    after = (problem.W, problem.offset, problem.A, problem.balance, start)
+    assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+
+
+def test_lemke_solves_random_positive_definite_problems():
+    rng = np.random.default_rng(5)
+    for n in (1, 5, 30):
+        X = rng.standard_normal((n, n))
+        M, r = X @ X.T + 0.1 * np.eye(n), rng.standard_normal(n)
+        z, solved = lemke(M, r, 100 * n)
+        assert solved
+        w = M @ z + r
+        assert np.abs(np.minimum(w, z)).max() < 1e-9
+
+
+def test_lemke_says_so_where_there_is_no_solution():
+    z, solved = lemke(np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 1.0]), 100)
+    assert not solved
