@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, sparse
-from skfem import CellBasis, FacetBasis
+from skfem import CellBasis
 
 from solver import kinematics
 from solver.constitutive import PlasticState, Response, elastic_stiffness, respond
 from solver.elements import element_type
 from solver.operators import Operators
+from solver.surface import pressure_forces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,36 +63,21 @@ class Discretisation:
         values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
-        self.weights = self.basis.dx * self._measure(self.points)
+        self.weights = self.basis.dx * self.measure(self.points)
         self.B = kinematics.strain_operator(values, gradients, self.points[0], body.state)
         if kind.mean_dilatation and body.state != "plane_stress":
             self.B = kinematics.mean_dilatation(self.B, self.weights)
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
-        self.load = self._pressure_forces()
+        self.load = np.zeros(self.n)
+        for boundary, pressure in body.pressure.items():
+            self.load += pressure_forces(self, boundary, pressure)
         self._hold()
 
-    def _measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
+    def measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
         """Return the depth a plane point stands for [mm]: thickness or 2 pi r."""
         if self.body.state == "axisymmetric":
             return np.asarray(2 * np.pi * x[0])
         return self.body.thickness
-
-    def _pressure_forces(self) -> NDArray[np.float64]:
-        load = np.zeros(self.n)
-        for boundary, pressure in self.body.pressure.items():
-            basis = FacetBasis(
-                self.body.mesh,
-                self.basis.elem,
-                facets=self.body.facets(boundary),
-                intorder=5,
-            )
-            weight = basis.dx * self._measure(np.asarray(basis.global_coordinates()))
-            normal = np.asarray(basis.normals)
-            for shape, nodes in zip(basis.basis, basis.element_dofs, strict=True):
-                force = -pressure * (normal * np.asarray(shape[0]) * weight).sum(axis=-1)
-                np.add.at(load, 2 * nodes, force[0])
-                np.add.at(load, 2 * nodes + 1, force[1])
-        return load
 
     def boundary_nodes(self, boundary: str) -> NDArray[np.int64]:
         """Return the nodes on a named boundary."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from skfem import FacetBasis
 
 from solver.errors import ModelError
 
@@ -59,32 +58,53 @@ class Surface:
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()
 
 
+def edges_of(part: Discretisation, boundary: str) -> NDArray[np.int64]:
+    """Return the edges (n_edges, 2 or 3) of a boundary: start, end (, middle) node.
+
+    Each has the body on its left. Facet bases are not used for it: they invert the element
+    mapping to a tolerance that elements 1e-5 of the body's size cannot meet.
+    """
+    mesh, basis = part.body.mesh, part.basis
+    facets = part.body.facets(boundary)
+    ends = basis.nodal_dofs[0][mesh.facets[:, facets]].T
+    start, end = part.X[:, ends[:, 0]], part.X[:, ends[:, 1]]
+    inside = part.X[:, basis.element_dofs[:, mesh.f2t[0, facets]]].mean(axis=1)
+    along, inward = end - start, inside - start
+    reverse = along[0] * inward[1] - along[1] * inward[0] < 0
+    ends[reverse] = ends[reverse, ::-1]
+    if not basis.facet_dofs.size:
+        return np.asarray(ends)
+    return np.hstack([ends, basis.facet_dofs[0][facets][:, None]])
+
+
 def extract(part: Discretisation, boundary: str) -> Surface:
     """Return the surface of a named boundary, which must be one open chain."""
-    body = part.body
-    facets = body.facets(boundary)
-    basis = FacetBasis(body.mesh, part.basis.elem, facets=facets, intorder=1)
-    ends = part.basis.nodal_dofs[0][body.mesh.facets[:, facets]].T
-    tangent = np.stack([-basis.normals[1, :, 0], basis.normals[0, :, 0]])
-    reverse = ((part.X[:, ends[:, 1]] - part.X[:, ends[:, 0]]) * tangent).sum(axis=0) < 0
-    ends[reverse] = ends[reverse, ::-1]
-
-    following = {int(start): i for i, start in enumerate(ends[:, 0])}
-    heads = set(ends[:, 0].tolist()) - set(ends[:, 1].tolist())
+    edges = edges_of(part, boundary)
+    following = {int(start): i for i, start in enumerate(edges[:, 0])}
+    heads = set(edges[:, 0].tolist()) - set(edges[:, 1].tolist())
     order = []
     at = heads.pop() if len(heads) == 1 else -1
     while at in following:
         order.append(following.pop(at))
-        at = int(ends[order[-1], 1])
-    if len(order) != len(facets):
+        at = int(edges[order[-1], 1])
+    if len(order) != len(edges):
         raise ModelError("boundary", boundary, "a contact surface must be one open chain of edges")
-    columns = [ends[order]]
-    if part.basis.facet_dofs.size:
-        columns.append(part.basis.facet_dofs[0][facets[order]][:, None])
-    edges = np.hstack(columns)
-    nodes, local = np.unique(edges, return_inverse=True)
+    nodes, local = np.unique(edges[order], return_inverse=True)
     X = part.X[:, nodes]
-    measure = (
-        2 * np.pi * X[0] if body.state == "axisymmetric" else np.full(len(nodes), body.thickness)
-    )
+    measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
     return Surface(nodes, local.reshape(edges.shape), X, measure)
+
+
+def pressure_forces(part: Discretisation, boundary: str, pressure: float) -> NDArray[np.float64]:
+    """Return the nodal forces (n,) of a pressure on a boundary, positive when pushing [N]."""
+    edges = edges_of(part, boundary)
+    X = part.X[:, edges]
+    force = np.zeros((2, part.X.shape[1]))
+    for xi, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True):
+        N = shape_functions(np.array(xi), edges.shape[1])
+        t = X @ shape_derivatives(np.array(xi), edges.shape[1])
+        push = -pressure * weight * np.stack([t[1], -t[0]]) * part.measure(X @ N)
+        for k, value in enumerate(N):
+            for component in (0, 1):
+                np.add.at(force[component], edges[:, k], push[component] * value)
+    return np.asarray(force.T.ravel())
