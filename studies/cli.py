@@ -62,12 +62,13 @@ def run(options: argparse.Namespace) -> int:
     with open_study(outcome.dataset) as dataset:
         if study.size <= SHOWN:
             print(runs_table(dataset))
+        warned = _warned(dataset)
         picture = _picture(dataset, outcome.dataset.with_name("residual_stress_xx.png"))
     for run_id, status, message in outcome.failed:
         print(f"{status}  runs/{run_id}.nc  {message}", file=sys.stderr)
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
-    print(f"\n{study.name}: {study.size} runs ({counts}), {computed}")
+    print(f"\n{study.name}: {study.size} runs ({counts}{warned}), {computed}")
     for written in (outcome.dataset, *picture):
         print(f"wrote {written}")
     if outcome.stopped:
@@ -172,6 +173,14 @@ def _interruption() -> Iterator[list[int]]:
         yield received
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _warned(dataset: Any) -> str:
+    """Return how many runs succeeded with a warning, which their details show."""
+    from studies.dataset import STATUSES
+
+    warned = (dataset["status"] == STATUSES.index("ok")) & (dataset["message"] != "")
+    return f"; {int(warned.sum())} with a warning" if warned.any() else ""
 
 
 def _picture(dataset: Any, path: Path) -> list[Path]:

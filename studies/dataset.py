@@ -7,7 +7,6 @@ import importlib.metadata
 import json
 import subprocess
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from solver.scenes import Scene
 from studies.design import USUAL_AXES, Case
 from studies.identity import solver_hash
 from studies.parameters import parameters_of
+from studies.quantities import QUANTITIES
 
 STATUSES = (*(status.name.lower() for status in Status), "error", "missing")
 """Outcomes by flag value: the solver's, then a run that broke, then one not computed."""
@@ -31,55 +31,6 @@ MISSING = "missing"
 
 INTEGER_FILL = -1
 
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """What a variable means; `count` marks whole numbers."""
-
-    long_name: str
-    units: str = "1"
-    standard_name: str = ""
-    count: bool = False
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """CF attributes."""
-        given = {
-            "long_name": self.long_name,
-            "units": self.units,
-            "standard_name": self.standard_name,
-        }
-        return {key: value for key, value in given.items() if value}
-
-
-QUANTITIES: Mapping[str, Quantity] = {
-    "x": Quantity("distance along the surface from the centre of the contact", "mm"),
-    "y": Quantity("height above the surface", "mm"),
-    "depth": Quantity("depth below the surface", "mm", "depth"),
-    "station": Quantity("position of a depth profile along the surface", "mm"),
-    "s": Quantity("distance along the contact surface from its centre", "mm"),
-    "residual_stress": Quantity("residual stress", "MPa"),
-    "residual_mises": Quantity("von Mises stress of the residual stress", "MPa"),
-    "plastic_strain": Quantity("equivalent plastic strain"),
-    "mises_loaded": Quantity("von Mises stress under load", "MPa"),
-    "residual_profile": Quantity("residual stress along depth", "MPa"),
-    "plastic_strain_profile": Quantity("equivalent plastic strain along depth"),
-    "surface_residual": Quantity("residual stress at the contact surface", "MPa"),
-    "contact_pressure": Quantity("contact pressure", "MPa"),
-    "contact_shear": Quantity("contact shear traction", "MPa"),
-    "contact_gap": Quantity("gap between the contact surfaces", "mm"),
-    "contact_half_width": Quantity("half-width of the contact under load", "mm"),
-    "max_plastic_strain": Quantity("largest equivalent plastic strain"),
-    "depth_of_max_plastic_strain": Quantity("depth of the largest plastic strain", "mm"),
-    "peak_residual_tension": Quantity("largest residual tension", "MPa"),
-    "peak_residual_compression": Quantity("largest residual compression", "MPa"),
-    "increments": Quantity("load increments", count=True),
-    "cut_increments": Quantity("load increments that were cut", count=True),
-    "iterations": Quantity("Newton iterations", count=True),
-    "median_iterations": Quantity("median Newton iterations an increment"),
-    "cpu_seconds": Quantity("processor time", "s"),
-    "degrees_of_freedom": Quantity("degrees of freedom", count=True),
-}
 
 LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
     "status": {

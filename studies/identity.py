@@ -39,11 +39,11 @@ def is_id(text: str) -> bool:
 def solver_hash() -> str:
     """Return the digest of all that decides what a run's file holds.
 
-    These are the sources of the solver and the module that lays its records out as data sets.
+    These are the sources of the solver and the modules that lay its records out as data sets.
     """
-    root = Path(solver.__file__).parent
+    root, here = Path(solver.__file__).parent, Path(__file__).parent
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
-    files["studies/dataset.py"] = Path(__file__).with_name("dataset.py")
+    files |= {f"studies/{name}": here / name for name in ("dataset.py", "quantities.py")}
     digests = {name: _digest(path.read_bytes()) for name, path in files.items()}
     return _digest(json.dumps(digests, sort_keys=True).encode())
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,17 @@ from studies.reading import one_run
 
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
-_OUTSIDE = "0.88"
-_PERCENT = 99.5
-"""Colours saturate beyond this percentile: next to a sharp corner stress grows without bound."""
+_OUTSIDE = "0.86"
+_PERCENT, _WORTHWHILE = 99.8, 1.5
+"""Next to a sharp corner stress grows without bound: colours end at this percentile of the map,
+where its largest value is that many times larger."""
+_DECAYED = 0.02
+"""Depth is shown to where nothing larger than this part of the peak is left."""
+
+_AREA, _LONGEST = 26.0, 8.0
+"""Area of a map and its longest side [in]."""
+_TEXT = 3.2
+"""Least length of the lines around a map [in]."""
 
 
 def figure(
@@ -39,7 +48,7 @@ def map_figure(
     component: str | None = None,
     zoom: float | None = None,
 ) -> Figure:
-    """Return a map of `field` over the bodies.
+    """Return a map of `field` over the bodies, whole where half of them was computed.
 
     Parameters
     ----------
@@ -55,31 +64,40 @@ def map_figure(
     """
     run = one_run(run)
     values = _component(run, _field(run, field, ("y", "x")), component).transpose("y", "x")
-    edge = float(run["s"].max()) if "s" in run else 0.0
-    if zoom is not None:
-        values = _near(values, edge, zoom)
+    edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
+    values = whole(values) if zoom is None else _near(values, edge, zoom)
     signed = "component" in values.coords
-    low, high, beyond = _limits(values.to_numpy(), signed)
-    width, height = (float(np.ptp(values[name].to_numpy())) for name in ("x", "y"))
-    sheet, axes = _sheet(run, values, width / height)
-    axes.set_facecolor(_OUTSIDE)
+    high, note = _limit(values, signed)
+    width, height = _size(values)
+    sheet = Figure(figsize=(width, height), dpi=150)
+    axes = sheet.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=_OUTSIDE)
+    _entitle(axes, run, values, max(width + 0.8, _TEXT))
     mesh = axes.pcolormesh(
         values["x"], values["y"], values, shading="nearest", rasterized=True,
-        cmap=SIGNED if signed else SEQUENTIAL, vmin=low, vmax=high,
+        cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
     )  # fmt: skip
-    frame = (*axes.get_xlim(), *axes.get_ylim())
-    axes.plot([frame[0], frame[1]], [0.0, 0.0], color="0.25", linewidth=0.8)
-    start = -edge if frame[0] < -edge else frame[0]
-    axes.plot(
-        [start, edge], [0.0, 0.0], color="k", linewidth=2.2, solid_capstyle="butt",
-        label="contact surface",
-    )  # fmt: skip
-    axes.set(xlim=frame[:2], ylim=frame[2:], aspect="equal")
-    axes.set(xlabel=_label(run["x"]), ylabel=_label(run["y"]))
-    axes.legend(loc="upper right", frameon=True, framealpha=0.9, edgecolor="none", fontsize=9)
-    bar = sheet.colorbar(mesh, ax=axes, extend=beyond, shrink=0.92, aspect=28, pad=0.02)
-    bar.set_label(_label(values))
+    left, right = axes.get_xlim()
+    axes.axhline(0.0, color="0.3", linewidth=0.6)
+    start = max(left, -edge if left < 0.0 else 0.0)
+    if edge > 0.0:
+        axes.plot(
+            [start, min(edge, right)], [0.0, 0.0], color="k", linewidth=1.4,
+            solid_capstyle="butt", label="contact under load",
+        )  # fmt: skip
+        axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
+    axes.set(xlim=(left, right), xlabel=_symbol(run["x"]), ylabel=_symbol(run["y"]))
+    axes.set_aspect("equal")
+    beside = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.16 / width, 1.0))
+    over, under = bool((values > high).any()), signed and bool((values < -high).any())
+    beyond = {(1, 1): "both", (1, 0): "max", (0, 1): "min"}.get((over, under), "neither")
+    bar = sheet.colorbar(mesh, cax=beside, extend=beyond, extendfrac=0.03)
+    bar.set_label(_wrapped(_label(values), max(height, _TEXT / 2.0), 10))
     bar.outline.set_visible(False)
+    axes.annotate(
+        _wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords="axes fraction",
+        xytext=(0.0, -40.0), textcoords="offset points", va="top", fontsize=8, color="0.3",
+    )  # fmt: skip
+    _fit(sheet, axes)
     return sheet
 
 
@@ -91,29 +109,53 @@ def line_figure(
 ) -> Figure:
     """Return `field` along the surface or along depth, a line for each stage, body or station.
 
-    `zoom` shows only that length next to the edge of the contact, or below the surface [mm].
+    `zoom` shows only that length on either side of the edge of the contact, or below the surface
+    [mm]. Without it, depth ends where the values have decayed.
     """
     run = one_run(run)
     values = _component(run, _field(run, field, ("s",), ("depth",)), component)
     along = "s" if "s" in values.dims else "depth"
-    sheet, axes = _sheet(run, values)
     others = [name for name in values.dims if name != along]
+    values = values.dropna(along, how="all")
+    if zoom is not None:
+        middle = float(run["contact_half_width"]) if along == "s" else 0.0
+        values = values.where(abs(values[along] - middle) <= zoom, drop=True)
+    elif along == "depth":
+        values = values.isel(depth=slice(_depth_shown(values, others)))
+    if values.sizes[along] < 2:
+        raise _too_close(zoom) if zoom is not None else StudyError("field", field, "has no values")
+    sheet = Figure(figsize=(8.0, 4.6), dpi=150, layout="constrained")
+    axes = sheet.add_subplot()
+    _entitle(axes, run, values, 8.0)
     for at in np.ndindex(*(values.sizes[name] for name in others)):
-        line = values.isel(dict(zip(others, at, strict=True)))
+        line = values.isel(dict(zip(others, at, strict=True))).dropna(along)
         name = ", ".join(_value(line[each]) for each in others)
-        axes.plot(line[along], line, label=name, linewidth=1.7)
+        axes.plot(line[along], line, label=name, linewidth=1.6)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.0)
-    if zoom is not None:
-        end = float(values[along].max())
-        axes.set_xlim((max(0.0, end - zoom), end) if along == "s" else (0.0, min(zoom, end)))
     axes.set(xlabel=_label(run[along]), ylabel=_label(values))
     if others:
-        axes.legend(frameon=False, title=", ".join(_words(str(name)) for name in others))
+        title = ", ".join(_words(str(name)) for name in others)
+        sheet.legend(loc="outside right upper", frameon=False, title=title)
     return sheet
+
+
+def whole(values: xr.DataArray) -> xr.DataArray:
+    """Return a map of both halves of the bodies, where one half was computed.
+
+    A grid whose first column ends at, or lies on, x = 0 is that of bodies symmetric about this
+    line, or about this axis. Shear across it changes sign on the other side.
+    """
+    x = values["x"].to_numpy()
+    if len(x) < 2 or not np.isclose(x[0], [0.0, (x[1] - x[0]) / 2], atol=1e-6 * x[-1]).any():
+        return values
+    component = str(values["component"].item()) if "component" in values.coords else ""
+    sign = -1.0 if component.count("x") == 1 else 1.0
+    other = sign * values.isel(x=slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1))
+    return xr.concat([other.assign_coords(x=-other["x"]), values], "x").assign_attrs(values.attrs)
 
 
 def _field(run: xr.Dataset, field: str, *dimensions: tuple[str, ...]) -> xr.DataArray:
@@ -143,34 +185,73 @@ def _component(run: xr.Dataset, values: xr.DataArray, component: str | None) -> 
 def _near(values: xr.DataArray, edge: float, zoom: float) -> xr.DataArray:
     near = values.where((abs(values["x"] - edge) <= zoom) & (abs(values["y"]) <= zoom), drop=True)
     if min(near.shape) < 2:
-        raise StudyError("zoom", zoom, "must be larger: it holds no points of the map")
+        raise _too_close(zoom)
     return near
 
 
-def _limits(values: np.ndarray, signed: bool) -> tuple[float, float, str]:
-    """Return the range of colours, and on which side values lie beyond it."""
-    there = values[np.isfinite(values)]
-    if not there.size or not there.any():
-        return (-1.0 if signed else 0.0), 1.0, "neither"
-    if not signed:
-        high = float(np.percentile(there[there > 0.0], _PERCENT))
-        return 0.0, high, "max" if there.max() > high else "neither"
-    high = float(np.percentile(np.abs(there), _PERCENT)) or float(np.abs(there).max())
-    over, under = there.max() > high, there.min() < -high
-    return -high, high, {(1, 1): "both", (1, 0): "max", (0, 1): "min"}.get((over, under), "neither")
+def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
+    """Return the number of points down to where nothing worth showing is left."""
+    largest = abs(values).max(others).to_numpy()
+    shown = np.flatnonzero(largest > _DECAYED * largest.max())
+    return int(shown[-1]) + 2 if shown.size else values.sizes["depth"]
 
 
-def _sheet(run: xr.Dataset, values: xr.DataArray, aspect: float = 1.35) -> tuple[Figure, Axes]:
-    """Return an empty figure with the run's title; `aspect` is width to height of its axes."""
-    width = float(np.clip(4.6 * aspect + 1.9, 5.5, 14.0))
-    sheet = Figure(figsize=(width, 5.6), dpi=150, layout="constrained")
-    axes = sheet.add_subplot()
+def _too_close(zoom: float) -> StudyError:
+    return StudyError("zoom", zoom, "must be larger: it holds fewer than two points")
+
+
+def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
+    """Return where colours end, and a note on the values beyond."""
+    there = values.to_numpy()[np.isfinite(values)]
+    size = np.abs(there) if signed else there
+    if not size.size or not size.max() > 0.0:
+        return 1.0, ""
+    high = float(np.percentile(size[size > 0.0], _PERCENT))
+    if size.max() <= _WORTHWHILE * high:
+        return float(size.max()), ""
+    unit = values.attrs.get("units", "1")
+    note = (
+        f"Colours end at {'±' if signed else ''}{high:.3g}{'' if unit == '1' else f' {unit}'}: "
+        f"{np.mean(size > high):.1%} of the map lies beyond. "
+        f"Values go from {there.min():.3g} to {there.max():.3g}."
+    )
+    return high, note.replace("-", "\N{MINUS SIGN}")
+
+
+def _size(values: xr.DataArray) -> tuple[float, float]:
+    """Return width and height of the axes of a map [in]."""
+    width, height = (float(np.ptp(values[name].to_numpy())) for name in ("x", "y"))
+    scale = min(np.sqrt(_AREA / (width * height)), _LONGEST / max(width, height))
+    return scale * width, scale * height
+
+
+def _fit(sheet: Figure, axes: Axes) -> None:
+    """Give the figure the size of all that is drawn, the axes keeping theirs."""
+    size = sheet.get_size_inches()
+    sheet.draw_without_rendering()
+    ink = sheet.get_tightbbox().padded(0.1)
+    sheet.set_size_inches(ink.width, ink.height)
+    axes.set_position(
+        (-ink.x0 / ink.width, -ink.y0 / ink.height, size[0] / ink.width, size[1] / ink.height)
+    )
+
+
+def _entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
+    """Set the title, and below it the run's place in the sweep, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
     of = f", {values['component'].item()}" if "component" in values.coords else ""
-    title = f"{quantity[:1].upper()}{quantity[1:]}{of}\n"
-    axes.set_title(title, loc="left", weight="bold", fontsize=11)
-    axes.text(0.0, 1.02, _setting(run), transform=axes.transAxes, fontsize=9, color="0.3")
-    return sheet, axes
+    setting = _wrapped(_setting(run), width, 9)
+    axes.set_title(setting, loc="left", fontsize=9, color="0.3", pad=5.0)
+    axes.annotate(
+        f"{quantity[:1].upper()}{quantity[1:]}{of}", (0.0, 1.0), xycoords="axes fraction",
+        xytext=(0.0, 10.0 + 12.0 * len(setting.splitlines())), textcoords="offset points",
+        weight="bold", fontsize=11,
+    )  # fmt: skip
+
+
+def _wrapped(text: str, width: float, points: int) -> str:
+    """Return text in lines that fit `width` inches at a font size."""
+    return textwrap.fill(text, int(width * 72.0 / (0.52 * points)), break_long_words=False)
 
 
 def _setting(run: xr.Dataset) -> str:
@@ -182,7 +263,8 @@ def _setting(run: xr.Dataset) -> str:
         for name, each in run.coords.items()
         if each.ndim == 0
     ]
-    return "  ·  ".join([run.attrs["scene"], *([_words(state)] if state else []), *words])
+    parts = [run.attrs["scene"], *([_words(state)] if state else []), *words]
+    return "  ·  ".join(part.replace(" ", "\N{NO-BREAK SPACE}") for part in parts)
 
 
 def _value(coordinate: xr.DataArray) -> str:
@@ -199,6 +281,11 @@ def _label(variable: xr.DataArray) -> str:
     unit = variable.attrs.get("units", "1")
     name = variable.attrs.get("long_name", str(variable.name))
     return name if unit == "1" else f"{name} [{unit}]"
+
+
+def _symbol(coordinate: xr.DataArray) -> str:
+    """Return the name of a map's axis, with its unit."""
+    return f"{coordinate.name} [{coordinate.attrs.get('units', '1')}]"
 
 
 def _words(identifier: str) -> str:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 from typing import TextIO
 
+from studies.dataset import OK
 from studies.run import StudyEvent
 from studies.study import Study
 
@@ -41,9 +42,9 @@ class Progress:
             self._begun = event.progress
         if event.kind == "run":
             self._seen += 1
-            self._failed += event.status != "ok"
+            self._failed += event.status != OK
             if not self._bar:
-                reason = f": {event.message}" if event.message else ""
+                reason = f": {event.message}" if event.status != OK else ""
                 line = f"{100 * event.progress:3.0f} %  {event.status}  {self._names[event.run]}"
                 print(line + reason, file=self._stream, flush=True)
         now = time.monotonic()

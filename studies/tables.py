@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,22 +15,32 @@ from studies.dataset import STATUSES
 from studies.parameters import parameters_of, scene_named
 from studies.reading import sweep_axes
 
-FIGURES = (
-    "peak_residual_tension",
-    "peak_residual_compression",
-    "max_plastic_strain",
-    "increments",
-    "median_iterations",
-    "cpu_seconds",
-)
-"""Variables a table of runs shows, where the scene gives them."""
+FIGURES: Mapping[str, str] = {
+    "residual_x_half_plane": "residual x half plane",
+    "residual_x_punch": "residual x punch",
+    "peak_contact_pressure": "contact pressure",
+    "max_plastic_strain": "plastic strain",
+    "increments": "increments",
+    "cut_increments": "cut",
+    "median_iterations": "median iterations",
+    "cpu_seconds": "cpu",
+}
+"""Variables a table of runs shows, where the scene gives them, and their headings."""
+
+_HEADING = 9
+"""Characters after which a heading goes on in the next line."""
 
 
 def runs_table(dataset: xr.Dataset) -> str:
-    """Return a line for each run: where it lies in the sweep, its status, its main figures."""
+    """Return a line for each run: where it lies in the sweep, its status, its main figures.
+
+    Residual stresses and plastic strain are what contact left; increments, those cut, and the
+    median of Newton's iterations tell how hard it was to find.
+    """
     axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     figures = [name for name in FIGURES if name in dataset]
     columns = [*axes, "status", *figures]
+    headings = [FIGURES.get(name, name.replace("_", " ")) for name in columns]
     units = [_unit(dataset[name]) for name in columns]
     values = {name: dataset[name].to_numpy() for name in ("status", *figures)}
     grids = {axis: dataset[axis].to_numpy() for axis in axes}
@@ -40,7 +51,7 @@ def runs_table(dataset: xr.Dataset) -> str:
         rows.append(
             [*where, STATUSES[values["status"][at]], *(_text(values[name][at]) for name in figures)]
         )
-    return _table([[name.replace("_", " ") for name in columns], units, *rows])
+    return _table([*_stacked(headings), units, *rows], right=len(axes) + 1)
 
 
 def run_details(dataset: xr.Dataset) -> str:
@@ -88,10 +99,23 @@ def _unit(variable: xr.DataArray) -> str:
     return "" if unit in {"", "1"} else f"[{unit}]"
 
 
-def _table(lines: Sequence[Sequence[str]]) -> str:
-    """Return columns set flush left, as wide as their widest entry."""
+def _stacked(headings: Sequence[str]) -> list[list[str]]:
+    """Return headings in as many lines as the longest needs, the last line full."""
+    parts = [textwrap.wrap(text, _HEADING, break_long_words=False) for text in headings]
+    deepest = max(map(len, parts))
+    return [
+        list(line) for line in zip(*([""] * (deepest - len(p)) + p for p in parts), strict=True)
+    ]
+
+
+def _table(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
+    """Return columns as wide as their widest entry, set flush right from column `right` on."""
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+    first = len(widths) if right is None else right
     return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        "  ".join(
+            cell.rjust(width) if i >= first else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
         for line in lines
     )

@@ -29,9 +29,10 @@ def test_run_prints_a_table_and_writes_data_and_picture(
     assert main(["run", str(study_file()), "--out", str(out), "--workers", "1"]) == 0
     printed = capsys.readouterr()
     lines = printed.out.splitlines()
-    assert lines[0].split()[:5] == ["load", "ratio", "friction", "status", "peak"]
-    assert lines[1].split() == ["[MPa]", "[s]"]
-    assert [line.split()[:3] for line in lines[2:6]] == [
+    assert lines[0].split() == ["load", "contact"]
+    assert lines[1].split() == ["ratio", "friction", "status", "pressure", "increments", "cpu"]
+    assert lines[2].split() == ["[MPa]", "[s]"]
+    assert [line.split()[:3] for line in lines[3:7]] == [
         ["0.3", "0", "ok"], ["0.3", "0.4", "ok"], ["0.9", "0", "ok"], ["0.9", "0.4", "ok"],
     ]  # fmt: skip
     written = [Path(line.split()[1]) for line in lines if line.startswith("wrote")]
@@ -51,6 +52,20 @@ def test_run_with_failed_runs_lists_them_and_returns_1(
     assert "2 ok, 2 limit_load" in printed.out
     assert main([*arguments, "--resume"]) == 1
     assert "0 computed" in capsys.readouterr().out
+
+
+def test_warnings_are_counted_and_told_with_the_run(
+    study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["run", str(study_file(trouble="warn")), "--out", str(out), "--workers", "1"]
+    assert main(arguments) == 0
+    printed = capsys.readouterr()
+    assert "strains are large" not in printed.err + printed.out
+    assert "4 runs (4 ok; 2 with a warning)" in printed.out
+    for run in (out / "runs").iterdir():
+        main(["show", str(run)])
+    assert capsys.readouterr().out.count("strains are large") == 2
 
 
 @pytest.mark.parametrize(

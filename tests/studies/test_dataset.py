@@ -10,7 +10,8 @@ import pytest
 
 from solver.record import Record, Status
 from studies import Store, Study, open_netcdf
-from studies.dataset import QUANTITIES, STATUSES, run_dataset
+from studies.dataset import STATUSES, run_dataset
+from studies.quantities import QUANTITIES
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
@@ -103,4 +104,4 @@ def test_a_dimension_without_coordinate_is_refused() -> None:
 
 
 def test_every_quantity_of_the_table_has_a_unit_that_is_si_or_one() -> None:
-    assert {each.units for each in QUANTITIES.values()} == {"1", "mm", "MPa", "s"}
+    assert {each.units for each in QUANTITIES.values()} == {"1", "mm", "MPa", "N", "N mm", "s"}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from studies import Store, Study, StudyError, open_netcdf, open_study
-from studies.plots import figure, line_figure, map_figure
+from studies.plots import figure, line_figure, map_figure, whole
 from tests.studies.conftest import compute_here, fake_study
 
 ComputedStudy = tuple[Study, Store]
@@ -21,6 +22,29 @@ def mesh_of(sheet: Figure) -> tuple[Axes, QuadMesh]:
     return axes, mesh
 
 
+def texts_of(sheet: Figure) -> str:
+    axes = sheet.axes[0]
+    texts = [axes.get_title(loc="left"), *(text.get_text() for text in axes.texts)]
+    return " ".join(texts).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def grid_map(x: np.ndarray, y: np.ndarray, component: str | None = None) -> xr.Dataset:
+    """Return a successful run with one map that is different everywhere."""
+    values = 1.0 + np.arange(y.size * x.size, dtype=float).reshape(y.size, x.size)
+    run = xr.Dataset(
+        {"status": 0, "message": "", "contact_half_width": x.max() / 2},
+        coords={"x": ("x", x, {"units": "mm"}), "y": ("y", y, {"units": "mm"})},
+        attrs={"scene": "fake", "parameters": '{"state": "plane_strain"}'},
+    )
+    attributes = {"long_name": "a quantity with a long name", "units": "MPa"}
+    if component is None:
+        run["quantity"] = (("y", "x"), values, attributes)
+    else:
+        run = run.assign_coords(component=[component])
+        run["quantity"] = (("component", "y", "x"), values[None], attributes)
+    return run
+
+
 def test_a_stress_map_has_zero_in_the_middle_of_its_colours(computed: ComputedStudy) -> None:
     _, store = computed
     with open_study(store.directory) as together:
@@ -29,23 +53,79 @@ def test_a_stress_map_has_zero_in_the_middle_of_its_colours(computed: ComputedSt
     low, high = mesh.get_clim()
     assert low == -high < 0.0
     assert axes.get_aspect() == 1.0
-    assert sheet.axes[1].get_ylabel() == "residual stress [MPa]"
-    words = " ".join(text.get_text() for text in axes.texts) + axes.get_title(loc="left")
+    assert axes.child_axes[0].get_ylabel() == "residual stress [MPa]"
+    words = texts_of(sheet)
     assert "Residual stress, xx" in words
     assert "load ratio 0.9" in words
     assert "friction 0.4" in words
 
 
-def test_a_strain_map_begins_at_zero_and_leaves_nothing_out(computed: ComputedStudy) -> None:
+def test_a_strain_map_begins_at_zero_and_shows_the_values_as_they_are(
+    computed: ComputedStudy,
+) -> None:
     study, store = computed
     case = next(study.cases())
     with open_netcdf(store.run_path(case.id)) as run:
         _, mesh = mesh_of(map_figure(run, "plastic_strain"))
         values = run["plastic_strain"].squeeze().to_numpy()
     assert mesh.get_clim()[0] == 0.0
-    drawn = mesh.get_array()
-    assert drawn is not None
-    np.testing.assert_array_equal(np.asarray(drawn), values)
+    drawn = np.asarray(mesh.get_array())
+    np.testing.assert_array_equal(drawn[:, -values.shape[1] :], values)
+
+
+@pytest.mark.parametrize("first", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("component", "sign"), [(None, 1), ("xx", 1), ("yz", 1), ("xy", -1), ("zx", -1)]
+)
+def test_half_a_body_is_drawn_whole(first: float, component: str | None, sign: int) -> None:
+    run = grid_map(first + np.arange(6.0), np.arange(-4.0, 0.0), component)
+    values = run["quantity"].isel(component=0) if component else run["quantity"]
+    both = whole(values)
+    assert both.sizes["x"] == (12 if first else 11)
+    np.testing.assert_array_equal(both["x"], -both["x"][::-1])
+    right = both.sel(x=slice(first, None))
+    np.testing.assert_array_equal(right, values)
+    left = both.sel(x=slice(None, -0.1))
+    np.testing.assert_array_equal(left[:, ::-1], sign * both.sel(x=slice(0.1, None)))
+    drawn = np.asarray(mesh_of(map_figure(run, "quantity"))[1].get_array())
+    np.testing.assert_array_equal(drawn, both)
+
+
+@pytest.mark.parametrize("first", [-5.0, 2.0])
+def test_a_whole_body_is_drawn_as_it_is(first: float) -> None:
+    values = grid_map(first + np.arange(11.0), np.arange(3.0))["quantity"]
+    assert whole(values) is values
+
+
+@pytest.mark.parametrize("size", [(0.5, 6.0), (1.0, 1.0), (9.0, 0.5), (1e-3, 2e-3), (1e4, 3e4)])
+def test_no_label_is_cut_and_the_bar_is_as_tall_as_the_map(size: tuple[float, float]) -> None:
+    width, height = size
+    run = grid_map(np.linspace(1.0, 1.0 + width, 40), np.linspace(-height, 0.0, 30))
+    run = run.assign_coords(friction=0.4, hardening="isotropic", load_ratio=0.8571)
+    run["quantity"][0, 0] = 1e5
+    sheet = map_figure(run, "quantity")
+    axes = sheet.axes[0]
+    sheet.draw_without_rendering()
+    inked = sheet.get_tightbbox()
+    assert inked.x0 >= 0.0
+    assert inked.y0 >= 0.0
+    assert inked.x1 <= sheet.get_figwidth()
+    assert inked.y1 <= sheet.get_figheight()
+    map_box, bar_box = (each.get_window_extent() for each in (axes, axes.child_axes[0]))
+    # An arrow for values beyond the colours takes 3 % at either end of the bar.
+    assert 0.94 * map_box.height < bar_box.height < 1.001 * map_box.height
+
+
+def test_colours_that_leave_values_out_say_so() -> None:
+    run = grid_map(np.arange(1.0, 101.0), np.arange(-10.0, 0.0), "xx")
+    everything = map_figure(run, "quantity")
+    assert mesh_of(everything)[1].get_clim()[1] == 1000.0
+    assert "beyond" not in texts_of(everything)
+    run["quantity"][0, 0, 0] = -1e6
+    sheet = map_figure(run, "quantity")
+    assert mesh_of(sheet)[1].get_clim()[1] < 1000.0
+    assert "0.2% of the map lies beyond" in texts_of(sheet)
+    assert "\N{MINUS SIGN}1e+06 to 1e+03" in texts_of(sheet)
 
 
 def test_zoom_shows_the_neighbourhood_of_the_edge(computed: ComputedStudy) -> None:
@@ -60,9 +140,9 @@ def test_zoom_shows_the_neighbourhood_of_the_edge(computed: ComputedStudy) -> No
 def test_a_pressure_figure_has_a_line_for_each_stage(computed: ComputedStudy) -> None:
     _, store = computed
     with open_study(store.directory) as together:
-        axes = line_figure(together, "contact_pressure").axes[0]
-    legend = axes.get_legend()
-    assert legend is not None
+        sheet = line_figure(together, "contact_pressure")
+    (axes,) = sheet.axes
+    (legend,) = sheet.legends
     assert [text.get_text() for text in legend.get_texts()] == ["loaded", "unloaded"]
     assert axes.get_ylabel() == "contact pressure [MPa]"
 
@@ -70,8 +150,8 @@ def test_a_pressure_figure_has_a_line_for_each_stage(computed: ComputedStudy) ->
 def test_figure_chooses_what_suits_the_field(computed: ComputedStudy) -> None:
     _, store = computed
     with open_study(store.directory) as together:
-        assert len(figure(together, "residual_stress").axes) == 2
-        assert len(figure(together, "contact_pressure").axes) == 1
+        assert figure(together, "residual_stress").axes[0].child_axes
+        assert figure(together, "contact_pressure").axes[0].lines
         with pytest.raises(StudyError) as caught:
             figure(together, "increments")
         assert "contact_pressure" in caught.value.allowed
@@ -86,3 +166,16 @@ def test_a_field_that_is_zero_everywhere_is_drawn(store: Store) -> None:
         for field in ("residual_stress", "plastic_strain"):
             low, high = mesh_of(map_figure(together, field))[1].get_clim()
             assert low < high
+
+
+def test_depth_ends_where_nothing_is_left() -> None:
+    depth = np.arange(0.0, 100.0)
+    run = grid_map(np.arange(1.0, 4.0), np.arange(-3.0, 0.0))
+    run = run.assign_coords(depth=("depth", depth, {"units": "mm"}), station=[0.0, 1.0])
+    profile = np.stack([np.exp(-depth), 5.0 * np.exp(-depth / 2.0)])
+    run["profile"] = (("station", "depth"), profile)
+    end = line_figure(run, "profile").axes[0].get_xlim()[1]
+    assert np.exp(-end / 2.0) < 0.02 < np.exp(-(end - 1.0) / 2.0)
+    assert line_figure(run, "profile", zoom=50.0).axes[0].get_xlim()[1] == 50.0
+    run["profile"] = 0.0 * run["profile"]
+    assert line_figure(run, "profile").axes[0].get_xlim()[1] == 99.0

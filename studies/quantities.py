@@ -1,0 +1,89 @@
+"""What the variables of a data set mean: names and units, for every scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What a variable means; `count` marks whole numbers."""
+
+    long_name: str
+    units: str = "1"
+    standard_name: str = ""
+    count: bool = False
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """CF attributes."""
+        given = {
+            "long_name": self.long_name,
+            "units": self.units,
+            "standard_name": self.standard_name,
+        }
+        return {key: value for key, value in given.items() if value}
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "x": Quantity("distance along the surface from the centre of the contact", "mm"),
+    "y": Quantity("height above the surface", "mm"),
+    "depth": Quantity("depth below the surface", "mm", "depth"),
+    "station": Quantity("position of a depth profile along the surface", "mm"),
+    "s": Quantity("distance along the contact surface from its centre", "mm"),
+    "residual_stress": Quantity("residual stress", "MPa"),
+    "residual_mises": Quantity("von Mises stress of the residual stress", "MPa"),
+    "plastic_strain": Quantity("equivalent plastic strain"),
+    "mises_loaded": Quantity("von Mises stress under load", "MPa"),
+    "residual_profile": Quantity("residual stress along depth", "MPa"),
+    "plastic_strain_profile": Quantity("equivalent plastic strain along depth"),
+    "surface_residual": Quantity("residual stress at the contact surface", "MPa"),
+    "contact_pressure": Quantity("contact pressure", "MPa"),
+    "contact_shear": Quantity("contact shear traction", "MPa"),
+    "contact_gap": Quantity("gap between the contact surfaces", "mm"),
+    "contact_half_width": Quantity("half-width of the contact under load", "mm"),
+    "peak_contact_pressure": Quantity("largest contact pressure under load", "MPa"),
+    "max_plastic_strain": Quantity("largest equivalent plastic strain"),
+    "max_plastic_strain_punch": Quantity("largest equivalent plastic strain in the punch"),
+    "max_plastic_strain_half_plane": Quantity(
+        "largest equivalent plastic strain in the half-plane"
+    ),
+    "depth_of_max_plastic_strain": Quantity(
+        "depth of the largest plastic strain; negative in the upper body", "mm"
+    ),
+    "plastic_work": Quantity("plastic work of the computed part of the bodies", "N mm"),
+    "peak_residual_tension": Quantity("largest normal component of the residual stress", "MPa"),
+    "peak_residual_compression": Quantity(
+        "smallest normal component of the residual stress", "MPa"
+    ),
+    "residual_x_half_plane": Quantity(
+        "residual stress xx on the half-plane, 0.005 half-widths inside the corner", "MPa"
+    ),
+    "residual_x_punch": Quantity(
+        "residual stress xx on the punch, 0.028 half-widths inside the corner", "MPa"
+    ),
+    "increments": Quantity("load increments", count=True),
+    "cut_increments": Quantity("load increments that were cut", count=True),
+    "iterations": Quantity("Newton iterations", count=True),
+    "median_iterations": Quantity("median Newton iterations an increment"),
+    "inner_fallbacks": Quantity("iterations whose contact problem needed pivoting", count=True),
+    "blended_tangents": Quantity("iterations with a stiffened tangent", count=True),
+    "cpu_seconds": Quantity("processor time", "s"),
+    "degrees_of_freedom": Quantity("degrees of freedom", count=True),
+    "audit_residual": Quantity("force out of balance / largest force"),
+    "audit_overlap": Quantity("largest overlap of the bodies", "mm"),
+    "audit_closed_gap": Quantity("largest gap where the bodies touch", "mm"),
+    "audit_tension": Quantity("largest tensile contact force", "N"),
+    "audit_friction_excess": Quantity("largest tangential force beyond friction", "N"),
+    "audit_surface_shear": Quantity("largest contact shear / shear yield stress"),
+    "audit_yield": Quantity("largest stress beyond the yield surface / yield stress"),
+    "audit_dissipation": Quantity(
+        "smallest plastic dissipation of an increment in a unit of volume", "MPa"
+    ),
+    "audit_contact_after_unloading": Quantity("contact force left after unloading", "N"),
+    "audit_error_loaded": Quantity("estimated relative error of stress under load, energy norm"),
+    "audit_error_residual": Quantity("estimated relative error of residual stress, energy norm"),
+    "audit_free_surface": Quantity("residual stress across the free side / yield stress"),
+    "audit_self_equilibrium": Quantity("net force on a cut / force of its stress magnitudes"),
+}

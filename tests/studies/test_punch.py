@@ -1,0 +1,75 @@
+"""Studies of the punch: what its runs are called, and that they do not depend on the study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver import SCENES, Record
+from studies import Store, Study, open_study, run_study
+from studies.dataset import LABEL_ATTRIBUTES
+from studies.quantities import QUANTITIES
+from studies.tables import runs_table
+
+COARSE = {"smallest_element": 0.05, "growth": 2.5, "load_step": 0.15, "hardening": "isotropic"}
+
+
+def computed(directory: Path, load_ratios: list[float]) -> xr.Dataset:
+    """Return the data set of a coarse study, computed by a worker process in a fresh store."""
+    sweep: dict[str, Any] = {"load_ratio": load_ratios, "friction": [0.3]}
+    study = Study.from_dict(
+        {"name": "coarse", "scene": "punch", "parameters": COARSE, "sweep": sweep}
+    )
+    outcome = run_study(study, Store(directory), workers=1)
+    assert outcome.ok, outcome.failed
+    return open_study(outcome.dataset)
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    return computed(tmp_path_factory.mktemp("both"), [0.4, 0.7])
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    scene = SCENES["punch"]
+    (only,) = scene.path(scene.parameters(**COARSE), [0.4], lambda fraction, text: None)
+    return only
+
+
+def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
+    both: xr.Dataset, tmp_path: Path
+) -> None:
+    alone = computed(tmp_path, [0.7])
+    shared = both.sel(load_ratio=[0.7])
+    assert float(abs(alone["residual_stress"]).max()) > 1.0, "the run yields"
+    for name in set(alone.variables) - {"cpu_seconds"}:
+        np.testing.assert_array_equal(shared[name], alone[name], err_msg=str(name))
+
+
+def test_every_variable_of_the_punch_has_a_name_and_a_unit(record: Record) -> None:
+    described = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
+    assert record.scalars.keys() <= QUANTITIES.keys()
+    assert record.fields.keys() <= QUANTITIES.keys()
+    assert record.coordinates.keys() <= described
+
+
+def test_no_variable_is_described_that_the_punch_does_not_give(record: Record) -> None:
+    given = record.scalars.keys() | record.fields.keys() | record.coordinates.keys()
+    assert QUANTITIES.keys() <= given
+
+
+def test_the_table_of_the_punch_fits_the_terminal(both: xr.Dataset) -> None:
+    sweep = xr.concat([both.assign_coords(friction=[f]) for f in (0.3, 0.4)], "friction")
+    wide = xr.concat(
+        [sweep.assign_coords(hardening=[h]) for h in ("isotropic", "kinematic")], "hardening"
+    )
+    wide["status"][0, 0, 0] = 2
+    lines = runs_table(wide.transpose("load_ratio", "friction", "hardening", ...)).splitlines()
+    assert "not_converged" in lines[4]
+    assert max(map(len, lines)) <= 120
+    assert len(lines) == 4 + wide["status"].size
