@@ -23,6 +23,7 @@ _EQUILIBRIUM = 1e-6
 _CONTACT = 1e-6
 _YIELD = 1e-6
 _LARGE_STRAIN = 0.10
+_SURFACE_SHEAR = 1.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,18 +158,22 @@ def audit(
     if figures["audit_dissipation"] < -_YIELD * yield_stress:
         violations.append(f"plastic dissipation is negative: {least_dissipation:.2e}")
     largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
-    warnings = (
-        (f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is stretched",)
-        if largest > _LARGE_STRAIN
-        else ()
-    )
-    return Audit(figures, tuple(violations), warnings)
+    warnings = []
+    if largest > _LARGE_STRAIN:
+        warnings.append(
+            f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is stretched"
+        )
+    if shear > _SURFACE_SHEAR:
+        warnings.append(
+            f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
+        )
+    return Audit(figures, tuple(violations), tuple(warnings))
 
 
 def cut_force(
     system: System, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
 ) -> float:
-    """Return the normal force on a plane cut over the integral of its magnitude.
+    """Return the normal force on a plane cut over the force its area carries at yield.
 
     ``where`` (2, n) are points along the straight cut; ``stress`` (4, n_points) Mandel. Zero for
     a residual stress that holds itself, but for the discretisation error.
@@ -180,6 +185,6 @@ def cut_force(
     s = Sampler(p, where)((recovery(p) @ stress.T).T)
     traction = n[0] ** 2 * s[0] + n[1] ** 2 * s[1] + np.sqrt(2) * n[0] * n[1] * s[3]
     t = np.linalg.norm(where - where[:, :1], axis=0)
-    measure = 2 * np.pi * where[0] if p.body.state == "axisymmetric" else p.body.thickness
-    total = float(np.trapezoid(np.abs(traction) * measure, t))
-    return float(np.trapezoid(traction * measure, t)) / total if total else 0.0
+    measure = np.broadcast_to(p.measure(where), len(t))
+    area = float(np.trapezoid(measure, t))
+    return float(np.trapezoid(traction * measure, t)) / (area * p.body.material.yield_stress)

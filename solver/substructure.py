@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from solver.discretisation import Discretisation
 
 _KEPT_IN_MEMORY = 8
+_BLOCK = 64
 _CACHE: OrderedDict[str, _Condensed] = OrderedDict()
 
 
@@ -40,24 +41,29 @@ class _Condensed:
         self.kept = kept
         self.inner = np.setdiff1d(part.free, kept)
         K = part.elastic_matrix()
-        among = K[self.inner][:, self.inner]
-        self._Kik = K[self.inner][:, kept]
-        upper = sparse.csr_array(sparse.triu(among, format="csr"))
-        self._solver = linear.analyse(upper, linear_solver)
-        self._solver.factorise(upper.data)
-        # the response of the inside to unit movements of the kept unknowns
-        self._follow = self._solver.solve(self._Kik.toarray())
-        self.stiffness = K[kept][:, kept].toarray() - self._Kik.T @ self._follow
-        self.stiffness = 0.5 * (self.stiffness + self.stiffness.T)
+        self._couple = K[self.inner][:, kept]
+        upper = sparse.csr_array(sparse.triu(K[self.inner][:, self.inner], format="csr"))
+        self._solver = linear.analyse(upper, linear_solver) if len(self.inner) else None
+        if self._solver is not None:
+            self._solver.factorise(upper.data)
         self._load = part.load[self.inner]
-        self._own = self._solver.solve(self._load)
-        self.load = part.load[kept] - self._Kik.T @ self._own
+        self.load = part.load[kept] - self._couple.T @ self._inside(self._load)
+        self.stiffness = K[kept][:, kept].toarray()
+        for first in range(0, len(kept), _BLOCK):
+            some = slice(first, first + _BLOCK)
+            follow = self._inside(self._couple[:, some].toarray())
+            self.stiffness[:, some] -= self._couple.T @ follow
+        self.stiffness = 0.5 * (self.stiffness + self.stiffness.T)
+
+    def _inside(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return inner displacements for inner forces, the kept unknowns held."""
+        return force if self._solver is None else self._solver.solve(force)
 
     def expand(self, u: NDArray[np.float64], load: float, size: int) -> NDArray[np.float64]:
         """Return all displacements (size,) from those kept."""
         full = np.zeros(size)
         full[self.kept] = u
-        full[self.inner] = load * self._own - self._follow @ u
+        full[self.inner] = self._inside(load * self._load - self._couple @ u)
         return full
 
 
