@@ -1,0 +1,70 @@
+"""The table, the CSV file, and the conditions they were measured under."""
+
+from __future__ import annotations
+
+import csv
+import os
+import platform
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+
+from solver import __version__, pardiso
+from tests.benchmarks.measure import Point
+
+
+def conditions() -> list[str]:
+    """Return lines on the machine, the versions and the load at the start."""
+    packages = ("numpy", "scipy", "scikit-fem", "numba")
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in packages)
+    mkl = "MKL PARDISO" if pardiso.library() is not None else "no MKL: SuperLU throughout"
+    busy = os.getloadavg()[0]
+    return [
+        f"solver {__version__}; Python {platform.python_version()}, {versions}; {mkl}",
+        f"{_processor()}, {os.cpu_count()} cores, {platform.system()}; one thread used; "
+        f"{busy:.1f} processes were running at the start",
+    ]
+
+
+def _processor() -> str:
+    """Return the processor's model name where the system tells it."""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def table(points: Sequence[Point], measures: Sequence[str]) -> list[str]:
+    """Return one line a point."""
+    lines = [
+        f"{'series':<18}{'setting':<26}{'unknowns':>9}{'CPU s':>8}{'noise':>7}"
+        + "".join(f"{name:>29}" for name in measures)
+    ]
+    for p in points:
+        errors = "".join(
+            f"{p.errors[n]:>29.2e}" if n in p.errors else f"{'-':>29}" for n in measures
+        )
+        noise = f"{p.spread:>7.0%}" if p.repeats > 1 else f"{'-':>7}"
+        lines.append(f"{p.series:<18}{p.setting:<26}{p.unknowns:>9}{p.cpu:>8.2f}{noise}{errors}")
+    return lines
+
+
+def write_csv(points: Sequence[Point], path: Path) -> None:
+    """Write every point: cost, values and errors in columns, empty where there is none."""
+    values = sorted({name for p in points for name in p.values})
+    errors = sorted({name for p in points for name in p.errors})
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(
+            ["problem", "series", "setting", "unknowns", "cpu_seconds", "spread", "repeats"]
+            + values
+            + [f"error of {name}" for name in errors]
+        )
+        for p in points:
+            writer.writerow(
+                [p.problem, p.series, p.setting, p.unknowns, p.cpu, p.spread, p.repeats]
+                + [p.values.get(name, "") for name in values]
+                + [p.errors.get(name, "") for name in errors]
+            )
