@@ -1,0 +1,248 @@
+"""Paths: increments, cuts, branches, limits; and that solvers and elements agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from hashlib import sha256
+
+import numpy as np
+import pytest
+
+from solver import (
+    Body,
+    LimitLoad,
+    Material,
+    Model,
+    ModelError,
+    NotConverged,
+    Path,
+    PathControl,
+    System,
+    Tolerances,
+    solve,
+)
+from solver import pardiso as mkl
+from solver.fields import Sampler
+from solver.increment import Increment
+from solver.mesh import grid
+from solver.scenes.punch import PunchParameters, model
+
+COARSE = PunchParameters(smallest_element=0.05, growth=1.8, friction=0.3)
+CONTROL = PathControl(load_step=0.1, unload_steps=2)
+
+
+@pytest.fixture(scope="module")
+def system():
+    return System(model(COARSE))
+
+
+def branch_at(system, load, control=CONTROL):
+    (branch,) = Path(system, control).branches([load])
+    return branch
+
+
+def arrays(converged):
+    state = converged.state
+    out = list(state.u)
+    for plastic in state.plastic:
+        out += [plastic.plastic_strain, plastic.accumulated]
+    for contact in state.contacts:
+        out += [contact.normal, contact.tangential, contact.status, contact.touching]
+    return out + [response.stress for response in converged.responses]
+
+
+def fingerprint(converged):
+    return sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays(converged)))
+
+
+def residual_x(solution, body, x):
+    """Residual sigma_x on the contact surface of a body at ``x`` [mm]."""
+    at = np.array([[x], [0.0]])
+    return float(Sampler(solution.system.full(body), at)(solution.stress(body))[0, 0])
+
+
+def bar(**material):
+    """A plane-stress bar pressed at one end, 300 MPa at load factor one."""
+    return Model(
+        bodies=(
+            Body(
+                name="bar",
+                mesh=grid(np.linspace(0.0, 4.0, 5), np.linspace(0.0, 1.0, 3)),
+                material=Material(youngs_modulus=2e5, poisson_ratio=0.3, **material),
+                state="plane_stress",
+                supports={"left": "x", "bottom": "y"},
+                pressure={"right": 300.0},
+            ),
+        )
+    )
+
+
+# -- branches ----------------------------------------------------------------------------------
+
+
+def test_branches_of_one_path_equal_separate_runs_bit_for_bit(system):
+    loads = [0.3, 0.55, 0.6]
+    together = list(Path(system, CONTROL).branches(loads))
+    for branch, load in zip(together, loads, strict=True):
+        alone = branch_at(system, load)
+        assert branch.load == load
+        for stage in ("loaded", "unloaded"):
+            ours, theirs = getattr(branch, stage), getattr(alone, stage)
+            assert ours.state.load == (load if stage == "loaded" else 0.0)
+            assert all(map(np.array_equal, arrays(ours), arrays(theirs)))
+        assert branch.tally.iterations == alone.tally.iterations
+        assert branch.tally.plastic_work == alone.tally.plastic_work
+
+
+def test_branches_come_in_increasing_order_of_load(system):
+    assert [b.load for b in Path(system, CONTROL).branches([0.5, 0.3])] == [0.3, 0.5]
+
+
+def test_states_given_away_are_never_changed(system):
+    """Later increments replace states, they do not write into them."""
+    kept = []
+    for branch in Path(system, CONTROL).branches([0.35, 0.45, 0.55]):
+        kept += [(c, fingerprint(c).hexdigest()) for c in (branch.loaded, branch.unloaded)]
+    assert all(fingerprint(c).hexdigest() == before for c, before in kept)
+    assert len({before for _, before in kept}) == len(kept)
+
+
+def test_a_load_that_never_yields_takes_one_increment_and_leaves_nothing():
+    system = System(model(replace(COARSE, yield_stress=1e6)))
+    branch = branch_at(system, 1e-3)
+    assert len(branch.tally.iterations) == 1
+    assert branch.tally.plastic_work == 0.0
+    assert branch.loaded.state.contacts[0].normal.sum() > 0
+    assert not any(np.asarray(a, float).any() for a in arrays(branch.unloaded)[: len(system.parts)])
+    for name in ("punch", "half_plane"):
+        assert not system.response(name, branch.unloaded).stress.any()
+        assert not system.response(name, branch.unloaded).state.accumulated.any()
+
+
+def test_an_elastic_load_in_one_increment_equals_the_same_load_in_ten():
+    """A conforming contact with friction grows in proportion while nothing yields."""
+    system = System(model(replace(COARSE, yield_stress=1e5, load_ratio=1.0)))
+    one = branch_at(system, 0.002).loaded.state.contacts[0]
+    state = system.initial()
+    for load in 2e-4 * np.arange(1, 11):
+        state = Increment(system, state, load).solve().state
+    scale = one.normal.max()
+    assert np.abs(state.contacts[0].normal - one.normal).max() < 1e-6 * scale
+    assert np.abs(state.contacts[0].tangential - one.tangential).max() < 1e-6 * scale
+
+
+# -- increments that fail ----------------------------------------------------------------------
+
+
+def test_an_increment_that_needs_more_iterations_is_cut_and_ends_at_the_same_load(system):
+    tight = replace(CONTROL, load_step=0.3, tolerances=Tolerances(iterations=4), max_cuts=6)
+    cut = branch_at(system, 0.6, tight)
+    assert cut.error is None
+    assert cut.tally.cuts > 0
+    assert cut.loaded.state.load == 0.6
+    whole = branch_at(system, 0.6)
+    assert whole.tally.cuts == 0
+    assert cut.tally.plastic_work == pytest.approx(whole.tally.plastic_work, rel=0.02)
+
+
+def test_an_impossible_tolerance_is_not_converged_and_says_where(system):
+    control = replace(CONTROL, tolerances=Tolerances(residual=1e-30, iterations=3), max_cuts=2)
+    branch = branch_at(system, 0.6, control)
+    assert isinstance(branch.error, NotConverged)
+    assert not isinstance(branch.error, LimitLoad)
+    assert branch.loaded is None
+    assert branch.unloaded is None
+    assert branch.tally.cuts == 3
+    assert branch.error.reached == 0.0
+    assert branch.error.attempted == pytest.approx(0.1 / 2**2)
+    assert "load factor 0 to 0.025" in str(branch.error)
+
+
+def test_a_bar_flows_at_its_yield_stress_and_the_error_brackets_it():
+    with pytest.raises(LimitLoad, match="no equilibrium between load factors") as outcome:
+        solve(bar(yield_stress=300.0), load=1.3, control=PathControl(load_step=0.13, max_cuts=8))
+    assert outcome.value.reached <= 1.0 < outcome.value.attempted
+    assert outcome.value.attempted - outcome.value.reached < 0.13 / 2**7
+
+
+def test_a_hardening_bar_follows_its_curve_and_keeps_no_stress():
+    """Eu = 0.1 E: at 1.5 times the yield stress the bar is 150 / Eu longer than its elastic part."""
+    material = {"yield_stress": 300.0, "hardening": "isotropic", "hardening_ratio": 0.1}
+    solution = solve(bar(**material), load=1.5)
+    x = solution.nodes("bar")[0]
+    plastic = 150.0 * (1 / 2e4 - 1 / 2e5)
+    assert solution.displacement("bar")[0] == pytest.approx(-plastic * x, abs=1e-9)
+    assert solution.plastic_strain("bar") == pytest.approx(np.full_like(x, plastic), rel=1e-7)
+    assert np.abs(solution.stress("bar")).max() < 1e-5
+
+
+def test_a_path_past_the_limit_keeps_the_branches_below_it():
+    path = Path(System(bar(yield_stress=300.0)), PathControl(load_step=0.25))
+    below, above = path.branches([0.9, 1.2])
+    assert below.error is None
+    assert below.unloaded is not None
+    assert isinstance(above.error, LimitLoad)
+    assert above.loaded is None
+
+
+def test_the_monitor_may_stop_a_path(system):
+    class StopHere(Exception):
+        pass
+
+    def report(load, message):
+        raise StopHere
+
+    with pytest.raises(StopHere):
+        list(Path(system, CONTROL, report).branches([0.6]))
+
+
+@pytest.mark.parametrize(("field", "value"), [("load_step", 0.0), ("unload_steps", 0)])
+def test_bad_controls_are_refused_by_name(field, value):
+    with pytest.raises(ModelError, match=rf"{field} = {value!r}"):
+        PathControl(**{field: value})
+
+
+@pytest.mark.parametrize("load", [0.0, -1.0, np.inf, np.nan])
+def test_bad_loads_are_refused_by_name(load):
+    with pytest.raises(ModelError, match="load = "):
+        solve(bar(), load=load)
+
+
+# -- solvers and elements ----------------------------------------------------------------------
+
+
+def test_superlu_and_pardiso_agree():
+    if mkl.library() is None:
+        pytest.skip("MKL is not installed")
+    first, second = (
+        branch_at(System(model(COARSE), linear_solver=name), 0.55) for name in ("superlu", "pardiso")
+    )
+    assert first.tally.iterations == second.tally.iterations
+    for ours, theirs in zip(first.unloaded.responses, second.unloaded.responses, strict=True):
+        # increments end at 1e-8 of the force, which the plastic zone amplifies
+        assert np.abs(ours.stress - theirs.stress).max() < 1e-3
+
+
+# of the residual stress: quadratic elements differ little, linear ones converge slowly
+ELEMENTS = {"quad9": 0.02, "tri6": 0.05, "quad4": 0.15, "tri3": 0.40}
+
+
+@pytest.fixture(scope="module")
+def by_element():
+    """Residual sigma_x of the half-plane 0.05 a from the corner, elements 0.01 a there; work."""
+    parameters = PunchParameters(
+        friction=0.3, smallest_element=0.01, growth=1.6, hardening="isotropic"
+    )
+    out = {}
+    for element in ("quad8", *ELEMENTS):
+        solution = solve(model(replace(parameters, element=element)), load=0.6, control=CONTROL)
+        out[element] = (residual_x(solution, "half_plane", 47.5), solution.tally.plastic_work)
+    return out
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_elements_agree_within_the_discretisation(by_element, element):
+    """Measured: quad8 191 MPa; quad9 193, tri6 187, quad4 168, tri3 124. Work within 7 %."""
+    stress, work = by_element["quad8"]
+    assert by_element[element][0] == pytest.approx(stress, rel=ELEMENTS[element])
+    assert by_element[element][1] == pytest.approx(work, rel=0.1)
