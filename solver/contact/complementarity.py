@@ -30,6 +30,7 @@ _MAX_SETS = 40
 _MAX_PASSES = 20
 _PIVOTS_PER_UNKNOWN = 20
 _TOLERANCE = 1e-10
+_ACCURATE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +103,8 @@ def _forces(
     stick = np.flatnonzero(status == STICK) if problem.frictional else closed[:0]
     if problem.frictional:
         stick = stick[problem.friction[stick] > 0]
+    if not len(closed) and not k:
+        return np.zeros(len(problem.offset)), np.zeros(0)
     # columns of F: each normal force carries the friction force of a slipping point
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
     P[closed, np.arange(len(closed))] = 1.0
@@ -122,11 +125,9 @@ def _forces(
     if k and size:
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
-    try:
-        solution = linalg.solve(S, weight * rhs, check_finite=False)
-    except (linalg.LinAlgError, linalg.LinAlgWarning, ValueError):
-        return None
-    if not np.isfinite(solution).all():
+    _, _, solution, info = linalg.lapack.dgesv(S, weight * rhs)
+    miss = np.abs(S @ solution - weight * rhs).max(initial=0.0)
+    if info or not miss <= _ACCURATE * np.abs(weight * rhs).max(initial=0.0):
         return None
     solution *= weight
     return P @ solution[:size], solution[size:]
@@ -176,9 +177,8 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     """
     n, mu = problem.n, problem.friction
     force, _ = _scales(problem)
-    held = np.linalg.matrix_rank(problem.A[:n]) == len(problem.balance)
-    # motions that friction alone can hold need some of it from the start
-    bound = np.zeros(n) if held else mu * force / n
+    # from above: a motion that friction has to hold must find enough of it in every pass
+    bound = mu * force if len(problem.balance) else np.zeros(n)
     for _ in range(_MAX_PASSES):
         F = _given_bound(problem, bound)
         if F is None:
