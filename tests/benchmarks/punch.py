@@ -18,7 +18,7 @@ import numpy as np
 
 from solver import SCENES, Record, Status
 from solver.scenes.punch import PunchParameters
-from tests.benchmarks.measure import REPEATS, Point, timed
+from tests.benchmarks.measure import Point, timed
 
 BASE = PunchParameters(friction=0.4)
 MEASURES = {
@@ -42,7 +42,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What is run: a base, the references, the series, and how often a short run is repeated.
+    """What is run: a base, the references, the series.
 
     ``finest`` is every figure's reference; ``limits`` are the runs that series of increments
     tend to on the base's mesh.
@@ -52,7 +52,6 @@ class Plan:
     finest: Mapping[str, float | int | str]
     limits: Mapping[str, Mapping[str, float | int | str]]
     cases: tuple[Case, ...]
-    repeats: int = REPEATS
 
 
 def _mesh(series: str, sizes: tuple[tuple[float, float], ...], **more: str) -> Iterator[Case]:
@@ -106,7 +105,6 @@ def quick_plan() -> Plan:
             *_one("unload_steps", (1, 5)),
             *_solvers((4e-3,)),
         ),
-        repeats=1,
     )
 
 
@@ -121,14 +119,14 @@ def _solvers(sizes: tuple[float, ...]) -> Iterator[Case]:
             )
 
 
-def measure(plan: Plan) -> list[Point]:
+def measure(plan: Plan, repeats: int) -> list[Point]:
     """Return the points of a plan, the finest run first; equal runs are made once."""
     runs: dict[tuple[PunchParameters, str], Point] = {}
 
     def point(case: Case) -> Point:
         key = replace(plan.base, **case.changes), case.linear_solver
         if key not in runs:
-            runs[key] = _run(*key, plan.repeats)
+            runs[key] = _run(*key, repeats)
         return replace(runs[key], series=case.series, setting=case.setting)
 
     finest = point(Case(series="finest", setting="reference", changes=plan.finest))
