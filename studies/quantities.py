@@ -85,5 +85,5 @@ QUANTITIES: Mapping[str, Quantity] = {
     "audit_error_loaded": Quantity("estimated relative error of stress under load, energy norm"),
     "audit_error_residual": Quantity("estimated relative error of residual stress, energy norm"),
     "audit_free_surface": Quantity("residual stress across the free side / yield stress"),
-    "audit_self_equilibrium": Quantity("net force on a cut / force of its stress magnitudes"),
+    "audit_self_equilibrium": Quantity("net residual force on a cut plane, relative"),
 }
