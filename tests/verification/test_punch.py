@@ -100,14 +100,20 @@ def test_frictional_pressure_falls_back_towards_the_yield_stress_at_the_corner(s
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_pressure_does_not_oscillate_from_point_to_point(friction):
-    """No vertex leaves the line (over log r) through its neighbours by 3 %, the corner excluded."""
+    """Below 3 %; measured 1.7 % at friction 0.4, 0.05 % without.
+
+    An oscillation is a pair of neighbours on opposite sides of the lines (over log r) through
+    their own neighbours, as large as the smaller of the two; a kink, as where the plastic zone
+    ends, bends one way. The corner vertex is left out.
+    """
     run = press(friction=friction, smallest_element=2e-3)
-    zone = (run.r > 0) & (run.r < 0.1)
+    zone = (run.r > 0) & (run.r < 0.2)
     r, p = np.log(run.r[zone]), run.pressure[zone]
     line = p[:-2] + (p[2:] - p[:-2]) * (r[1:-1] - r[:-2]) / (r[2:] - r[:-2])
-    plastic = p[1:-1] > 1.7
-    assert plastic.sum() >= 4
-    assert np.abs(p[1:-1] / line - 1)[plastic].max() < 0.03
+    off = p[1:-1] / line - 1
+    pairs = np.where(off[1:] * off[:-1] < 0, np.minimum(abs(off[1:]), abs(off[:-1])), 0.0)
+    assert len(pairs) >= 8
+    assert pairs.max() < 0.03
 
 
 def test_both_bodies_yield_under_friction():
@@ -128,3 +134,122 @@ def test_residual_tension_in_the_half_plane_grows_with_friction(hardening):
     ]
     assert abs(values[0]) < 1.0
     assert (np.diff(values) > 5.0).all()
+
+
+def test_residual_stress_of_the_punch_turns_to_compression_as_friction_grows():
+    """sigma_x at 0.028 a, isotropic hardening, friction 0, 0.1 ... 0.4: 22, 24, -12, -54, -51 MPa.
+
+    The figures stand: quad9 and tri6, half and double elements, a punch four times as high and
+    increments five times as small move them by 3 MPa at most. Published is compression that
+    grows with friction; ours is tension below friction 0.15 and levels off beyond 0.3. The
+    place is the published one: compression along the contact is largest 0.03 a from the corner.
+    """
+    values = {
+        f: press(friction=f, hardening="isotropic", smallest_element=2e-3).punch for f in FRICTIONS
+    }
+    assert 15 < values[0.0] < 30
+    assert 15 < values[0.1] < 30
+    assert -20 < values[0.2] < -5
+    assert values[0.3] == pytest.approx(-53, abs=5)
+    assert values[0.4] == pytest.approx(-51, abs=5)
+
+
+def test_hardening_lowers_the_residual_tension_of_the_half_plane():
+    """At friction 0.4: 345 MPa without, 291 with isotropic, less with kinematic hardening."""
+    by_law = [
+        press(friction=0.4, hardening=h, smallest_element=2e-3).half_plane
+        for h in ("none", "isotropic", "kinematic")
+    ]
+    assert by_law[1] < 0.9 * by_law[0]
+    assert by_law[2] < by_law[1]
+
+
+def test_residual_compression_of_the_punch_is_larger_in_plane_strain():
+    stress = press(friction=0.4, smallest_element=2e-3)
+    strain = strain_run(friction=0.4)
+    assert strain.punch < 5 * stress.punch < 0
+    hardening = press(friction=0.4, hardening="isotropic", smallest_element=2e-3)
+    assert strain_run(friction=0.4, hardening="isotropic").punch < hardening.punch < 0
+
+
+# -- hardening and plane strain ----------------------------------------------------------------
+
+
+def test_hardening_with_friction_makes_the_pressure_climb_to_the_corner():
+    """Without friction it stays finite: 1.87 against 2.70 p0 a thousandth of a from the corner."""
+    free, rough = (press(friction=f, hardening="isotropic") for f in (0.0, 0.4))
+    near = (rough.r > 0) & (rough.r < 0.03)
+    assert (np.diff(rough.pressure[near]) < 0).all()
+    assert rough.pressure[near][0] > 1.4 * rough.pressure[near][-1]
+    assert free.pressure[near][0] < 1.1 * free.pressure[near][-1]
+    assert rough.pressure[0] > 2 * free.pressure[0]
+
+
+@pytest.mark.parametrize("hardening", ["none", "isotropic"])
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_plane_strain_pressure_is_finite(friction, hardening):
+    """It stops growing when elements are halved: by 5 % at most at the same place."""
+    coarse = press(
+        state="plane_strain",
+        load_ratio=0.8571,
+        smallest_element=4e-3,
+        friction=friction,
+        hardening=hardening,
+    )
+    fine = strain_run(friction=friction, hardening=hardening)
+    at = np.geomspace(0.008, 0.5, 20)
+    values = [np.interp(np.log(at), np.log(c.r[1:]), c.pressure[1:]) for c in (coarse, fine)]
+    assert values[1] == pytest.approx(values[0], rel=0.05)
+    assert fine.pressure[1:].max() < 2.5
+
+
+# -- a sequence of meshes, and the record ------------------------------------------------------
+
+
+def test_accuracy_measures_settle_under_refinement():
+    """Smallest element 4e-3, 2e-3, 1e-3 a; isotropic hardening, friction 0.4.
+
+    ============  ======  ======  ======
+    half-plane     286.9   290.6   295.8  MPa at 0.005 a (294.9 with 5e-4)
+    punch          -51.8   -51.3   -50.5  MPa at 0.028 a (-50.2 with 5e-4)
+    plastic work   9.577   9.569   9.576  N mm / mm
+    ============  ======  ======  ======
+    """
+    runs = [
+        press(friction=0.4, hardening="isotropic", smallest_element=h) for h in (4e-3, 2e-3, 1e-3)
+    ]
+    for name, spread in (("half_plane", 0.04), ("punch", 0.04), ("work", 0.003)):
+        values = np.array([getattr(run, name) for run in runs])
+        assert np.ptp(values) < spread * np.abs(values).max()
+
+
+def test_without_hardening_friction_the_corner_strain_grows_but_the_work_settles():
+    """Friction 0.4, no hardening: strain 0.13, 0.32, 0.65; work 11.36, 11.43, 11.46 N mm / mm.
+
+    The strain of a perfectly plastic corner has no limit under refinement; residual sigma_x at
+    0.005 a moves by 5 % a step (333, 345, 363, and 349 with 5e-4) and is no sharper than that.
+    """
+    runs = [press(friction=0.4, smallest_element=h) for h in (4e-3, 2e-3, 1e-3)]
+    strains = [run.yielded["half_plane"] for run in runs]
+    assert strains[2] > 1.5 * strains[1] > 2 * strains[0]
+    works = [run.work for run in runs]
+    assert abs(works[2] - works[1]) < abs(works[1] - works[0])
+    assert works[2] == pytest.approx(works[1], rel=5e-3)
+    tension = [run.half_plane for run in runs]
+    assert np.ptp(tension) < 0.1 * max(tension)
+
+
+def test_the_scene_records_what_the_solution_holds():
+    parameters = PunchParameters(friction=0.4, hardening="isotropic", smallest_element=4e-3)
+    (record,) = SCENES["punch"].path(parameters, [0.5714], lambda share, message: None)
+    run = press(friction=0.4, hardening="isotropic", smallest_element=4e-3)
+    assert record.status is Status.OK
+    assert record.scalars["residual_x_half_plane"] == pytest.approx(run.half_plane, rel=1e-6)
+    assert record.scalars["residual_x_punch"] == pytest.approx(run.punch, rel=1e-6)
+    assert record.scalars["plastic_work"] == pytest.approx(run.work, rel=1e-9)
+    s = 1 - record.coordinates["s"] / 50.0
+    dims, pressure = record.fields["contact_pressure"]
+    assert dims == ("stage", "s")
+    centre = np.interp(0.5, run.r, run.pressure) * 0.5714 * 350
+    assert np.interp(0.5, s[::-1], pressure[0, ::-1]) == pytest.approx(centre, rel=0.01)
+    assert not np.nan_to_num(pressure[1]).any()
