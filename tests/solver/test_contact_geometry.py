@@ -12,7 +12,9 @@ STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 ELEMENTS = ["quad8", "quad4"]
 
 
-def two_surfaces(element="quad8", bend=0.0, gap=0.0, state="plane_strain", thickness=1.0, width=6.0):
+def two_surfaces(
+    element="quad8", bend=0.0, gap=0.0, state="plane_strain", thickness=1.0, width=6.0
+):
     """A body of width 6 above a body of the given width, both bent to y = bend x²."""
 
     def arc(p):
@@ -145,5 +147,5 @@ def test_surfaces_that_close_upon_themselves_are_refused():
     ring = Body(name="ring", mesh=mesh, material=STEEL)
     plane = Body(name="plane", mesh=grid(np.arange(3.0), np.arange(-2.0, 1.0)), material=STEEL)
     pair = ContactPair(slave=("ring", "all"), master=("plane", "top"))
-    with pytest.raises(ModelError, match="boundary = 'all': .* one open chain"):
+    with pytest.raises(ModelError, match=r"boundary = 'all': .* one open chain"):
         System(Model(bodies=(ring, plane), contacts=(pair,)))

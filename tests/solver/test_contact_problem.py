@@ -23,13 +23,13 @@ def half_plane_compliance(n, coupling, seed):
     distance = np.abs(x[:, None] - x[None, :])
     flexible = np.log(4.0 / (distance + 0.05))
     sign = coupling * np.sign(x[:, None] - x[None, :])
-    return x, np.block([[flexible, sign], [-sign.T * -1, flexible]])
+    return x, np.block([[flexible, sign], [sign.T, flexible]])
 
 
 def instance(seed, friction, *, rigid=0, frictional=True, n=12, coupling=0.3):
     rng = np.random.default_rng(seed)
     x, W = half_plane_compliance(n, coupling, seed)
-    W = 0.5 * (W + W.T) + 1e-3 * np.eye(2 * n)
+    W += 1e-3 * np.eye(2 * n)
     gap = rng.uniform(-1.0, 1.0, n) if not rigid else rng.uniform(0.0, 1.0, n)
     m = 2 * n if frictional else n
     offset = np.concatenate([gap, 0.5 * rng.standard_normal(n)])[:m]
@@ -89,8 +89,7 @@ def test_frictional_solutions_satisfy_coulombs_law(friction, rigid):
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_the_answer_does_not_depend_on_where_the_active_sets_start(friction):
-    """Unique for weak coupling; the fallback, where a start needs it, gives the same forces."""
-    pivoted = 0
+    """The solution is unique while normal and tangential motion are coupled weakly."""
     for seed in range(40):
         problem = instance(seed, friction, coupling=0.1)
         rng = np.random.default_rng(seed + 1000)
@@ -98,11 +97,9 @@ def test_the_answer_does_not_depend_on_where_the_active_sets_start(friction):
         for _ in range(8):
             solution = solve_contact(problem, rng.integers(0, 4 if friction else 2, problem.n))
             assert solution is not None
-            pivoted += solution.pivoted
             answers.append(solution.forces)
         scale = np.abs(answers[0]).max()
         assert max(np.abs(a - answers[0]).max() for a in answers) < 1e-8 * scale
-    print("pivoted", pivoted)
 
 
 def test_the_fallback_satisfies_the_conditions_where_active_sets_cycle():
@@ -113,14 +110,17 @@ def test_the_fallback_satisfies_the_conditions_where_active_sets_cycle():
         if solution is not None and solution.pivoted:
             pivoted += 1
             assert natural_residual(problem, solution) < 1e-8
-    print("pivoted", pivoted)
     assert pivoted >= 3
 
 
 def test_a_load_that_pulls_a_floating_body_off_has_no_solution():
     problem = instance(0, 0.0, rigid=1, frictional=False)
     pulled = ContactProblem(
-        W=problem.W, offset=problem.offset, friction=problem.friction, A=problem.A, balance=-problem.balance
+        W=problem.W,
+        offset=problem.offset,
+        friction=problem.friction,
+        A=problem.A,
+        balance=-problem.balance,
     )
     assert solve_contact(pulled, np.full(problem.n, STICK)) is None
 
@@ -163,5 +163,5 @@ def test_lemke_solves_random_positive_definite_problems():
 
 
 def test_lemke_says_so_where_there_is_no_solution():
-    z, solved = lemke(np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 1.0]), 100)
+    _, solved = lemke(np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 1.0]), 100)
     assert not solved

@@ -166,7 +166,7 @@ def test_a_bar_flows_at_its_yield_stress_and_the_error_brackets_it():
 
 
 def test_a_hardening_bar_follows_its_curve_and_keeps_no_stress():
-    """Eu = 0.1 E: at 1.5 times the yield stress the bar is 150 / Eu longer than its elastic part."""
+    """Eu = 0.1 E: 150 MPa above the yield stress leave a plastic strain of 150 (1/Eu - 1/E)."""
     material = {"yield_stress": 300.0, "hardening": "isotropic", "hardening_ratio": 0.1}
     solution = solve(bar(**material), load=1.5)
     x = solution.nodes("bar")[0]
@@ -215,7 +215,8 @@ def test_superlu_and_pardiso_agree():
     if mkl.library() is None:
         pytest.skip("MKL is not installed")
     first, second = (
-        branch_at(System(model(COARSE), linear_solver=name), 0.55) for name in ("superlu", "pardiso")
+        branch_at(System(model(COARSE), linear_solver=name), 0.55)
+        for name in ("superlu", "pardiso")
     )
     assert first.tally.iterations == second.tally.iterations
     for ours, theirs in zip(first.unloaded.responses, second.unloaded.responses, strict=True):

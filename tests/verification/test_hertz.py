@@ -9,7 +9,7 @@ import pytest
 
 from solver import Body, ContactPair, Model, Solution, solve
 from solver.mesh import graded, grid, mapped
-from tests.verification.bodies import E, NU, steel
+from tests.verification.bodies import NU, E, steel
 from tests.verification.closed_forms import HertzLine, plane_strain_modulus
 
 HALF_WIDTH = 1.0

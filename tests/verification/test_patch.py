@@ -19,7 +19,9 @@ SLAVE = np.linspace(0.0, 10.0, 11)
 MASTER = np.append(np.arange(14) * 0.7, 10.0)  # edges of 0.7, the last 0.9
 
 
-def two_blocks(element="quad8", state="plane_strain", sliding="small", friction=0.0, finer=False, condense=True):
+def two_blocks(
+    element="quad8", state="plane_strain", sliding="small", friction=0.0, finer=False, condense=True
+):
     x_slave, x_master = (MASTER, SLAVE) if finer else (SLAVE, MASTER)
     upper = block(
         "upper",

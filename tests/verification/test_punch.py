@@ -129,8 +129,7 @@ def test_both_bodies_yield_under_friction():
 def test_residual_tension_in_the_half_plane_grows_with_friction(hardening):
     """sigma_x at 0.005 a, friction 0, 0.1 ... 0.4: 0, 166, 267, 334, 345 MPa without hardening."""
     values = [
-        press(friction=f, hardening=hardening, smallest_element=2e-3).half_plane
-        for f in FRICTIONS
+        press(friction=f, hardening=hardening, smallest_element=2e-3).half_plane for f in FRICTIONS
     ]
     assert abs(values[0]) < 1.0
     assert (np.diff(values) > 5.0).all()
