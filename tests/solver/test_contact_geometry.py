@@ -7,6 +7,7 @@ import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError, System
 from solver.mesh import grid, mapped
+from solver.surface import extract
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 ELEMENTS = ["quad8", "quad4"]
@@ -82,13 +83,14 @@ def test_flat_surfaces_have_exact_gap_rows(element):
     rng = np.random.default_rng(2)
     u = at_rest(system)
     rows = rows_on_parts(system, interface, interface.pairing(u).normal)
-    step = [1e-4 * rng.standard_normal(len(part)) for part in u]
+    step = [1e-5 * rng.standard_normal(len(part)) for part in u]
     up = interface.pairing([a + b for a, b in zip(u, step, strict=True)]).gap
     down = interface.pairing([a - b for a, b in zip(u, step, strict=True)]).gap
     linear = sum(row @ s for row, s in zip(rows, step, strict=True))
     # the ends move in and out of the master's edge: their hats cover more or less
     inner = slice(1, -1)
-    assert (up - down)[inner] / 2 == pytest.approx(linear[inner], abs=2e-3 * 1e-4)
+    # measured 6e-10 of the step, its square times the turn of the normals
+    assert (up - down)[inner] / 2 == pytest.approx(linear[inner], abs=1e-8 * 1e-5)
 
 
 def test_gap_rows_match_central_differences_on_curved_surfaces():
@@ -104,7 +106,7 @@ def test_gap_rows_match_central_differences_on_curved_surfaces():
         down = interface.pairing([a - b for a, b in zip(u, step, strict=True)]).gap
         linear = sum(row @ s for row, s in zip(rows, step, strict=True))
         worst = max(worst, np.abs((up - down) / 2 - linear)[1:-1].max() / 1e-5)
-    assert worst < 2e-2
+    assert worst < 5e-4  # measured 5e-5
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.05])
@@ -149,3 +151,15 @@ def test_surfaces_that_close_upon_themselves_are_refused():
     pair = ContactPair(slave=("ring", "all"), master=("plane", "top"))
     with pytest.raises(ModelError, match=r"boundary = 'all': .* one open chain"):
         System(Model(bodies=(ring, plane), contacts=(pair,)))
+
+
+def test_thin_elements_along_a_curve_have_their_body_on_the_right_side():
+    """Elements thinner than the sagitta of their edge: the chord does not tell the side."""
+    curve = mapped(
+        grid(np.array([0.0, 10.0, 20.0]), np.array([0.0, 0.05, 1.0])),
+        lambda p: np.stack([p[0], p[1] + p[0] ** 2 / 200]),
+    )
+    bent = Body(name="bent", mesh=curve, material=STEEL, pressure={"bottom": 100.0})
+    assert bent.discretisation.load[1::2].sum() == pytest.approx(100.0 * 20.0)
+    chain = extract(bent.discretisation, "bottom")
+    assert chain.X[0, chain.vertices] == pytest.approx([0.0, 10.0, 20.0])
