@@ -6,7 +6,7 @@ import argparse
 import importlib
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has left; say no more
         return OK
+    except OSError as error:
+        return _complain(error, FAILED)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -101,14 +103,11 @@ def plot(options: argparse.Namespace) -> int:
     """Draw a field of one run."""
     from studies.plots import figure
     from studies.reading import one_run, open_study
-    from studies.store import appearing
 
     selection = dict(_assignment(text) for text in options.select)
     with open_study(options.path) as dataset:
         run = one_run(dataset, selection)
-        drawn = figure(run, options.field, options.component, options.zoom)
-        with appearing(options.out) as part:
-            drawn.savefig(part, format=options.out.suffix.removeprefix(".") or "png")
+        _save(figure(run, options.field, options.component, options.zoom), options.out)
     print(f"wrote {options.out}")
     return OK
 
@@ -187,15 +186,28 @@ def _picture(dataset: Any, path: Path) -> list[Path]:
     """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
     from studies.plots import map_figure
     from studies.reading import one_run
-    from studies.store import appearing
 
     try:
         drawn = map_figure(one_run(dataset), "residual_stress", "xx")
     except StudyError:
         return []
-    with appearing(path) as part:
-        drawn.savefig(part, format="png")
+    _save(drawn, path)
     return [path]
+
+
+def _save(drawn: Any, path: Path) -> None:
+    """Write a figure in the format that the name of the file asks for."""
+    from studies.store import appearing
+
+    kinds = drawn.canvas.get_supported_filetypes()
+    kind = path.suffix.removeprefix(".").lower() or "png"
+    if kind not in kinds:
+        raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
+    try:
+        with appearing(path) as part:
+            drawn.savefig(part, format=kind)
+    except OSError as error:
+        raise StudyError("--out", str(path), f"cannot be written: {error.strerror}") from None
 
 
 def _assignment(text: str) -> tuple[str, str]:
@@ -210,10 +222,14 @@ def _complain(reason: object, status: int) -> int:
     return status
 
 
-def _at_least_one(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be an integer >= 1")
-    return int(text)
+def _integer(least: int, most: int) -> Callable[[str], int]:
+    def checked(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= most:
+            allowed = f"must be an integer >= {least} and <= {most}"
+            raise argparse.ArgumentTypeError(f"{text!r}: {allowed}")
+        return int(text)
+
+    return checked
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -231,7 +247,7 @@ def _parser() -> argparse.ArgumentParser:
     one = add("run", run)
     one.add_argument("study", type=Path, metavar="STUDY.toml")
     one.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
-    one.add_argument("--workers", type=_at_least_one, help="processes (default: one a core)")
+    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one a core)")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
 
@@ -251,7 +267,7 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add("serve", serve)
     one.add_argument("--host", default="127.0.0.1")
-    one.add_argument("--port", type=int, default=8000)
+    one.add_argument("--port", type=_integer(0, 65535), default=8000)
     one.add_argument("--data", type=Path, default=Path("out"), metavar="DIR")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 

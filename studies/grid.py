@@ -16,6 +16,7 @@ from typing import Any, Self
 import dask
 from distributed import Client, Event, Future, KilledWorker, LocalCluster, get_worker
 from distributed.client import FutureCancelledError
+from distributed.comm.addressing import get_address_host_port
 
 from studies.errors import GridLost
 
@@ -76,6 +77,8 @@ class Grid:
         with ExitStack() as opening:
             address = self._scheduler or self._own_workers(opening)
             try:
+                if self._scheduler:
+                    get_address_host_port(self._scheduler)  # a refused client closes badly
                 self._client = opening.enter_context(
                     Client(address, set_as_default=False, timeout=_CONNECT)
                 )

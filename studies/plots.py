@@ -197,7 +197,7 @@ def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
 
 
 def _too_close(zoom: float) -> StudyError:
-    return StudyError("zoom", zoom, "must be larger: it holds fewer than two points")
+    return StudyError("zoom", zoom, "must be a length [mm] that holds two points or more")
 
 
 def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:

@@ -101,6 +101,8 @@ def run_study(
     ------
     StoreBusy
         when another process computes into the same store
+    StudyError
+        when the store cannot be written to
     GridLost
         when the scheduler is gone; the same call computes the rest
     """
@@ -112,7 +114,7 @@ def run_study(
         known = store.catalogue.rows(case.id for case in cases)
         done = {key for key, row in known.items() if resume or row["status"] == layout.OK}
         wanted = {case.id for case in cases} - done
-        store.discard(wanted & known.keys())
+        store.discard(wanted)
         work = _Work(study, store, wanted, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, scheduler, stop)

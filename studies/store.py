@@ -14,6 +14,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import sqlite3
 import uuid
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -25,7 +26,7 @@ import xarray as xr
 
 from studies import dataset as layout
 from studies.catalogue import Catalogue
-from studies.errors import StoreBusy
+from studies.errors import StoreBusy, StudyError
 from studies.identity import is_id
 from studies.study import Study
 
@@ -123,8 +124,16 @@ class Store:
         return len(found)
 
     def reconcile(self) -> None:
-        """Bring the catalogue into line with the files that exist."""
-        found, known = self._files(), self.catalogue.ids()
+        """Bring the catalogue into line with the files that exist and can be read."""
+        try:
+            known = self.catalogue.ids()
+        except sqlite3.OperationalError:  # such as one that is locked: it is none the worse
+            raise
+        except sqlite3.DatabaseError:
+            for damaged in self.directory.glob(f"{self.catalogue.path.name}*"):  # and its journal
+                damaged.unlink()
+            known = set()
+        found = self._files()
         self.catalogue.remove(known - found)
         self.catalogue.put(self.read_row(run_id) for run_id in found - known)
 
@@ -136,9 +145,16 @@ class Store:
         ------
         StoreBusy
             when another process holds it
+        StudyError
+            when it cannot be written to
         """
-        (self.directory / "runs").mkdir(parents=True, exist_ok=True)
-        with (self.directory / ".lock").open("w") as lock:
+        try:
+            (self.directory / "runs").mkdir(parents=True, exist_ok=True)
+            holding = (self.directory / ".lock").open("w")
+        except OSError as error:
+            allowed = f"must be a directory to write in ({error.strerror})"
+            raise StudyError("directory", str(self.directory), allowed) from None
+        with holding as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -149,7 +165,9 @@ class Store:
             yield
 
     def _files(self) -> set[str]:
-        return {path.stem for path in (self.directory / "runs").glob("*.nc") if is_id(path.stem)}
+        """Return the ids of all runs whose file can be read."""
+        found = (self.directory / "runs").glob("*.nc")
+        return {path.stem for path in found if is_id(path.stem) and _opens(path)}
 
 
 @contextmanager
@@ -163,6 +181,15 @@ def appearing(path: Path) -> Iterator[Path]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def _opens(path: Path) -> bool:
+    """Tell whether a file is complete, as far as its head and its length tell."""
+    try:
+        with h5py.File(path, "r"):
+            return True
+    except OSError:
+        return False
 
 
 def _checked(content_id: str) -> str:

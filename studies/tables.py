@@ -89,6 +89,8 @@ def _parameters(dataset: xr.Dataset) -> Mapping[str, Any]:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return json.dumps(value)
     if isinstance(value, float | np.floating):
         return "-" if np.isnan(value) else f"{value:.4g}"
     return "-" if value is None else str(value)

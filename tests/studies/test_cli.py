@@ -90,7 +90,16 @@ def test_bad_input_is_one_line_and_returns_2(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "a.toml", "--workers", "0"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["run"],
+        ["run", "a.toml", "--workers", "0"],
+        ["serve", "--port", "99999"],
+    ],
+)
 def test_a_wrong_command_line_returns_2(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -98,6 +107,18 @@ def test_a_wrong_command_line_returns_2(
         main(arguments)
     assert caught.value.code == 2
     assert "usage: residua" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("inside", ["", "deeper"])
+def test_a_directory_that_cannot_be_written_to_is_one_line_and_returns_2(
+    study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str], inside: str
+) -> None:
+    (tmp_path / "file").touch()
+    out = tmp_path / "file" / inside
+    assert main(["run", str(study_file()), "--out", str(out)]) == 2
+    printed = capsys.readouterr()
+    assert "must be a directory to write in (" in printed.err
+    assert printed.err.count("\n") == 1
 
 
 def test_a_busy_directory_is_one_line_and_returns_1(
@@ -154,7 +175,11 @@ def test_plot_draws_any_field_of_any_run(
         (["--field", "colour"], "must be one of residual_stress, plastic_strain"),
         (["--component", "zz"], "must be one of xx, yy, xy"),
         (["--field", "plastic_strain", "--component", "xx"], "leave it out"),
-        (["--zoom", "0.1"], "must be larger"),
+        (["--zoom", "0.1"], "must be a length"),
+        (["--zoom", "-1"], "must be a length"),
+        (["--zoom", "nan"], "must be a length"),
+        (["--out", "a.xyz"], "--out = 'a.xyz': must end in one of"),
+        (["--out", str(tmp_path / "nowhere" / "a.png")], "cannot be written: No such file"),
     ]:
         assert main([*arguments, *wrong]) == 2
         assert named in capsys.readouterr().err

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from studies import Store, StoreBusy, Study
+from studies import Store, StoreBusy, Study, run_study
 from studies.store import appearing
 from tests.studies.conftest import compute_here, fake_study
 
@@ -145,6 +145,27 @@ def test_the_rebuilt_catalogue_forgets_files_that_are_gone(store: Store) -> None
     store.run_path(gone).unlink()
     assert store.rebuild_catalogue() == 3
     assert store.catalogue.run(gone) is None
+
+
+def test_a_damaged_catalogue_is_made_anew(store: Store) -> None:
+    compute_here(fake_study(), store)
+    rows = store.catalogue.runs()
+    store.catalogue.path.write_text("not a catalogue at all, but long enough to be one" * 20)
+    with store.writing():
+        assert store.catalogue.runs() == rows
+
+
+def test_a_run_cut_short_is_no_run_and_is_computed_again(store: Store) -> None:
+    study = fake_study()
+    first, *others = (case.id for case in study.cases())
+    compute_here(study, store)
+    whole = store.run_path(first).read_bytes()
+    store.run_path(first).write_bytes(whole[: len(whole) // 2])
+    with store.writing():
+        assert store.catalogue.ids() == set(others)
+    outcome = run_study(study, store, workers=1)
+    assert outcome.counts == {"ok": 4}
+    assert outcome.computed == [first]
 
 
 def test_a_reader_sees_whole_transactions_while_a_writer_writes(computed: ComputedStudy) -> None:
