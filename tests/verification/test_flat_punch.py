@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from solver import solve
+from solver.scenes.punch import PunchParameters, model
 from tests.verification.closed_forms import (
     corner_power,
     dundurs_lee_power,
@@ -90,3 +92,12 @@ def test_a_rigid_punch_has_the_closed_pressure_and_the_square_root_singularity(r
 def test_the_error_under_a_rigid_punch_falls_with_refinement(rigid):
     coarse, middle, fine = (rigid_error(punch, 0.05) for punch in rigid)
     assert coarse > middle > fine
+
+
+def test_the_punch_scene_at_its_finest_mesh_has_the_corner_power():
+    """Elements of 1e-5 half-widths whose coordinates are one: rounding must not spoil them."""
+    parameters = PunchParameters(yield_stress=1e6, state="plane_strain", smallest_element=SMALLEST)
+    x, pressure, _ = solve(model(parameters), load=1e-3).contact()
+    r = 1 - x[0] / parameters.half_width
+    near = (r > 10 * SMALLEST) & (r < 3e-3)
+    assert 1 + log_slope(r[near], pressure[near]) == pytest.approx(dundurs_lee_power(), abs=2e-3)

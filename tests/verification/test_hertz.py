@@ -43,7 +43,7 @@ class Contact:
         return self.pressure[0]
 
 
-def press(per_half_width, element="quad8", slave="cylinder", sliding="small"):
+def press(per_half_width, element="quad8", slave="cylinder", sliding="small", load=1.0):
     h = HALF_WIDTH / per_half_width
     fine = np.arange(0.0, 1.5 * HALF_WIDTH + h / 2, h)
     coarse = graded(SIZE - fine[-1], h, 1.3, 10.0)[1:]
@@ -75,7 +75,7 @@ def press(per_half_width, element="quad8", slave="cylinder", sliding="small"):
     sides = {"cylinder": ("cylinder", "bottom"), "plane": ("plane", "top")}
     master = sides["plane" if slave == "cylinder" else "cylinder"]
     pair = ContactPair(slave=sides[slave], master=master, sliding=sliding)
-    solution = solve(Model(bodies=(cylinder, plane), contacts=(pair,)))
+    solution = solve(Model(bodies=(cylinder, plane), contacts=(pair,)), load=load)
     position, pressure, _ = solution.contact()
     order = np.argsort(position[0])
     return Contact(position[0, order], pressure[order], solution)
@@ -137,6 +137,14 @@ def test_it_does_not_matter_which_body_is_the_slave_nor_how_surfaces_are_paired(
     for other in (press(20, slave="plane"), press(20, sliding="finite")):
         assert other.half_width == pytest.approx(meshes[20].half_width, rel=2e-3)
         assert other.peak == pytest.approx(meshes[20].peak, rel=1e-3)
+
+
+def test_contact_grows_with_the_root_of_the_load(meshes):
+    """A quarter of the load, half the width and half the pressure: 10 elements then, 0.5 %."""
+    quarter = press(20, load=0.25)
+    assert quarter.half_width == pytest.approx(EXACT.half_width / 2, rel=5e-3)
+    assert quarter.peak == pytest.approx(EXACT.peak_pressure / 2, rel=2e-3)
+    assert (quarter.pressure[quarter.x > 0.6 * HALF_WIDTH] == 0).all()
 
 
 def test_outer_dimensions_do_not_matter(monkeypatch):
