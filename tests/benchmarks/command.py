@@ -17,10 +17,10 @@ PUNCH_FIGURES = {
         "Punch: what the mesh costs and gives (quad8)",
     ),
     "element": (
-        ("mesh", "quad9", "quad4", "tri6"),
-        "Punch: elements on the same meshes (mesh = quad8)",
+        punch.ELEMENTS,
+        "Punch: elements on the same meshes",
     ),
-    "solver": (("pardiso", "superlu"), "Punch: linear solvers on the same meshes"),
+    "solver": (punch.SOLVERS, "Punch: linear solvers on the same meshes"),
 }
 ALONE = {f"{n} alone": text for n, text in punch.MEASURES.items() if n != "plateau"}
 

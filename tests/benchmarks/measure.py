@@ -12,7 +12,7 @@ import numpy as np
 T = TypeVar("T")
 
 REPEATS = 3
-SHORT = 4.0
+SHORT = 6.0
 """Runs below this many CPU seconds are repeated."""
 
 
