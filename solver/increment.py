@@ -45,6 +45,8 @@ _BLENDS = (0.0, 0.02, 0.1, 0.3, 1.0)
 _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
+_LATE = 5
+"""Iterations after which a step without stiffness tells that the structure flows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +95,7 @@ class Increment:
         origin = self.guess or self.start
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
-        step: _Step | None = None
-        best, since_best = np.inf, 0
+        best, since_best, softest = np.inf, 0, 1.0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
@@ -109,6 +110,8 @@ class Increment:
                 return self._commit(u, responses, candidates, contacts, scale, iteration, error)
             elastic_first = iteration == 0 and self.guess is None
             step = self._step(residuals, responses, candidates, elastic_first)
+            if iteration >= _LATE:
+                softest = min(softest, self._stiffness(step, responses))
             share, u, responses = self._search(u, residuals, candidates, step)
             forces = (1 - share) * candidates.forces + share * step.forces
             contacts = candidates.states(contacts, forces, step.status)
@@ -117,7 +120,7 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._stiffness(step, responses),
+            softest,
         )
 
     # -- 1, 2: where we are ------------------------------------------------------------------
@@ -267,10 +270,8 @@ class Increment:
             blended=self._blended,
         )
 
-    def _stiffness(self, step: _Step | None, responses: Sequence[Response]) -> float:
-        """Return the tangent stiffness along the last step over the elastic one."""
-        if step is None:
-            return 1.0
+    def _stiffness(self, step: _Step, responses: Sequence[Response]) -> float:
+        """Return the tangent stiffness along a step over the elastic one."""
         forms = [
             part.stiffness_along(du, response)
             for part, du, response in zip(self.system.parts, step.u, responses, strict=True)

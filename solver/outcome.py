@@ -58,8 +58,8 @@ class Yielded(SolverError):
 class IncrementFailed(SolverError):
     """The increment did not converge.
 
-    ``stiffness`` is the share of the elastic stiffness that was left along the last step;
-    next to nothing means that the structure flows.
+    ``stiffness`` is the least share of the elastic stiffness left along a late step; next to
+    nothing means that the structure flows.
     """
 
     def __init__(self, message: str, stiffness: float) -> None:
@@ -68,5 +68,5 @@ class IncrementFailed(SolverError):
 
     @property
     def flowing(self) -> bool:
-        """Whether the last step was a plastic mechanism."""
+        """Whether a late step was a plastic mechanism."""
         return self.stiffness < _FLOWING

@@ -57,7 +57,7 @@ class PunchParameters(MaterialParameters):
     )
     elastic_punch: bool = described(False, "whether the punch never yields")
     smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = described(
-        1e-3, "smallest element side, at the corner / a"
+        5e-4, "smallest element side, at the corner / a"
     )
     growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = described(
         1.4, "ratio of neighbouring element sides away from the corner"
