@@ -29,6 +29,7 @@ from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.system import State
+from solver.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,6 +92,10 @@ class Increment:
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
+        with one_thread():
+            return self._iterate()
+
+    def _iterate(self) -> Converged:
         tolerances = self.tolerances
         origin = self.guess or self.start
         u, contacts = origin.u, origin.contacts
