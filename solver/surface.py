@@ -68,8 +68,11 @@ def edges_of(part: Discretisation, boundary: str) -> NDArray[np.int64]:
     facets = part.body.facets(boundary)
     ends = basis.nodal_dofs[0][mesh.facets[:, facets]].T
     start, end = part.X[:, ends[:, 0]], part.X[:, ends[:, 1]]
-    inside = part.X[:, basis.element_dofs[:, mesh.f2t[0, facets]]].mean(axis=1)
-    along, inward = end - start, inside - start
+    corners = mesh.t[:, mesh.f2t[0, facets]]
+    on_edge = (corners[:, None, :] == mesh.facets[None, :, facets]).any(axis=1)
+    position = part.X[:, basis.nodal_dofs[0][corners]]
+    inside = np.where(on_edge, 0.0, position).sum(axis=1) / (~on_edge).sum(axis=0)
+    along, inward = end - start, inside - (start + end) / 2
     reverse = along[0] * inward[1] - along[1] * inward[0] < 0
     ends[reverse] = ends[reverse, ::-1]
     if not basis.facet_dofs.size:

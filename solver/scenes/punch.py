@@ -32,7 +32,6 @@ from solver.scenes.scene import Monitor, Scene
 from solver.system import System
 
 _LARGEST = 0.08  # of a, under the punch
-_HALF_PLANE_LARGEST = 1.0
 _PUNCH_LARGEST = 0.25
 
 
@@ -50,7 +49,7 @@ class PunchParameters(MaterialParameters):
         2.0, "height of the punch / a"
     )
     half_plane_size: Annotated[float, Interval(ge=2.0, le=1000.0), Unit("1")] = described(
-        8.0, "width and depth of the half-plane / a"
+        40.0, "width and depth of the half-plane / a"
     )
     punch_stiffness: Annotated[float, Interval(ge=1e-4, le=1e4), Unit("1")] = described(
         1.0, "Young's modulus of the punch / that of the half-plane"
@@ -80,9 +79,9 @@ def model(parameters: PunchParameters) -> Model:
     )
     size = parameters.half_plane_size * a
     under = a - graded(a, h, growth, _LARGEST * a)[::-1]
-    beyond = a + graded(size - a, h, growth, _HALF_PLANE_LARGEST * a)
+    beyond = a + graded(size - a, h, growth, size / 4)
     up = graded(parameters.punch_height * a, h, growth, _PUNCH_LARGEST * a)
-    down = -graded(size, h, growth, _HALF_PLANE_LARGEST * a)[::-1]
+    down = -graded(size, h, growth, size / 4)[::-1]
     cells = element_type(parameters.element).cells
     punch = Body(
         name="punch",
