@@ -46,7 +46,7 @@ _BLENDS = (0.0, 0.02, 0.1, 0.3, 1.0)
 _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
-_LATE = 5
+_LATE = 1
 """Iterations after which a step without stiffness tells that the structure flows."""
 
 
