@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -23,6 +23,7 @@ from annotated_types import Interval, Unit
 from solver.audit import cut_force
 from solver.body import Body
 from solver.elements import element_type
+from solver.errors import ModelError
 from solver.mesh import graded, grid
 from solver.model import ContactPair, Model
 from solver.path import Branch, Path, PathControl
@@ -32,8 +33,12 @@ from solver.scenes.parameters import Friction, Length, MaterialParameters, Ratio
 from solver.scenes.scene import Monitor, Scene
 from solver.system import System
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 _LARGEST = 0.08  # of a, under the punch
 _PUNCH_LARGEST = 0.25
+_MOST_ELEMENTS = 60_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,19 +75,34 @@ class PunchParameters(MaterialParameters):
     )
     unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(5, "increments of unloading")
 
+    def __post_init__(self) -> None:
+        # zero-argument super() does not see the class that dataclass(slots=True) makes
+        MaterialParameters.__post_init__(self)
+        under, beyond, up, down = (len(nodes) for nodes in _nodes(self))
+        elements = under * up + (under + beyond) * down
+        if elements > _MOST_ELEMENTS:
+            raise ModelError(
+                "smallest_element", self.smallest_element,
+                f"makes {elements} elements with growth {self.growth:g}; at most "
+                f"{_MOST_ELEMENTS} are allowed: grow faster or start larger",
+            )  # fmt: skip
 
-def model(parameters: PunchParameters) -> Model:
-    """Return the half model: bodies, supports, pressure and contact."""
-    a, h, growth = (
-        parameters.half_width,
-        parameters.smallest_element * parameters.half_width,
-        parameters.growth,
-    )
+
+def _nodes(parameters: PunchParameters) -> tuple[NDArray[np.float64], ...]:
+    """Return node positions under the punch, beyond it, up the punch and down below [mm]."""
+    a, growth = parameters.half_width, parameters.growth
+    h = parameters.smallest_element * a
     size = parameters.half_plane_size * a
     under = a - graded(a, h, growth, _LARGEST * a)[::-1]
     beyond = a + graded(size - a, h, growth, size / 4)
     up = graded(parameters.punch_height * a, h, growth, _PUNCH_LARGEST * a)
     down = -graded(size, h, growth, size / 4)[::-1]
+    return under, beyond, up, down
+
+
+def model(parameters: PunchParameters) -> Model:
+    """Return the half model: bodies, supports, pressure and contact."""
+    under, beyond, up, down = _nodes(parameters)
     cells = element_type(parameters.element).cells
     punch = Body(
         name="punch",
