@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -90,12 +91,22 @@ class PunchParameters(MaterialParameters):
 
 def _nodes(parameters: PunchParameters) -> tuple[NDArray[np.float64], ...]:
     """Return node positions under the punch, beyond it, up the punch and down below [mm]."""
-    a, growth = parameters.half_width, parameters.growth
-    h = parameters.smallest_element * a
-    size = parameters.half_plane_size * a
+    return _graded_nodes(
+        parameters.half_width,
+        parameters.smallest_element * parameters.half_width,
+        parameters.growth,
+        parameters.half_plane_size * parameters.half_width,
+        parameters.punch_height * parameters.half_width,
+    )
+
+
+@lru_cache(maxsize=32)
+def _graded_nodes(
+    a: float, h: float, growth: float, size: float, height: float
+) -> tuple[NDArray[np.float64], ...]:
     under = a - graded(a, h, growth, _LARGEST * a)[::-1]
     beyond = a + graded(size - a, h, growth, size / 4)
-    up = graded(parameters.punch_height * a, h, growth, _PUNCH_LARGEST * a)
+    up = graded(height, h, growth, _PUNCH_LARGEST * a)
     down = -graded(size, h, growth, size / 4)[::-1]
     return under, beyond, up, down
 
