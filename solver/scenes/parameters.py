@@ -7,6 +7,7 @@ import operator
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
@@ -60,27 +61,37 @@ class MaterialParameters:
 
 def check(parameters: Any) -> None:
     """Raise `ModelError` for the first field that breaks its annotation."""
-    hints = typing.get_type_hints(type(parameters), include_extras=True)
-    for item in fields(parameters):
-        value, hint = getattr(parameters, item.name), hints[item.name]
-        if typing.get_origin(hint) is Literal:
-            choices = typing.get_args(hint)
+    for name, kind, choices, bounds in _rules(type(parameters)):
+        value = getattr(parameters, name)
+        if choices:
             if value not in choices:
-                raise ModelError(item.name, value, "must be one of " + ", ".join(choices))
+                raise ModelError(name, value, "must be one of " + ", ".join(choices))
             continue
-        kind, *limits = typing.get_args(hint) or (hint,)
         if kind is bool:
             if not isinstance(value, bool):
-                raise ModelError(item.name, value, "must be true or false")
+                raise ModelError(name, value, "must be true or false")
             continue
         wanted = "an integer" if kind is int else "a number"
         number = isinstance(value, int if kind is int else (int, float))
         if isinstance(value, bool) or not number or not math.isfinite(value):
-            raise ModelError(item.name, value, f"must be {wanted}")
-        bounds = [bound for limit in limits for bound in _bounds(limit)]
+            raise ModelError(name, value, f"must be {wanted}")
         if not all(_holds(bound, value) for bound in bounds):
             allowed = " and ".join(_words(bound) for bound in bounds)
-            raise ModelError(item.name, value, "must be " + allowed)
+            raise ModelError(name, value, "must be " + allowed)
+
+
+@cache
+def _rules(kind: type[Any]) -> tuple[tuple[str, Any, tuple[str, ...], tuple[Any, ...]], ...]:
+    """Return name, type, permitted words and bounds of every field."""
+    rules = []
+    hints = typing.get_type_hints(kind, include_extras=True)
+    for item in fields(kind):
+        hint = hints[item.name]
+        words = typing.get_args(hint) if typing.get_origin(hint) is Literal else ()
+        of, *limits = (str,) if words else typing.get_args(hint) or (hint,)
+        bounds = tuple(bound for limit in limits for bound in _bounds(limit))
+        rules.append((item.name, of, words, bounds))
+    return tuple(rules)
 
 
 def _bounds(limit: Any) -> list[Any]:
