@@ -61,7 +61,7 @@ class MaterialParameters:
 
 def check(parameters: Any) -> None:
     """Raise `ModelError` for the first field that breaks its annotation."""
-    for name, kind, choices, bounds in _rules(type(parameters)):
+    for name, kind, choices, bounds in _rules(parameters.__class__):
         value = getattr(parameters, name)
         if choices:
             if value not in choices:
@@ -81,7 +81,7 @@ def check(parameters: Any) -> None:
 
 
 @cache
-def _rules(kind: type[Any]) -> tuple[tuple[str, Any, tuple[str, ...], tuple[Any, ...]], ...]:
+def _rules(kind: Any) -> tuple[tuple[str, Any, tuple[str, ...], tuple[Any, ...]], ...]:
     """Return name, type, permitted words and bounds of every field."""
     rules = []
     hints = typing.get_type_hints(kind, include_extras=True)
