@@ -20,7 +20,7 @@ from service.limits import BodyLimit
 from service.lock import DirectoryInUse, lock_directory
 from service.runner import Runner
 from service.settings import Settings
-from service.store import open_store
+from studies import Store
 
 DESCRIPTION = """Elastic-plastic contact studies: post one, watch it, fetch its data set.
 
@@ -56,7 +56,7 @@ def create_app(settings: Settings) -> FastAPI:
         responses=errors.ANSWERS,
     )
     app.state.settings = settings
-    app.state.store = open_store(settings.data)
+    app.state.store = Store(settings.data)
     app.state.jobs = Jobs(settings.data / "jobs.sqlite")
     app.state.runner = Runner(settings, app.state.jobs, lock)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)

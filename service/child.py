@@ -17,11 +17,9 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, TextIO
 
-from service.store import open_store
-from studies import GridLost, StoreBusy, Study, StudyError, run_study
+from studies import GridLost, Store, StoreBusy, Study, StudyError, run_study
 
 STDIN = 0
 
@@ -87,7 +85,7 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         return
     outcome = run_study(
         study,
-        open_store(Path(order["data"])),
+        Store(order["data"]),
         workers=order["workers"],
         scheduler=order["scheduler"],
         resume=not order["again"],

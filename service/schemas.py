@@ -95,7 +95,7 @@ class Run(BaseModel):
     status: str
     message: str
     parameters: dict[str, Any]
-    scalars: dict[str, float | None] = Field(description="the figures of the run")
+    scalars: dict[str, int | float | None] = Field(description="the figures of the run")
     created: str
     cpu_seconds: float | None
 

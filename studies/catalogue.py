@@ -1,8 +1,10 @@
 """The catalogue: every run of a directory in one table that can be queried.
 
 The process that computes is the only writer. Readers, in other threads or processes, open
-their own short connections. The journal is SQLite's rollback journal: unlike the write-ahead
-log it needs no memory shared between machines, so the directory may lie on a network volume.
+their own short connections. They may write, for one reason: the first to come after a writer was
+killed undoes what that left half done. The journal is SQLite's rollback journal: unlike the
+write-ahead log it needs no memory shared between machines, so the directory may lie on a network
+volume.
 """
 
 from __future__ import annotations
@@ -22,14 +24,11 @@ _JSON = ("parameters", "scalars")
 _WAIT = 30.0
 """Seconds a connection waits for another one's lock."""
 
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS runs (
+_TABLE = """runs (
     id TEXT PRIMARY KEY, scene TEXT NOT NULL, status TEXT NOT NULL, message TEXT NOT NULL,
     parameters TEXT NOT NULL, scalars TEXT NOT NULL, path TEXT NOT NULL, created TEXT NOT NULL,
     cpu_seconds REAL, solver_source TEXT NOT NULL
-);
-CREATE INDEX IF NOT EXISTS runs_by_scene ON runs (scene, status);
-"""
+)"""
 
 Row = dict[str, Any]
 
@@ -47,8 +46,7 @@ class Catalogue:
 
     def run(self, run_id: str) -> Row | None:
         """Return the row of one run, or None."""
-        rows = self._select("WHERE id = ?", [run_id])
-        return rows[0] if rows else None
+        return self.rows([run_id]).get(run_id)
 
     def runs(
         self,
@@ -74,18 +72,19 @@ class Catalogue:
             values += [f"$.{json.dumps(name)}", value]
         where = f"WHERE {' AND '.join(clauses)}" if clauses else ""
         with self._reading() as connection:
-            if connection is None:
-                return [], 0
             (total,) = connection.execute(f"SELECT count(*) FROM runs {where}", values).fetchone()
-        page = self._select(
-            f"{where} ORDER BY created, id LIMIT ? OFFSET ?", [*values, limit, offset]
-        )
+            page = _select(
+                connection,
+                f"{where} ORDER BY created, id LIMIT ? OFFSET ?",
+                [*values, limit, offset],
+            )
         return page, total
 
     def rows(self, run_ids: Iterable[str]) -> dict[str, Row]:
         """Return, by id, the rows of those of `run_ids` that are known."""
         wanted = json.dumps(list(run_ids))
-        found = self._select("WHERE id IN (SELECT value FROM json_each(?))", [wanted])
+        with self._reading() as connection:
+            found = _select(connection, "WHERE id IN (SELECT value FROM json_each(?))", [wanted])
         return {row["id"]: row for row in found}
 
     def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
@@ -103,32 +102,39 @@ class Catalogue:
     def ids(self) -> set[str]:
         """Return the ids of all runs."""
         with self._reading() as connection:
-            if connection is None:
-                return set()
             return {row[0] for row in connection.execute("SELECT id FROM runs")}
 
-    def _select(self, rest: str, values: list[Any]) -> list[Row]:
-        with self._reading() as connection:
-            if connection is None:
-                return []
-            found = connection.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs {rest}", values)
-            return [_row(row) for row in found]
-
     @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection | None]:
-        if not self.path.exists():
-            yield None
-            return
-        address = f"{self.path.resolve().as_uri()}?mode=ro"
-        with closing(sqlite3.connect(address, uri=True, timeout=_WAIT)) as connection:
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        """Give a connection that sees one state; nothing written yet is a table without rows."""
+        there = self.path.exists()
+        address = f"{self.path.resolve().as_uri()}?mode=rw" if there else ":memory:"
+        with _connection(address, "BEGIN") as connection:
+            tables = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'runs'")
+            if tables.fetchone() is None:
+                connection.execute(f"CREATE TEMP TABLE {_TABLE}")
             yield connection
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        with closing(sqlite3.connect(self.path, timeout=_WAIT)) as connection:
-            connection.executescript(_SCHEMA)
-            with connection:
-                yield connection
+        """Give a connection whose changes, the table itself included, come at once or never."""
+        with _connection(self.path.resolve().as_uri(), "BEGIN IMMEDIATE") as connection, connection:
+            connection.execute(f"CREATE TABLE IF NOT EXISTS {_TABLE}")
+            connection.execute("CREATE INDEX IF NOT EXISTS runs_by_scene ON runs (scene, status)")
+            yield connection
+
+
+@contextmanager
+def _connection(address: str, begin: str) -> Iterator[sqlite3.Connection]:
+    connection = sqlite3.connect(address, uri=True, timeout=_WAIT, isolation_level=None)
+    with closing(connection):
+        connection.execute(begin)
+        yield connection
+
+
+def _select(connection: sqlite3.Connection, rest: str, values: list[Any]) -> list[Row]:
+    found = connection.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs {rest}", values)
+    return [_row(row) for row in found]
 
 
 def _stored(row: Mapping[str, Any], column: str) -> Any:

@@ -13,7 +13,6 @@ from typing import Any
 import psutil
 
 from service.jobs import Jobs
-from service.store import open_store
 from studies import open_netcdf
 from tests.architecture.sources import ROOT
 from tests.service.servers import PROGRAM, Server, environment, fake_study, free_port, wait_until
@@ -134,25 +133,6 @@ def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:
     assert "post it again" in mortal.finished("a" * 32)["message"]
     refused = mortal.finished("c" * 32)
     assert refused["status"] == "failed" and "parameters.gone" in refused["message"]
-
-
-INTERRUPTED_WRITER = """
-import os, sqlite3, sys
-connection = sqlite3.connect(sys.argv[1])
-connection.execute("PRAGMA cache_size = 1")
-connection.execute("BEGIN")
-for number in range(1000):
-    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, ""]
-    connection.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
-os._exit(9)
-"""
-
-
-def test_a_catalogue_whose_writer_was_killed_can_be_read(tmp_path: Path) -> None:
-    catalogue = open_store(tmp_path).catalogue
-    subprocess.run([sys.executable, "-c", INTERRUPTED_WRITER, catalogue.path], check=False)
-    assert catalogue.path.with_name(f"{catalogue.path.name}-journal").exists()
-    assert open_store(tmp_path).catalogue.runs() == ([], 0)
 
 
 def refusal(data: Path, **settings: str) -> str:
