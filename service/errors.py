@@ -113,23 +113,20 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     """Return field, value and what is allowed for each error FastAPI found."""
     errors = []
     for error in exc.errors():
-        broken = error["type"] == "json_invalid"
-        errors.append(
-            {
-                "field": "body" if broken else dotted(error["loc"]),
-                "value": None if broken else shown(error.get("input")),
-                "allowed": f"valid JSON ({error['ctx']['error']} at character {error['loc'][-1]})"
-                if broken
-                else error["msg"],
-            }
-        )
+        field, value, allowed = dotted(error["loc"]), shown(error.get("input")), error["msg"]
+        if error["type"] == "json_invalid":
+            reason = f"{error['ctx']['error']} at character {error['loc'][-1]}"
+            field, value, allowed = "body", None, f"valid JSON ({reason})"
+        elif field == "body":
+            allowed = "a JSON object, sent with the header content-type: application/json"
+        errors.append({"field": field, "value": value, "allowed": allowed})
     return errors
 
 
 def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field."""
-    error = {"field": exc.field, "value": shown(exc.value), "allowed": exc.allowed}
-    detail = f"{exc.field}: {exc.allowed}"
+    error = {"field": shown(exc.field), "value": shown(exc.value), "allowed": exc.allowed}
+    detail = f"{error['field']}: {exc.allowed}"
     return problem(request, status_of(exc), detail, [error])
 
 
@@ -150,7 +147,11 @@ def on_plain_error(request: Request, exc: NotFound | Conflict) -> Problem:
 def on_http_error(request: Request, exc: HTTPException) -> Problem:
     """Answer what the framework refuses itself: unknown paths, methods, large bodies."""
     headers = dict(exc.headers) if exc.headers else None
-    return problem(request, HTTPStatus(exc.status_code), exc.detail, headers=headers)
+    status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
+    if status is HTTPStatus.BAD_REQUEST:  # a body that Python's JSON reader gave up
+        allowed = f"JSON that can be read ({exc.__cause__ or exc.detail})"
+        detail, errors = f"body: {allowed}", [{"field": "body", "value": None, "allowed": allowed}]
+    return problem(request, status, detail, errors, headers)
 
 
 def on_unexpected(request: Request, exc: Exception) -> Problem:

@@ -16,6 +16,7 @@ class StudyError(ValueError):
     """
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
+        field = field.encode("utf-8", "backslashreplace").decode()  # JSON may hold lone surrogates
         super().__init__(f"{field} = {reprlib.repr(value)}: {allowed}")
         self.field = field
         self.value = value

@@ -7,20 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.servers import Server
+from tests.service.servers import Server, worker_elsewhere
 
 
 @pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """One running service for all tests that leave it running."""
-    server = Server(tmp_path_factory.mktemp("service")).start()
-    yield server
-    server.close()
+    """One running service for all tests that leave it running; its worker stays between studies."""
+    home = tmp_path_factory.mktemp("service")
+    with worker_elsewhere(home) as address:
+        server = Server(home, settings={"RESIDUA_SCHEDULER": address}).start()
+        yield server
+        server.close()
 
 
 @pytest.fixture
 def mortal(tmp_path: Path) -> Iterator[Server]:
-    """A service of the test's own, to be stopped and killed; not started yet."""
-    server = Server(tmp_path / "mortal", workers=2)
+    """A service of the test's own with its own workers, to be killed; not started yet."""
+    server = Server(tmp_path / "mortal")
     yield server
     server.close()

@@ -8,7 +8,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,9 @@ STARTUP = Path(__file__).with_name("startup")
 PROGRAM = (
     "import sys; from service.app import serve; serve('127.0.0.1', int(sys.argv[1]), sys.argv[2])"
 )
+
+COARSE_PUNCH = {"smallest_element": 0.05, "growth": 2.5, "half_plane_size": 4}
+"""Parameters that make a run of the punch a matter of a second."""
 
 
 def environment(log: Path) -> dict[str, str]:
@@ -48,6 +52,34 @@ def wait_until(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.1)
     return answer
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process that may have ended."""
+    process.terminate()
+    process.wait(timeout=30.0)
+
+
+@contextmanager
+def worker_elsewhere(home: Path) -> Iterator[str]:
+    """Run a scheduler with one worker in ``home``, and give its address."""
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", str(port)]
+    worker = ["worker", address, "--nthreads", "1", "--local-directory", str(home)]
+    with ExitStack() as stack:
+        log = stack.enter_context((home / "dask.log").open("ab"))
+        for words in (scheduler, worker):
+            process = subprocess.Popen(
+                [sys.executable, "-m", "dask", *words, "--dashboard-address", "127.0.0.1:0"],
+                cwd=home,
+                env=environment(home / "computed.log"),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+            )
+            stack.callback(end, process)
+        yield address
 
 
 @dataclass

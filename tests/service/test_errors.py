@@ -57,6 +57,9 @@ def changed(**parts: Any) -> dict[str, Any]:
         (changed(name="\ud800"), "name", "\ud800"),
         (changed(name=7), "name", 7),
         (changed(colour="red"), "colour", "red"),
+        (changed(parameters={"\ud800": 1}), "parameters.\\ud800", 1),
+        (changed(sweep={"\ud800": [1]}), "sweep.\\ud800", "[1]"),
+        (changed(**{"\ud800": 1}), "\\ud800", 1),
         (
             changed(parameters={"behaviour": "limit"}, sweep={"friction": [0.5, 1.0]}),
             "sweep.friction[1]",
@@ -96,23 +99,38 @@ def test_a_sweep_of_a_thousand_million_points_is_refused_before_it_is_expanded(
 
 @pytest.mark.parametrize(
     "body",
-    [b"{", b"", b'{"name": "a",}', b"\xff\xfe", b"[" * 100_000, b"9" * 10_000],
-    ids=["open", "empty", "comma", "bytes", "deep", "digits"],
+    [b"{", b'{"name": "a",}', b"\xff\xfe", b"[" * 100_000, b"9" * 10_000, b"\x1f\x8b"],
+    ids=["open", "comma", "bytes", "deep", "digits", "packed"],
 )
 def test_a_body_that_is_not_json_is_refused(service: Server, body: bytes) -> None:
     answer = service.client.post("/studies", content=body, headers=JSON)
-    assert answer.status_code in (400, 422)
-    document = problem(answer, answer.status_code)
-    assert "body" in document["detail"]
+    (error,) = problem(answer, 400)["errors"]
+    assert error["field"] == "body" and "JSON" in error["allowed"]
 
 
-@pytest.mark.parametrize("body", [[], "text", 3, None])
-def test_a_body_that_is_no_table_is_refused(service: Server, body: Any) -> None:
-    problem(service.client.post("/studies", json=body), 422)
+@pytest.mark.parametrize("body", [b"", b"[]", b'"text"', b"3", b"null"])
+def test_a_body_that_is_no_table_is_refused(service: Server, body: bytes) -> None:
+    answer = service.client.post("/studies", content=body, headers=JSON)
+    (error,) = problem(answer, 422)["errors"]
+    assert error["field"] == "body" and "JSON object" in error["allowed"]
 
 
-def test_a_form_is_refused(service: Server) -> None:
-    problem(service.client.post("/studies", data={"name": "a"}), 422)
+@pytest.mark.parametrize(
+    "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", "?"]
+)
+def test_a_study_sent_as_something_else_is_told_its_content_type(
+    service: Server, kind: str
+) -> None:
+    body = json.dumps(fake_study("form")).encode()
+    answer = service.client.post("/studies", content=body, headers={"content-type": kind})
+    (error,) = problem(answer, 422)["errors"]
+    assert "application/json" in error["allowed"]
+
+
+def test_the_name_of_a_field_is_shown_at_a_readable_length(service: Server) -> None:
+    answer = service.client.post("/studies", json=changed(parameters={"k" * 100_000: 1}))
+    (error,) = problem(answer, 422)["errors"]
+    assert error["field"].startswith("parameters.kkk") and len(answer.content) < 3000
 
 
 @pytest.mark.parametrize(
