@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sqlite3
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -20,7 +21,7 @@ from service.limits import BodyLimit
 from service.lock import DirectoryInUse, lock_directory
 from service.runner import Runner
 from service.settings import Settings
-from studies import Store
+from studies import Store, StoreBusy, StudyError
 
 DESCRIPTION = """Elastic-plastic contact studies: post one, watch it, fetch its data set.
 
@@ -56,7 +57,7 @@ def create_app(settings: Settings) -> FastAPI:
         responses=errors.ANSWERS,
     )
     app.state.settings = settings
-    app.state.store = Store(settings.data)
+    app.state.store = open_store(settings.data)
     app.state.jobs = Jobs(settings.data / "jobs.sqlite")
     app.state.runner = Runner(settings, app.state.jobs, lock)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
@@ -64,6 +65,15 @@ def create_app(settings: Settings) -> FastAPI:
     for router in routes.ROUTERS:
         app.include_router(router)
     return app
+
+
+def open_store(directory: Path) -> Store:
+    """Return the store in ``directory``, its catalogue in line with the runs that are there."""
+    store = Store(directory)
+    # Whoever computes here without the service has just done the same.
+    with contextlib.suppress(StoreBusy), store.writing():
+        pass
+    return store
 
 
 def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) -> None:
@@ -82,8 +92,10 @@ def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) 
         first = error.errors()[0]
         name = f"RESIDUA_{first['loc'][0]}".upper()
         refuse(f"{name} = {first['input']!r}: {first['msg']}")
-    except DirectoryInUse as error:
+    except (DirectoryInUse, StudyError) as error:
         refuse(str(error))
+    except sqlite3.DatabaseError as error:
+        refuse(f"data = {str(data)!r}: its jobs.sqlite cannot be used ({error})")
     except OSError as error:
         refuse(f"data = {str(data)!r}: must be a directory to write in ({error.strerror})")
     uvicorn.run(

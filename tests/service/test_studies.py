@@ -88,6 +88,28 @@ def test_the_data_set_arrives_as_it_was_stored(
     assert (part.status_code, part.content) == (206, answer.content[:8])
 
 
+@pytest.mark.parametrize(
+    "part", ["bytes=5-2", "bytes=a-b", "lines=1-2", "bytes=0-" + "9" * 5000, "bytes=0-1,3-4"]
+)
+def test_a_part_that_makes_no_sense_is_answered_by_the_whole(
+    service: Server, done: dict[str, Any], part: str
+) -> None:
+    url = f"/studies/{done['id']}/dataset.nc"
+    answer = service.client.get(url, headers={"range": part})
+    assert answer.status_code == 200
+    assert answer.content == service.client.get(url).content
+
+
+def test_a_part_beyond_the_end_is_refused_with_the_length(
+    service: Server, done: dict[str, Any]
+) -> None:
+    url = f"/studies/{done['id']}/dataset.nc"
+    answer = service.client.get(url, headers={"range": "bytes=999999999-"})
+    assert answer.status_code == 416
+    size = service.client.head(url).headers["content-length"]
+    assert answer.headers["content-range"] == f"bytes */{size}"
+
+
 def test_events_tell_the_story_to_its_end(service: Server) -> None:
     study_id = service.post(fake_study("story", seconds=0.3))
     with service.client.stream("GET", f"/studies/{study_id}/events") as stream:
