@@ -12,10 +12,11 @@ from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
 from solver.material import Material
 from solver.model import ContactPair, Model
 from solver.outcome import Tolerances
-from solver.path import Branch, Path, PathControl
+from solver.path import Branch, Path
 from solver.record import Record, Status
 from solver.scenes import SCENES, Scene
 from solver.solution import Solution, solve
+from solver.stepper import PathControl
 from solver.system import System
 
 __version__ = "0.1.0"

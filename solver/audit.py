@@ -118,7 +118,7 @@ def audit(
                 worst = max(worst, float(f.max()) / material.yield_stress)
     for k, interface in enumerate(system.interfaces):
         tangential = np.abs(contact_pressure(system, state, k)[1])
-        for number, _ in interface.sides:
+        for number, _, _ in interface.sides:
             material = system.parts[number].body.material
             if not material.elastic:
                 strength = material.yield_stress + material.plastic_modulus * float(

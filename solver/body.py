@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from skfem import Mesh
 
     from solver.material import Material
+    from solver.motion import Axle, TravellingPressure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,6 +37,8 @@ class Body:
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
     pressure : boundary name -> pressure at load factor one, positive when pushing [MPa]
     condense : reduce the body to its contact surfaces where its material is elastic
+    axle : makes an elastic body a wheel; its supports then hold it to the hub
+    travelling : a pressure that moves along a boundary; load factors then are times
     """
 
     name: str
@@ -48,6 +51,8 @@ class Body:
     supports: Mapping[str, str] = field(default_factory=dict)
     pressure: Mapping[str, float] = field(default_factory=dict)
     condense: bool = True
+    axle: Axle | None = None
+    travelling: TravellingPressure | None = None
 
     def __post_init__(self) -> None:
         if self.state not in STATES:
@@ -68,6 +73,10 @@ class Body:
         for boundary, held in self.supports.items():
             if held not in ("x", "y", "xy"):
                 raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
+        if self.axle is not None and not self.material.elastic:
+            raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
+        if self.travelling is not None:
+            self.facets(self.travelling.boundary, "travelling")
         for boundary, value in self.pressure.items():
             if not np.isfinite(value):
                 raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")

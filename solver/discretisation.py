@@ -13,7 +13,8 @@ from solver import kinematics
 from solver.constitutive import PlasticState, Response, elastic_stiffness, respond
 from solver.elements import element_type
 from solver.operators import Operators
-from solver.surface import pressure_forces
+from solver.part import Part
+from solver.surface import pressure_forces, travelling_forces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +30,7 @@ def choose_pins(rigid: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[
     return np.setdiff1d(free, free[pivots[: rigid.shape[1]]])
 
 
-class Discretisation:
+class Discretisation(Part):
     """Unknowns, quadrature and constant operators of one body.
 
     Unknowns are numbered node by node: ``2 * node`` is x, ``2 * node + 1`` is y. Points are
@@ -103,6 +104,12 @@ class Discretisation:
         """Return the operators of this part."""
         return Operators(self, linear_solver)
 
+    def external(self, load: float) -> NDArray[np.float64]:
+        """Return the external nodal forces (n,) at a load factor or time [N]."""
+        if self.body.travelling is None:
+            return load * self.load
+        return travelling_forces(self, self.body.travelling, load)
+
     # -- the law at all points ---------------------------------------------------------------
 
     def virgin(self) -> PlasticState:
@@ -130,7 +137,7 @@ class Discretisation:
     ) -> NDArray[np.float64]:
         """Return external minus internal forces (n,), contact forces left out [N]."""
         del u
-        return load * self.load - self.internal_force(response.stress)
+        return self.external(load) - self.internal_force(response.stress)
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return the tangent and the elastic quadratic form of a step [N mm]."""

@@ -78,6 +78,7 @@ class Increment:
         *,
         guess: State | None = None,
         contact: bool = True,
+        elastic_first: bool = True,
         elastic_only: bool = False,
         tolerances: Tolerances | None = None,
     ) -> None:
@@ -86,6 +87,7 @@ class Increment:
         self.load = load
         self.guess = guess
         self.contact = contact
+        self.elastic_first = elastic_first
         self.elastic_only = elastic_only
         self.tolerances = tolerances or Tolerances()
         self._pivoted = 0
@@ -112,9 +114,9 @@ class Increment:
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
-            if balanced and candidates.beyond >= 0 and (iteration or not self.load):
+            if balanced and candidates.beyond >= 0:
                 return self._commit(u, responses, candidates, contacts, scale, iteration, error)
-            elastic_first = iteration == 0 and self.guess is None
+            elastic_first = iteration == 0 and self.elastic_first
             step = self._step(residuals, responses, candidates, elastic_first)
             if iteration >= _LATE:
                 softest = min(softest, self._stiffness(step, responses))
@@ -159,7 +161,7 @@ class Increment:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
         inner = self._on_parts(candidates, candidates.forces)
-        level = _norm([self.load * part.load for part in parts]) + _norm(inner)
+        level = _norm([part.external(self.load) for part in parts]) + _norm(inner)
         scale = max(self.start.force_scale, level)
         if scale == 0:
             return 0.0, 0.0, 0.0

@@ -11,7 +11,8 @@ from solver.audit import Audit, audit, contact_pressure
 from solver.errors import ModelError
 from solver.fields import recovery
 from solver.kinematics import to_tensor
-from solver.path import Path, PathControl, Tally
+from solver.path import Path
+from solver.stepper import PathControl, Tally
 from solver.system import System
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from solver import linear
 from solver.constitutive import PlasticState, Response
 from solver.discretisation import choose_pins
 from solver.operators import Dense, Fixed
+from solver.part import Part
 from solver.surface import Surface
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class _Condensed:
         return full
 
 
-class Substructure:
+class Substructure(Part):
     """A part with the unknowns of its contact surfaces alone.
 
     It offers what a `Discretisation` offers to an increment; ``whole`` is the meshed body.
@@ -110,7 +111,7 @@ class Substructure:
     ) -> NDArray[np.float64]:
         """Return external minus internal forces (n,) [N]."""
         del response
-        return load * self.load - self._condensed.stiffness @ u
+        return self.external(load) - self._condensed.stiffness @ u
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return the tangent and the elastic quadratic form of a step [N mm]."""

@@ -10,9 +10,12 @@ import numpy as np
 from solver.errors import ModelError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from solver.discretisation import Discretisation
+    from solver.motion import TravellingPressure
 
 
 def shape_functions(xi: NDArray[np.float64], count: int) -> NDArray[np.float64]:
@@ -100,13 +103,32 @@ def extract(part: Discretisation, boundary: str) -> Surface:
 
 def pressure_forces(part: Discretisation, boundary: str, pressure: float) -> NDArray[np.float64]:
     """Return the nodal forces (n,) of a pressure on a boundary, positive when pushing [N]."""
+    return _tractions(part, boundary, lambda x: (np.full(x.shape[1], pressure), 0.0), 4)
+
+
+def travelling_forces(
+    part: Discretisation, travelling: TravellingPressure, time: float
+) -> NDArray[np.float64]:
+    """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
+    return _tractions(part, travelling.boundary, lambda x: travelling.at(time, x[0]), 8)
+
+
+def _tractions(
+    part: Discretisation,
+    boundary: str,
+    traction: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], float]],
+    points: int,
+) -> NDArray[np.float64]:
+    """Integrate a pressure and a shear, a multiple of it against the edges' direction."""
     edges = edges_of(part, boundary)
     X = part.X[:, edges]
     force = np.zeros((2, part.X.shape[1]))
-    for xi, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True):
+    for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
         N = shape_functions(np.array(xi), edges.shape[1])
         t = X @ shape_derivatives(np.array(xi), edges.shape[1])
-        push = -pressure * weight * np.stack([t[1], -t[0]]) * part.measure(X @ N)
+        pressure, ratio = traction(X @ N)
+        direction = np.stack([-t[1], t[0]]) - ratio * t
+        push = weight * pressure * direction * part.measure(X @ N)
         for k, value in enumerate(N):
             for component in (0, 1):
                 np.add.at(force[component], edges[:, k], push[component] * value)

@@ -15,6 +15,7 @@ from solver.contact.geometry import Pairing, pair
 from solver.discretisation import Discretisation
 from solver.errors import ModelError
 from solver.substructure import Substructure
+from solver.wheel import Wheel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,27 +66,27 @@ class Interface:
     slave_surface: Surface
     master_surface: Surface
     friction: float
+    parts: tuple[Part, Part]
     reference: Pairing | None
 
     @property
-    def sides(self) -> tuple[tuple[int, Surface], tuple[int, Surface]]:
-        """Slave and master: part number and surface."""
-        return (self.slave, self.slave_surface), (self.master, self.master_surface)
+    def sides(self) -> tuple[tuple[int, Part, Surface], tuple[int, Part, Surface]]:
+        """Slave and master: number, part and surface."""
+        return (
+            (self.slave, self.parts[0], self.slave_surface),
+            (self.master, self.parts[1], self.master_surface),
+        )
 
     def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
         """Return gap, area and derivative rows at displacements ``u``."""
-        slave, master = u[self.slave], u[self.master]
+        motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
         if self.reference is not None:
-            on_slave, on_master = self.reference.normal
-            change = on_slave @ slave[self.slave_surface.dofs]
-            change += on_master @ master[self.master_surface.dofs]
+            change = sum(
+                block @ motion.T.ravel()
+                for block, motion in zip(self.reference.normal, motions, strict=True)
+            )
             return replace(self.reference, gap=self.reference.gap + change)
-        return pair(
-            self.slave_surface,
-            slave[self.slave_surface.dofs].reshape(-1, 2).T,
-            self.master_surface,
-            master[self.master_surface.dofs].reshape(-1, 2).T,
-        )
+        return pair(self.slave_surface, motions[0], self.master_surface, motions[1])
 
 
 Part = Discretisation | Substructure
@@ -102,6 +103,8 @@ def _surfaces(model: Model) -> dict[tuple[str, str], Surface]:
 
 def _part(body: Body, surfaces: dict[tuple[str, str], Surface], linear_solver: str) -> Part:
     own = [chain for (name, _), chain in surfaces.items() if name == body.name]
+    if body.axle is not None:
+        return Wheel(body.discretisation, own, linear_solver)
     if body.material.elastic and body.condense and own:
         return Substructure(body.discretisation, own, linear_solver)
     return body.discretisation
@@ -123,7 +126,10 @@ def _interface(
     if contact.sliding == "small":
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
         reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1])
-    return Interface(slave, master, slave_surface, master_surface, contact.friction, reference)
+    both = (parts[slave], parts[master])
+    return Interface(
+        slave, master, slave_surface, master_surface, contact.friction, both, reference
+    )
 
 
 class System:
@@ -149,12 +155,13 @@ class System:
         ends = np.cumsum(sizes)
         rows = []
         for interface in self.interfaces:
-            pairing = interface.pairing(tuple(np.zeros(part.n) for part in self.parts))
+            pairing = interface.pairing(tuple(part.start() for part in self.parts))
             for kind in (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]:
                 A = np.zeros((len(pairing.area), ends[-1]))
-                for (number, chain), block in zip(interface.sides, kind, strict=True):
+                for (number, part, chain), block in zip(interface.sides, kind, strict=True):
                     columns = slice(ends[number] - sizes[number], ends[number])
-                    A[:, columns] += block @ self.parts[number].rigid[chain.dofs]
+                    dofs, rows_of = part.pull_back(chain, part.start(), block)
+                    A[:, columns] += rows_of @ part.rigid[dofs]
                 rows.append(A)
         A = np.vstack([np.zeros((0, ends[-1])), *rows])
         loose = null_space(A, rcond=1e-9) if len(A) else np.eye(ends[-1])
@@ -209,7 +216,7 @@ class System:
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""
-        u = tuple(np.zeros(part.n) for part in self.parts)
+        u = tuple(part.start() for part in self.parts)
         contacts = []
         for interface in self.interfaces:
             gap = interface.pairing(u).gap

@@ -63,6 +63,27 @@ QUANTITIES: Mapping[str, Quantity] = {
     "residual_x_punch": Quantity(
         "residual stress xx on the punch, 0.028 half-widths inside the corner", "MPa"
     ),
+    "pass": Quantity("number of the pass", count=True),
+    "pass_creepage": Quantity("creepage of a pass: 1 + R d(rotation) / d(advance)"),
+    "pass_max_plastic_strain": Quantity("largest equivalent plastic strain after a pass"),
+    "creepage": Quantity("creepage of the last pass"),
+    "travel": Quantity("length rolled in the last pass", "mm"),
+    "surface_residual_x": Quantity("residual stress xx at the surface, mid-track", "MPa"),
+    "surface_residual_z": Quantity("residual stress zz at the surface, mid-track", "MPa"),
+    "lowest_residual_x": Quantity("smallest residual stress xx under mid-track", "MPa"),
+    "lowest_residual_z": Quantity("smallest residual stress zz under mid-track", "MPa"),
+    "depth_of_lowest_residual_x": Quantity("depth of the smallest residual stress xx", "mm"),
+    "depth_of_lowest_residual_z": Quantity("depth of the smallest residual stress zz", "mm"),
+    "surface_plastic_strain": Quantity("equivalent plastic strain at the surface, mid-track"),
+    "highest_plastic_strain": Quantity("largest equivalent plastic strain under mid-track"),
+    "depth_of_highest_plastic_strain": Quantity(
+        "depth of the largest plastic strain under mid-track", "mm"
+    ),
+    "unsteadiness": Quantity(
+        "largest difference of residual stress between stations / largest residual stress"
+    ),
+    "axle_height": Quantity("displacement of the axle at mid-track", "mm"),
+    "longitudinal_force": Quantity("longitudinal force on the track, mid-track", "N"),
     "increments": Quantity("load increments", count=True),
     "cut_increments": Quantity("load increments that were cut", count=True),
     "iterations": Quantity("Newton iterations", count=True),

@@ -18,6 +18,10 @@ from studies.reading import sweep_axes
 FIGURES: Mapping[str, str] = {
     "residual_x_half_plane": "residual x half plane",
     "residual_x_punch": "residual x punch",
+    "surface_residual_x": "surface residual x",
+    "lowest_residual_x": "lowest residual x",
+    "surface_residual_z": "surface residual z",
+    "lowest_residual_z": "lowest residual z",
     "peak_contact_pressure": "contact pressure",
     "max_plastic_strain": "plastic strain",
     "increments": "increments",

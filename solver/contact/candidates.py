@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from solver.operators import Operator
     from solver.system import ContactState, State, System
 
-_MARGIN = 2.0
+_MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
 
 
@@ -140,7 +140,6 @@ def find_candidates(
     n = sum(len(v) for v in vertices)
     frictional = any(interface.friction > 0 for interface in system.interfaces)
     m = 2 * n if frictional else n
-    moved = [now - before for now, before in zip(u, start.u, strict=True)]
     motion, friction, beyond = np.zeros(m), np.zeros(n), np.inf
     pieces: list[list[Rows]] = [[] for _ in system.parts]
     first = 0
@@ -153,13 +152,14 @@ def find_candidates(
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         friction[normal] = np.where(before.touching[at], interface.friction, 0.0)
-        for side, (part, surface) in enumerate(interface.sides):
-            block = np.zeros((m, len(surface.dofs)))
+        for side, (number, part, surface) in enumerate(interface.sides):
+            block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
-                motion[tangent] += block[tangent] @ moved[part][surface.dofs]
-            pieces[part].append(Rows(surface.dofs, block))
+                moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
+                motion[tangent] += block[tangent] @ moved.T.ravel()
+            pieces[number].append(Rows(*part.pull_back(surface, u[number], block)))
 
     def gather(name: str) -> NDArray[np.float64]:
         values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]

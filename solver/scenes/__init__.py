@@ -7,8 +7,9 @@ differ only in the scene's ``branch`` parameter share one path.
 from __future__ import annotations
 
 from solver.scenes.punch import PUNCH
+from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
 
-SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH,)}
+SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING)}
 
 __all__ = ["SCENES", "Monitor", "Scene"]

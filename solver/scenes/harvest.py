@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,17 +14,16 @@ from solver.kinematics import COMPONENTS, to_tensor
 from solver.record import Record, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
+    from solver.errors import NotConverged
     from solver.outcome import Converged
-    from solver.path import Branch, Tally
+    from solver.stepper import Tally
     from solver.system import System
 
     Array = NDArray[np.float64]
-
-STAGES = ("loaded", "unloaded")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +37,7 @@ class Layout:
     s : positions along the contact surface from its centre [mm]
     profile_body : the body whose profiles are taken
     surfaces : body -> boundary that is its contact surface, in the order of the dimension
+    stages : labels of the states whose contact is recorded
     """
 
     x: Array
@@ -47,13 +47,14 @@ class Layout:
     s: Array
     profile_body: str
     surfaces: dict[str, str]
+    stages: tuple[str, ...] = ("loaded", "unloaded")
 
     @property
     def coordinates(self) -> dict[str, Any]:
         """The record's coordinates."""
         return {
             "component": np.array(COMPONENTS),
-            "stage": np.array(STAGES),
+            "stage": np.array(self.stages),
             "body": np.array(list(self.surfaces)),
             "x": self.x,
             "y": self.y,
@@ -61,6 +62,24 @@ class Layout:
             "station": self.station,
             "s": self.s,
         }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class End:
+    """How a run ended, and what its scene adds to the record.
+
+    ``stages`` are the states of the dimension ``stage`` with the position of the contact's
+    centre [mm]; ``loaded`` and ``unloaded`` are judged and drawn, and absent after an ``error``.
+    """
+
+    tally: Tally
+    error: NotConverged | None = None
+    loaded: Converged | None = None
+    unloaded: Converged | None = None
+    stages: tuple[tuple[Converged, float], ...] = ()
+    coordinates: Mapping[str, Any] = field(default_factory=dict)
+    fields: Mapping[str, Any] = field(default_factory=dict)
+    scalars: Mapping[str, float] = field(default_factory=dict)
 
 
 class Harvest:
@@ -75,36 +94,31 @@ class Harvest:
         surface = np.stack([layout.s, np.zeros_like(layout.s)])
         wholes = {body.name: system.full(body.name) for body in system.model.bodies}
         self._recover = {name: recovery(part) for name, part in wholes.items()}
-        self._map = {name: Sampler(part, grid) for name, part in wholes.items()}
+        self._map = {name: Sampler(wholes[name], grid) for name in layout.surfaces}
         self._lines = Sampler(wholes[layout.profile_body], lines)
         self._surface = {name: Sampler(wholes[name], surface) for name in layout.surfaces}
 
-    def record(
-        self,
-        parameters: object,
-        branch: Branch,
-        extra: Callable[[Harvest, Branch], dict[str, float]],
-    ) -> Record:
-        """Return the record of a branch; ``extra`` adds the scene's own scalars."""
-        scalars = self._cost(branch.tally)
-        if branch.error or branch.loaded is None or branch.unloaded is None:
-            limit = isinstance(branch.error, LimitLoad)
+    def record(self, parameters: object, end: End) -> Record:
+        """Return the record of a run."""
+        scalars = _cost(end.tally) | {"degrees_of_freedom": float(self.system.n_unknowns)}
+        if end.error is not None or end.loaded is None or end.unloaded is None:
+            limit = isinstance(end.error, LimitLoad)
             return Record(
                 parameters=parameters,
                 status=Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED,
-                message=str(branch.error),
-                coordinates=self.layout.coordinates,
-                scalars=scalars,
+                message=str(end.error),
+                coordinates=self.layout.coordinates | dict(end.coordinates),
+                scalars=scalars | dict(end.scalars),
             )
-        check = audit(self.system, branch.loaded, branch.unloaded, branch.tally.dissipation)
-        scalars |= dict(check.figures) | self._scalars(branch.loaded, branch.unloaded)
-        scalars |= {"plastic_work": branch.tally.plastic_work} | extra(self, branch)
+        check = audit(self.system, end.loaded, end.unloaded, end.tally.dissipation)
+        scalars |= dict(check.figures) | self._scalars(end.loaded, end.unloaded)
+        scalars |= {"plastic_work": end.tally.plastic_work} | dict(end.scalars)
         return Record(
             parameters=parameters,
             status=Status.OK if check.passed else Status.AUDIT_FAILED,
             message="; ".join(check.violations + check.warnings),
-            coordinates=self.layout.coordinates,
-            fields=self._fields(branch.loaded, branch.unloaded),
+            coordinates=self.layout.coordinates | dict(end.coordinates),
+            fields=self._fields(end) | dict(end.fields),
             scalars=scalars,
         )
 
@@ -124,39 +138,40 @@ class Harvest:
         """Return surface stress (4, n_s) of a body, tensor components [MPa]."""
         return to_tensor(self._surface[body](self.stress(body, converged)))
 
+    def profile(self, converged: Converged) -> tuple[Array, Array]:
+        """Return stress (station, 4, depth) [MPa] and plastic strain (station, depth)."""
+        body, shape = self.layout.profile_body, (len(self.layout.station), len(self.layout.depth))
+        stress = self._lines(self.stress(body, converged)).reshape(4, *shape)
+        strain = self._lines(self.plastic(body, converged)).reshape(shape)
+        return to_tensor(stress).swapaxes(0, 1), strain
+
     # -- the record's variables ----------------------------------------------------------------
 
-    def _fields(self, loaded: Converged, unloaded: Converged) -> dict[str, Any]:
-        layout = self.layout
-        shape = (len(layout.y), len(layout.x))
+    def _on_map(self, values: Callable[[str], Array]) -> Array:
+        out: Array | None = None
+        for body, sampler in self._map.items():
+            here = sampler(values(body))
+            out = here if out is None else np.where(np.isnan(out), here, out)
+        assert out is not None
+        return out.reshape(*out.shape[:-1], len(self.layout.y), len(self.layout.x))
 
-        def on_map(values: Callable[[str], Array]) -> Array:
-            out: Array | None = None
-            for body, sampler in self._map.items():
-                here = sampler(values(body))
-                out = here if out is None else np.where(np.isnan(out), here, out)
-            assert out is not None
-            return out.reshape(*out.shape[:-1], *shape)
-
-        residual = on_map(lambda body: self.stress(body, unloaded))
-        below = layout.profile_body
-        lines = (len(layout.station), len(layout.depth))
-        profile = self._lines(self.stress(below, unloaded)).reshape(4, *lines)
-        contact = [self._contact(c) for c in (loaded, unloaded)]
-        surface = np.stack([self.on_surface(body, unloaded) for body in layout.surfaces])
+    def _fields(self, end: End) -> dict[str, Any]:
+        loaded, unloaded = end.loaded, end.unloaded
+        assert loaded is not None
+        assert unloaded is not None
+        residual = self._on_map(lambda body: self.stress(body, unloaded))
+        under_load = self._on_map(lambda body: self.stress(body, loaded))
+        strain = self._on_map(lambda body: self.plastic(body, unloaded))
+        stress_profile, strain_profile = self.profile(unloaded)
+        contact = [self._contact(c, centre) for c, centre in end.stages]
+        surface = np.stack([self.on_surface(body, unloaded) for body in self.layout.surfaces])
         return {
             "residual_stress": (("component", "y", "x"), to_tensor(residual)),
             "residual_mises": (("y", "x"), von_mises(residual)),
-            "plastic_strain": (("y", "x"), on_map(lambda body: self.plastic(body, unloaded))),
-            "mises_loaded": (("y", "x"), von_mises(on_map(lambda body: self.stress(body, loaded)))),
-            "residual_profile": (
-                ("station", "component", "depth"),
-                to_tensor(profile).swapaxes(0, 1),
-            ),
-            "plastic_strain_profile": (
-                ("station", "depth"),
-                self._lines(self.plastic(below, unloaded)).reshape(lines),
-            ),
+            "plastic_strain": (("y", "x"), strain),
+            "mises_loaded": (("y", "x"), von_mises(under_load)),
+            "residual_profile": (("station", "component", "depth"), stress_profile),
+            "plastic_strain_profile": (("station", "depth"), strain_profile),
             "surface_residual": (("body", "component", "s"), surface),
             **{
                 name: (("stage", "s"), np.stack([c[k] for c in contact]))
@@ -164,13 +179,16 @@ class Harvest:
             },
         }
 
-    def _contact(self, converged: Converged) -> tuple[Array, Array, Array]:
+    def _contact(self, converged: Converged, centre: float) -> tuple[Array, Array, Array]:
         """Return pressure, shear and gap along s, NaN where there is no slave surface."""
+        if not self.system.interfaces:
+            nothing = np.full_like(self.layout.s, np.nan)
+            return nothing, nothing, nothing
         interface, state = self.system.interfaces[0], converged.state
         pressure, shear = contact_pressure(self.system, state, 0)
         gap = interface.pairing(state.u).gap
         chain = interface.slave_surface
-        x = chain.X[0, chain.vertices]
+        x = chain.X[0, chain.vertices] - centre
         order = np.argsort(x)
 
         def along(values: Array) -> Array:
@@ -186,27 +204,31 @@ class Harvest:
         points = self.system.full(most).points.reshape(2, -1)
         where = points[1, strains[most].argmax()]
         residual = [self.stress(name, unloaded)[:3] for name in names]
-        pressure, _ = contact_pressure(self.system, loaded.state, 0)
-        chain = self.system.interfaces[0].slave_surface
-        closed = loaded.state.contacts[0].normal > 0
-        x = np.abs(chain.X[0, chain.vertices])
+        width, peak = 0.0, 0.0
+        if self.system.interfaces:
+            pressure, _ = contact_pressure(self.system, loaded.state, 0)
+            chain = self.system.interfaces[0].slave_surface
+            x = chain.X[0, chain.vertices][loaded.state.contacts[0].normal > 0]
+            peak = float(pressure.max())
+            symmetric = chain.X[0].min() == 0
+            width = float(x.max() if symmetric else np.ptp(x) / 2) if len(x) else 0.0
         return {
-            "contact_half_width": float(x[closed].max(initial=0.0)),
-            "peak_contact_pressure": float(pressure.max()),
+            "contact_half_width": width,
+            "peak_contact_pressure": peak,
             "max_plastic_strain": float(strains[most].max()),
             "depth_of_max_plastic_strain": float(-where) if strains[most].max() > 0 else np.nan,
             "peak_residual_tension": float(max(r.max() for r in residual)),
             "peak_residual_compression": float(min(r.min() for r in residual)),
         }
 
-    def _cost(self, tally: Tally) -> dict[str, float]:
-        return {
-            "increments": len(tally.iterations),
-            "cut_increments": tally.cuts,
-            "iterations": sum(tally.iterations),
-            "median_iterations": float(np.median(tally.iterations)) if tally.iterations else 0.0,
-            "inner_fallbacks": tally.pivoted,
-            "blended_tangents": tally.blended,
-            "cpu_seconds": tally.seconds,
-            "degrees_of_freedom": self.system.n_unknowns,
-        }
+
+def _cost(tally: Tally) -> dict[str, float]:
+    return {
+        "increments": len(tally.iterations),
+        "cut_increments": tally.cuts,
+        "iterations": sum(tally.iterations),
+        "median_iterations": float(np.median(tally.iterations)) if tally.iterations else 0.0,
+        "inner_fallbacks": tally.pivoted,
+        "blended_tangents": tally.blended,
+        "cpu_seconds": tally.seconds,
+    }

@@ -27,11 +27,13 @@ from solver.elements import element_type
 from solver.errors import ModelError
 from solver.mesh import graded, grid
 from solver.model import ContactPair, Model
-from solver.path import Branch, Path, PathControl
+from solver.outcome import Converged
+from solver.path import Path
 from solver.record import Record
-from solver.scenes.harvest import Harvest, Layout
+from solver.scenes.harvest import End, Harvest, Layout
 from solver.scenes.parameters import Friction, Length, MaterialParameters, Ratio, described
 from solver.scenes.scene import Monitor, Scene
+from solver.stepper import PathControl
 from solver.system import System
 
 if TYPE_CHECKING:
@@ -159,11 +161,9 @@ def layout(parameters: PunchParameters) -> Layout:
     )
 
 
-def _extra(harvest: Harvest, branch: Branch) -> dict[str, float]:
+def _figures(harvest: Harvest, unloaded: Converged) -> dict[str, float]:
     """Return the figures this scene is judged by."""
-    loaded, unloaded, system = branch.loaded, branch.unloaded, harvest.system
-    assert loaded is not None
-    assert unloaded is not None
+    system = harvest.system
     a = float(system.interfaces[0].slave_surface.X[0].max())
     s = harvest.layout.s
     out = {}
@@ -204,7 +204,12 @@ def path(
         monitor(min(done / expected, 0.99), message)
 
     for ratio, branch in zip(ratios, Path(system, control, report).branches(ratios), strict=True):
-        yield harvest.record(replace(parameters, load_ratio=ratio), branch, _extra)
+        loaded, unloaded = branch.loaded, branch.unloaded
+        end = End(tally=branch.tally, error=branch.error, loaded=loaded, unloaded=unloaded)
+        if loaded is not None and unloaded is not None:
+            stages = ((loaded, 0.0), (unloaded, 0.0))
+            end = replace(end, stages=stages, scalars=_figures(harvest, unloaded))
+        yield harvest.record(replace(parameters, load_ratio=ratio), end)
     monitor(1.0, "done")
 
 

@@ -47,7 +47,7 @@ def at_rest(system):
 def rows_on_parts(system, interface, rows):
     """Rows (n, unknowns of the part) for slave and master."""
     out = []
-    for (number, surface), block in zip(interface.sides, rows, strict=True):
+    for (number, _, surface), block in zip(interface.sides, rows, strict=True):
         whole = np.zeros((len(block), system.parts[number].n))
         whole[:, surface.dofs] = block
         out.append(whole)
@@ -136,7 +136,7 @@ def test_a_rotation_of_both_bodies_changes_no_gap():
     u = []
     for body in ("upper", "lower"):
         number = system.part(body)
-        x = next(surface for part, surface in interface.sides if part == number)
+        x = next(surface for part, _, surface in interface.sides if part == number)
         turned = np.zeros(system.parts[number].n)
         turned[x.dofs] = (np.array([[c, -s], [s, c]]) @ x.X - x.X).T.ravel()
         u.append(turned)

@@ -41,7 +41,7 @@ def schur(n_slave, n_master, element):
     (interface,) = system.interfaces
     pairing = interface.pairing(system.initial().u)
     S = np.zeros((n_slave + 1, n_slave + 1))
-    for (part, surface), rows in zip(interface.sides, pairing.normal, strict=True):
+    for (part, _, surface), rows in zip(interface.sides, pairing.normal, strict=True):
         hats = pairing.area[:, None] * rows
         S += system.operators[part].elastic.compliance(surface.dofs, hats)
     return S

@@ -1,4 +1,4 @@
-"""Studies of the punch: what its runs are called, and that they do not depend on the study."""
+"""Studies of the scenes: what its runs are called, and that they do not depend on the study."""
 
 from __future__ import annotations
 
@@ -35,10 +35,17 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def record() -> Record:
-    scene = SCENES["punch"]
-    (only,) = scene.path(scene.parameters(**COARSE), [0.4], lambda fraction, text: None)
-    return only
+def records() -> list[Record]:
+    coarse = {
+        "punch": (COARSE, 0.4),
+        "rolling": ({"element_size": 2.0, "advance_step": 2.0, "track": 8.0}, 1),
+    }
+    assert coarse.keys() == SCENES.keys() - {"fake"}, "every scene of the product is here"
+    found = []
+    for name, (parameters, value) in coarse.items():
+        scene = SCENES[name]
+        found += scene.path(scene.parameters(**parameters), [value], lambda fraction, text: None)
+    return found
 
 
 def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
@@ -51,15 +58,21 @@ def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
         np.testing.assert_array_equal(shared[name], alone[name], err_msg=str(name))
 
 
-def test_every_variable_of_the_punch_has_a_name_and_a_unit(record: Record) -> None:
+def test_every_variable_of_a_scene_has_a_name_and_a_unit(records: list[Record]) -> None:
     described = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
-    assert record.scalars.keys() <= QUANTITIES.keys()
-    assert record.fields.keys() <= QUANTITIES.keys()
-    assert record.coordinates.keys() <= described
+    for record in records:
+        assert record.scalars.keys() <= QUANTITIES.keys()
+        assert record.fields.keys() <= QUANTITIES.keys()
+        assert record.coordinates.keys() <= described
 
 
-def test_no_variable_is_described_that_the_punch_does_not_give(record: Record) -> None:
-    given = record.scalars.keys() | record.fields.keys() | record.coordinates.keys()
+def test_no_variable_is_described_that_no_scene_gives(records: list[Record]) -> None:
+    given = {
+        name
+        for record in records
+        for names in (record.scalars, record.fields, record.coordinates)
+        for name in names
+    }
     assert QUANTITIES.keys() <= given
 
 

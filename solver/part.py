@@ -1,0 +1,41 @@
+"""What every part of a system does unless it does better."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.surface import Surface
+
+
+class Part:
+    """A body as the increment sees it: unknowns ``u`` (n,), forces, surfaces that move.
+
+    ``load`` (n,) holds the external nodal forces at load factor one [N].
+    """
+
+    n: int
+    load: NDArray[np.float64]
+
+    def start(self) -> NDArray[np.float64]:
+        """Return the unknowns (n,) before anything happens."""
+        return np.zeros(self.n)
+
+    def external(self, load: float) -> NDArray[np.float64]:
+        """Return the external nodal forces (n,) at a load factor [N]."""
+        return load * self.load
+
+    def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
+        return u[surface.dofs].reshape(-1, 2).T
+
+    def pull_back(
+        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return unknowns and rows on them from rows on a surface's displacements."""
+        del u
+        return surface.dofs, block

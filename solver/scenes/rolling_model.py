@@ -1,0 +1,212 @@
+"""Wheel, track and timetable of the rolling scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Interval, Unit
+
+from solver.body import Body
+from solver.errors import ModelError
+from solver.material import Material
+from solver.mesh import graded, grid, mapped
+from solver.model import ContactPair, Model
+from solver.motion import Axle, AxleProgram, TravellingPressure
+from solver.passes import Schedule
+from solver.scenes.parameters import Fraction, Friction, Length, MaterialParameters, described
+
+_MARGIN = 2.5  # fine track beyond the ends / Hertz half-width
+_RIM = 4.0  # fine rim beyond the track / Hertz half-width
+_HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
+_HUB = 0.3  # radius of the rigid hub / R
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RollingParameters(MaterialParameters):
+    """Parameters of rolling (N, mm, MPa; forces a mm of width)."""
+
+    yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
+        502.0, "uniaxial yield stress Re of the half-space"
+    )
+    load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(
+        1360.0 / 502.0, "peak pressure of the elastic Hertz contact / yield stress"
+    )
+    friction: Friction = described(0.3, "Coulomb friction coefficient")
+    traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
+        0.0,
+        "longitudinal force / full slip force: positive brakes, negative accelerates, 1 is a "
+        "locked wheel",
+    )
+    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "passes over the track")
+    direction: Literal["same", "back_and_forth"] = described(
+        "same", "whether every pass goes the same way, or the wheel rolls back"
+    )
+    heading: Literal["forward", "backward"] = described("forward", "way of the first pass along x")
+    load: Literal["contact", "hertz"] = described(
+        "contact", "a wheel in true contact, or a translated Hertz pressure"
+    )
+    radius: Length = described(334.92, "radius R of the wheel")
+    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
+        1.0, "Young's modulus of the wheel / that of the half-space"
+    )
+    wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
+        0.0, "angle by which the wheel is turned before it is set down"
+    )
+    track: Length = described(50.0, "length rolled in a pass, centred on x = 0")
+    element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
+        1.0, "element side along the track and at the surface"
+    )
+    growth: Annotated[float, Interval(ge=1.0, le=3.0), Unit("1")] = described(
+        1.15, "ratio of neighbouring element sides in depth"
+    )
+    advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
+        1.0, "advance of the axle in an increment"
+    )
+    press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
+        8, "increments of setting down, and of driving"
+    )
+    unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(4, "increments of unloading")
+    isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
+
+    def __post_init__(self) -> None:
+        # zero-argument super() does not see the class that dataclass(slots=True) makes
+        MaterialParameters.__post_init__(self)
+        if self.traction == 1.0 and self.load == "contact" and self.friction == 0.0:
+            raise ModelError("traction", self.traction, "a locked wheel needs friction")
+        if self.traction and not self.friction:
+            raise ModelError("traction", self.traction, "must be 0 without friction")
+        if self.element_size > self.half_width / 2:
+            raise ModelError(
+                "element_size", self.element_size,
+                f"must be at most half the Hertz half-width, {self.half_width / 2:.3g} mm",
+            )  # fmt: skip
+        if self.advance_step > self.track / 2:
+            raise ModelError(
+                "advance_step", self.advance_step, f"must be at most {self.track / 2:g} mm"
+            )
+
+    @property
+    def peak_pressure(self) -> float:
+        """p0 of the elastic Hertz contact [MPa]."""
+        return self.load_ratio * self.yield_stress
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of wheel and half-space [MPa]."""
+        half = (1 - self.poisson_ratio**2) / self.youngs_modulus
+        return 1 / (half + half / self.wheel_stiffness)
+
+    @property
+    def half_width(self) -> float:
+        """Half-width a = 2 R p0 / E* of the elastic Hertz contact [mm]."""
+        return 2 * self.radius * self.peak_pressure / self.contact_modulus
+
+    @property
+    def force(self) -> float:
+        """Vertical force pi a p0 / 2 [N per mm of width]."""
+        return math.pi * self.half_width * self.peak_pressure / 2
+
+    @property
+    def schedule(self) -> Schedule:
+        """The timetable."""
+        first = 1 if self.heading == "forward" else -1
+        turn = -1 if self.direction == "back_and_forth" else 1
+        return Schedule(
+            n=self.passes,
+            track=self.track,
+            step=self.advance_step,
+            directions=tuple(first * turn**k for k in range(self.passes)),
+            driven=bool(self.traction) and self.traction != 1.0 and self.load == "contact",
+            press=self.press_steps,
+            release=self.unload_steps,
+        )
+
+
+def _half_space(parameters: RollingParameters) -> Body:
+    a, h = parameters.half_width, parameters.element_size
+    fine = parameters.track / 2 + _MARGIN * a
+    far = _HALF_SPACE * a
+    beyond = fine + graded(far, h, 1.4, far / 4)[1:]
+    track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
+    x = np.concatenate([-beyond[::-1], track, beyond])
+    y = -graded(far, h, parameters.growth, far / 4)[::-1]
+    travelling = None
+    if parameters.load == "hertz":
+        knots = parameters.schedule.knots()
+        ratio = parameters.friction * parameters.traction
+        ways = np.repeat(parameters.schedule.directions, len(knots["time"]) // parameters.passes)
+        travelling = TravellingPressure(
+            boundary="top",
+            half_width=a,
+            peak=parameters.peak_pressure,
+            time=knots["time"],
+            amplitude=knots["load"],
+            position=knots["position"],
+            shear_ratio=ratio * ways,
+        )
+    return Body(
+        name="half_space",
+        mesh=grid(x, y),
+        material=parameters.material(),
+        supports={"left": "x", "right": "x", "bottom": "xy"},
+        travelling=travelling,
+    )
+
+
+def _wheel(parameters: RollingParameters) -> Body:
+    R, h, a = parameters.radius, parameters.element_size, parameters.half_width
+    reach = parameters.track / 2 + _RIM * a
+    if reach > 0.8 * math.pi * R:
+        raise ModelError("track", parameters.track, "must be shorter than the wheel's rim")
+    rim = np.linspace(-reach, reach, 2 * math.ceil(reach / h) + 1)
+    beyond = reach + graded(math.pi * R - reach, h, 1.5, 0.3 * R)[1:]
+    angle = np.concatenate([-beyond[::-1], rim, beyond]) / R
+    radius = R - graded((1 - _HUB) * R, h, 1.3, 0.2 * R)[::-1]
+    ring = grid(angle, radius)
+    top = np.asarray(ring.boundaries["top"])
+    middle = ring.p[0, ring.facets[:, top]].mean(axis=0)
+    ring = ring.with_boundaries({"rim": top[np.abs(middle) < reach / R]})
+    turned = parameters.wheel_turned
+
+    def around(p: np.ndarray) -> np.ndarray:
+        angle = p[0] - turned
+        return np.stack([-p[1] * np.sin(angle), R - p[1] * np.cos(angle)])
+
+    schedule = parameters.schedule
+    knots = schedule.knots()
+    way = np.repeat(schedule.directions, len(knots["time"]) // parameters.passes)
+    full_slip = parameters.friction * parameters.force
+    program = AxleProgram(
+        time=knots["time"],
+        force=parameters.force * knots["load"],
+        moment=R * parameters.traction * full_slip * way * knots["moment"],
+        advance=knots["position"],
+        rotation=np.full_like(knots["time"], -turned) if parameters.traction == 1.0 else None,
+    )
+    return Body(
+        name="wheel",
+        mesh=mapped(ring, around),
+        material=Material(
+            youngs_modulus=parameters.youngs_modulus * parameters.wheel_stiffness,
+            poisson_ratio=parameters.poisson_ratio,
+        ),
+        supports={"bottom": "xy"},
+        axle=Axle(centre=(0.0, R), radius=R, program=program, turned=-turned),
+    )
+
+
+def model(parameters: RollingParameters) -> Model:
+    """Return the half-space, and the wheel where there is one."""
+    half_space = _half_space(parameters)
+    if parameters.load == "hertz":
+        return Model(bodies=(half_space,))
+    contact = ContactPair(
+        slave=("half_space", "top"),
+        master=("wheel", "rim"),
+        friction=parameters.friction,
+        sliding="finite",
+    )
+    return Model(bodies=(_wheel(parameters), half_space), contacts=(contact,))

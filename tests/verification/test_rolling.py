@@ -1,0 +1,179 @@
+"""Rolling: elastic closed forms, symmetries, and the published signs of residual stress.
+
+The cases with yielding are those of P. Marek, PhD thesis, Warsaw University of Technology (1995),
+section 5.2, on a coarser mesh and a shorter track.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from solver import SCENES, ModelError, Status
+from solver.scenes.rolling_model import RollingParameters
+
+ELASTIC = {"yield_stress": 1e6, "load_ratio": 1360.0 / 1e6}
+COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
+
+
+@cache
+def roll(**fields):
+    """The record of one run."""
+    parameters = RollingParameters(**fields)
+    (record,) = SCENES["rolling"].path(parameters, [parameters.passes], lambda share, text: None)
+    assert record.status is Status.OK, record.message
+    return record
+
+
+def mid_track(record, name):
+    """A contact variable under load at mid-track, along s."""
+    at = list(record.coordinates["stage"]).index("mid_track")
+    return np.nan_to_num(record.fields[name][1][at])
+
+
+def profile(record, component, station=1, number=-1):
+    """Residual stress against depth under a station after a pass (the last one)."""
+    at = list(record.coordinates["component"]).index(component)
+    return record.fields["residual_profile"][1][number, station, at]
+
+
+def elastic(**fields):
+    return roll(**(ELASTIC | {"element_size": 1.0, "track": 24.0} | fields))
+
+
+# -- elastic -----------------------------------------------------------------------------------
+
+
+def test_free_rolling_of_an_elastic_pair_is_a_hertz_contact():
+    record = elastic()
+    parameters = record.parameters
+    s, pressure = record.coordinates["s"], mid_track(record, "contact_pressure")
+    assert pressure.max() == pytest.approx(parameters.peak_pressure, rel=0.01)
+    # half-width from the zero of a line fitted to p^2 over s^2, elements of a/8
+    inside = (np.abs(s) < 0.8 * parameters.half_width) & (np.abs(s) > 0.3 * parameters.half_width)
+    slope, height = np.polyfit(s[inside] ** 2, pressure[inside] ** 2, 1)
+    assert np.sqrt(-height / slope) == pytest.approx(parameters.half_width, rel=0.01)
+    assert record.scalars["max_plastic_strain"] == 0.0
+
+
+def test_free_rolling_of_equal_bodies_carries_no_shear():
+    record = elastic()
+    shear = np.abs(mid_track(record, "contact_shear")).max()
+    assert shear < 0.02 * record.parameters.peak_pressure
+    assert abs(record.scalars["longitudinal_force"]) < 1e-3 * record.parameters.force
+
+
+@pytest.mark.parametrize("traction", [0.5, -0.5])
+def test_moment_makes_the_longitudinal_force_it_is_meant_to(traction):
+    record = elastic(traction=traction)
+    parameters = record.parameters
+    expected = traction * parameters.friction * parameters.force
+    # the lever arm is R less the approach of the bodies, 0.1 % of R
+    assert abs(record.scalars["longitudinal_force"]) == pytest.approx(abs(expected), rel=5e-3)
+
+
+def test_slip_is_at_the_trailing_side_as_carter_found():
+    """Carter (1926): stick at the leading edge, over c = a (1 - sqrt(1 - T/mu P)) of slip."""
+    record = elastic(traction=0.5)
+    parameters = record.parameters
+    s = record.coordinates["s"]
+    pressure, shear = (np.abs(mid_track(record, f"contact_{k}")) for k in ("pressure", "shear"))
+    slipping = shear > 0.97 * parameters.friction * pressure
+    closed = pressure > 0.2 * parameters.peak_pressure
+    assert slipping[closed & (s < -0.6 * parameters.half_width)].all()
+    assert not slipping[closed & (s > 0.0)].any()
+
+
+def test_rolling_does_not_depend_on_how_the_wheel_was_turned():
+    plain, turned = roll(**COARSE), roll(**COARSE, wheel_turned=0.7)
+    for component in ("xx", "yy", "zz", "xy"):
+        difference = profile(plain, component) - profile(turned, component)
+        assert np.abs(difference).max() < 1e-3
+    assert plain.scalars["creepage"] == pytest.approx(turned.scalars["creepage"], abs=1e-9)
+
+
+def test_rolling_the_other_way_gives_the_mirror_image():
+    forward, backward = (roll(**COARSE, traction=0.5, heading=h) for h in ("forward", "backward"))
+    for component, sign in (("xx", 1), ("yy", 1), ("zz", 1), ("xy", -1)):
+        for station, mirrored in ((0, 2), (1, 1), (2, 0)):
+            there = profile(forward, component, station)
+            back = profile(backward, component, mirrored)
+            assert np.abs(there - sign * back).max() < 1e-3
+
+
+# -- yielding ----------------------------------------------------------------------------------
+
+
+def test_free_rolling_leaves_tension_at_the_surface_and_yields_below_it():
+    record = roll(**COARSE)
+    assert record.scalars["surface_residual_x"] > 50
+    assert record.scalars["surface_residual_z"] > 20
+    assert record.scalars["lowest_residual_x"] < -200
+    assert 2.5 < record.scalars["depth_of_highest_plastic_strain"] < 6.0
+    assert record.scalars["surface_plastic_strain"] < 1e-3
+
+
+def test_traction_yields_the_surface_and_leaves_compression_there():
+    free, braking, driving = (roll(**COARSE, traction=t) for t in (0.0, 0.75, -0.75))
+    for driven in (braking, driving):
+        assert driven.scalars["surface_plastic_strain"] > 5e-3
+        assert driven.scalars["surface_residual_z"] < -100
+        assert driven.scalars["surface_residual_x"] < free.scalars["surface_residual_x"] - 200
+
+
+def test_hardening_lowers_the_extremes():
+    plain = roll(**COARSE)
+    for hardening in ("isotropic", "kinematic"):
+        hard = roll(**COARSE, hardening=hardening)
+        assert hard.scalars["highest_plastic_strain"] < plain.scalars["highest_plastic_strain"]
+        assert hard.scalars["lowest_residual_x"] > plain.scalars["lowest_residual_x"]
+
+
+def test_second_pass_adds_plastic_strain():
+    record = roll(**COARSE, passes=2, direction="back_and_forth")
+    first, second = record.fields["pass_max_plastic_strain"][1]
+    assert second > 1.2 * first
+    alone = roll(**COARSE)
+    assert np.array_equal(profile(record, "xx", number=0), profile(alone, "xx"))
+
+
+def test_locked_wheel_slides_everywhere():
+    record = roll(**COARSE, traction=1.0, friction=0.1)
+    pressure, shear = (mid_track(record, f"contact_{kind}") for kind in ("pressure", "shear"))
+    # but where the leading edge has just come down: it starts without tangential force
+    closed = (pressure > 1.0) & (record.coordinates["s"] < 5.0)
+    assert np.abs(shear[closed]) == pytest.approx(0.1 * pressure[closed], rel=1e-6)
+
+
+# -- prescribed pressure -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("ratio", "yields"), [(3.09, False), (3.12, True)])
+def test_translated_hertz_pressure_first_yields_at_the_known_load(ratio, yields):
+    """p0/k = 3.107 for von Mises at Poisson 0.3 (here bracketed within 1 %)."""
+    record = roll(
+        load="hertz", friction=0.0, load_ratio=ratio / np.sqrt(3), element_size=0.4,
+        growth=1.03, track=8.0, advance_step=1.0,
+    )  # fmt: skip
+    assert (record.scalars["max_plastic_strain"] > 0) is yields
+
+
+# -- bad input ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fields", "name"),
+    [
+        ({"traction": -1.0}, "traction"),
+        ({"traction": 0.5, "friction": 0.0}, "traction"),
+        ({"element_size": 50.0}, "element_size"),
+        ({"advance_step": 40.0}, "advance_step"),
+        ({"passes": 0}, "passes"),
+    ],
+)
+def test_bad_parameters_are_named(fields, name):
+    with pytest.raises(ModelError) as caught:
+        RollingParameters(**fields)
+    assert caught.value.field == name
