@@ -67,6 +67,11 @@ def vertex_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float
     return np.asarray(n / np.linalg.norm(n, axis=0))
 
 
+def _combine(x: NDArray[np.float64], N: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum over an edge's nodes, the last axis of both."""
+    return np.asarray(np.einsum("...k,...k->...", x, N))
+
+
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(a[0] * b[1] - a[1] * b[0])
 
@@ -83,8 +88,8 @@ def _project_on_slave(
     n0, n1 = normals[:, :-1, None], normals[:, 1:, None]
     xi = np.zeros((len(slave.edges), points.shape[1]))
     for _ in range(_NEWTON_STEPS):
-        offset = (xe * shape_functions(xi, count)).sum(axis=-1) - points[:, None]
-        slope = (xe * shape_derivatives(xi, count)).sum(axis=-1)
+        offset = _combine(xe, shape_functions(xi, count)) - points[:, None]
+        slope = _combine(xe, shape_derivatives(xi, count))
         n = (1 - xi) / 2 * n0 + (1 + xi) / 2 * n1
         value = _cross(n, offset)
         derivative = _cross((n1 - n0) / 2, offset) + _cross(n, slope)
@@ -106,10 +111,10 @@ def _project_on_master(
     xe = x[:, edges]
     eta = np.zeros(np.broadcast_shapes(edges.shape[:-1], points.shape[1:]))
     for _ in range(_NEWTON_STEPS):
-        offset = (xe * shape_functions(eta, count)).sum(axis=-1) - points
-        slope = _cross(normals, (xe * shape_derivatives(eta, count)).sum(axis=-1))
+        offset = _combine(xe, shape_functions(eta, count)) - points
+        slope = _cross(normals, _combine(xe, shape_derivatives(eta, count)))
         eta = np.clip(eta - _cross(normals, offset) / np.where(slope == 0, 1.0, slope), -3.0, 3.0)
-    offset = (xe * shape_functions(eta, count)).sum(axis=-1) - points
+    offset = _combine(xe, shape_functions(eta, count)) - points
     return eta, (normals * offset).sum(axis=0)
 
 
