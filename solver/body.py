@@ -77,6 +77,12 @@ class Body:
             raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
         if self.travelling is not None:
             self.facets(self.travelling.boundary, "travelling")
+            if self.material.elastic and self.condense:
+                raise ModelError("travelling", self.name, "needs condense=False on elastic bodies")
+        moved = self.axle is not None or self.travelling is not None
+        if moved and self.pressure:
+            allowed = "must be empty on a body with an axle or a travelling pressure"
+            raise ModelError("pressure", dict(self.pressure), allowed)
         for boundary, value in self.pressure.items():
             if not np.isfinite(value):
                 raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")

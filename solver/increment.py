@@ -47,6 +47,8 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
+_TOUCHING = 1e-9
+"""Overlap that counts as touching before anything is loaded [mm]."""
 _LATE = 1
 """Iterations after which a step without stiffness tells that the structure flows."""
 
@@ -163,8 +165,9 @@ class Increment:
         inner = self._on_parts(candidates, candidates.forces)
         level = _norm([part.external(self.load) for part in parts]) + _norm(inner)
         scale = max(self.start.force_scale, level)
-        if scale == 0:
-            return 0.0, 0.0, 0.0
+        if scale == 0:  # nothing loads the bodies yet; overlapping ones are not in balance
+            overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
+            return 0.0, float(overlap < -_TOUCHING), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
         W = candidates.compliance([o.elastic for o in self.system.operators])
         return scale, _norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
@@ -179,7 +182,6 @@ class Increment:
         elastic: bool,
     ) -> _Step:
         for blend in (1.0,) if elastic else _BLENDS:
-            self._blended += 0 < blend and not elastic
             try:
                 operators = [
                     o.tangent(response, blend)
@@ -189,8 +191,9 @@ class Increment:
             except Singular:
                 continue
             if step is not None:
+                self._blended += 0 < blend and not elastic
                 return step
-        raise IncrementFailed("no contact forces can balance this load", 0.0)
+        raise IncrementFailed("no contact forces were found that balance this load", 1.0)
 
     def _blended_step(
         self, residuals: Vectors, operators: Sequence[Operator], candidates: Candidates

@@ -20,6 +20,7 @@ from solver.errors import ModelError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_NOT_POSITIVE = -4
 SOLVERS = ("auto", "pardiso", "superlu")
 
 
@@ -88,7 +89,9 @@ class PardisoSolver:
         try:
             self._definite.factorise(data)
             self._current = self._definite
-        except pardiso.PardisoError:
+        except pardiso.PardisoError as failure:
+            if failure.code != _NOT_POSITIVE:
+                raise Singular(str(failure)) from failure
             if self._indefinite is None:
                 self._indefinite = pardiso.Pardiso(self._upper, pardiso.INDEFINITE)
             try:

@@ -129,7 +129,7 @@ class Substructure(Part):
         return self._condensed.expand(u, load, self.whole.n)
 
 
-def _key(body: Body, nodes: NDArray[np.int64]) -> str:
+def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:
     """Return a content key: equal bodies share their condensation."""
     digest = sha256()
     for array in (body.mesh.doflocs, body.mesh.t, nodes):
@@ -137,7 +137,8 @@ def _key(body: Body, nodes: NDArray[np.int64]) -> str:
     material = body.material
     digest.update(
         repr((
-            material.youngs_modulus, material.poisson_ratio, body.state, body.element,
+            linear_solver, material.youngs_modulus, material.poisson_ratio,
+            body.state, body.element,
             body.full_integration, body.thickness,
             sorted((name, held, body.facets(name).tobytes())
                    for name, held in body.supports.items()),
@@ -149,7 +150,7 @@ def _key(body: Body, nodes: NDArray[np.int64]) -> str:
 
 
 def _condense(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> _Condensed:
-    key = _key(part.body, nodes)
+    key = _key(part.body, nodes, linear_solver)
     if key in _CACHE:
         _CACHE.move_to_end(key)
     else:

@@ -183,6 +183,10 @@ def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:
 
 
 def _join(pieces: list[Rows]) -> Rows | None:
+    """Return the rows of all surfaces of a part; unknowns that surfaces share stand once."""
     if not pieces:
         return None
-    return Rows(np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces]))
+    dofs, place = np.unique(np.concatenate([p.dofs for p in pieces]), return_inverse=True)
+    block = np.zeros((len(pieces[0].block), len(dofs)))
+    np.add.at(block, (slice(None), place), np.hstack([p.block for p in pieces]))  # type: ignore[arg-type]
+    return Rows(dofs, block)

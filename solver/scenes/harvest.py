@@ -180,7 +180,11 @@ class Harvest:
         }
 
     def _contact(self, converged: Converged, centre: float) -> tuple[Array, Array, Array]:
-        """Return pressure, shear and gap along s, NaN where there is no slave surface."""
+        """Return pressure, shear and gap along s, NaN where there is no slave surface.
+
+        The shear is the traction on the lower body along +x: in every scene the opposite of
+        the slave's along its own tangent. Bodies taken apart have no gap to speak of.
+        """
         if not self.system.interfaces:
             nothing = np.full_like(self.layout.s, np.nan)
             return nothing, nothing, nothing
@@ -195,7 +199,8 @@ class Harvest:
             found = np.interp(self.layout.s, x[order], values[order], left=np.nan, right=np.nan)
             return np.asarray(found)
 
-        return along(pressure), along(shear), along(gap)
+        apart = not state.contacts[0].normal.any()
+        return along(pressure), along(-shear), along(np.full_like(gap, np.nan) if apart else gap)
 
     def _scalars(self, loaded: Converged, unloaded: Converged) -> dict[str, float]:
         names = [body.name for body in self.system.model.bodies]
@@ -204,7 +209,7 @@ class Harvest:
         points = self.system.full(most).points.reshape(2, -1)
         where = points[1, strains[most].argmax()]
         residual = [self.stress(name, unloaded)[:3] for name in names]
-        width, peak = 0.0, 0.0
+        width, peak = np.nan, np.nan
         if self.system.interfaces:
             pressure, _ = contact_pressure(self.system, loaded.state, 0)
             chain = self.system.interfaces[0].slave_surface

@@ -86,7 +86,7 @@ def _figures(harvest: Harvest, result: PassResult) -> dict[str, float]:
         wheel = result.mid_track.state.u[0]
         out["axle_height"] = float(wheel[-2])
         contact = result.mid_track.state.contacts[0]
-        out["longitudinal_force"] = float(contact.tangential.sum())
+        out["longitudinal_force"] = -float(contact.tangential.sum())
     return out
 
 

@@ -16,12 +16,15 @@ from solver.mesh import graded, grid, mapped
 from solver.model import ContactPair, Model
 from solver.motion import Axle, AxleProgram, TravellingPressure
 from solver.passes import Schedule
-from solver.scenes.parameters import Fraction, Friction, Length, MaterialParameters, described
+from solver.scenes.parameters import Friction, Length, MaterialParameters, described
 
 _MARGIN = 2.5  # fine track beyond the ends / Hertz half-width
 _RIM = 4.0  # fine rim beyond the track / Hertz half-width
 _HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
 _HUB = 0.3  # radius of the rigid hub / R
+_LONGEST_REACH = 0.8  # of half the rim
+_MOST_COLUMNS = 3000
+_MOST_INCREMENTS = 100_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +72,6 @@ class RollingParameters(MaterialParameters):
         8, "increments of setting down, and of driving"
     )
     unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(4, "increments of unloading")
-    isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
@@ -87,6 +89,26 @@ class RollingParameters(MaterialParameters):
             raise ModelError(
                 "advance_step", self.advance_step, f"must be at most {self.track / 2:g} mm"
             )
+
+        columns = (self.track + 2 * _MARGIN * self.half_width) / self.element_size
+        if columns > _MOST_COLUMNS:
+            raise ModelError(
+                "element_size", self.element_size,
+                f"makes {columns:.0f} elements along the track; at most {_MOST_COLUMNS}",
+            )  # fmt: skip
+        increments = self.passes * self.track / self.advance_step
+        if increments > _MOST_INCREMENTS:
+            raise ModelError(
+                "advance_step", self.advance_step,
+                f"makes {increments:.0f} increments; at most {_MOST_INCREMENTS}",
+            )  # fmt: skip
+        if self.load == "contact" and self.reach > _LONGEST_REACH * math.pi * self.radius:
+            raise ModelError("track", self.track, "must be shorter than the wheel's rim")
+
+    @property
+    def reach(self) -> float:
+        """Half the length of the rim that may come into contact [mm]."""
+        return self.track / 2 + _RIM * self.half_width
 
     @property
     def peak_pressure(self) -> float:
@@ -157,10 +179,8 @@ def _half_space(parameters: RollingParameters) -> Body:
 
 
 def _wheel(parameters: RollingParameters) -> Body:
-    R, h, a = parameters.radius, parameters.element_size, parameters.half_width
-    reach = parameters.track / 2 + _RIM * a
-    if reach > 0.8 * math.pi * R:
-        raise ModelError("track", parameters.track, "must be shorter than the wheel's rim")
+    R, h = parameters.radius, parameters.element_size
+    reach = parameters.reach
     rim = np.linspace(-reach, reach, 2 * math.ceil(reach / h) + 1)
     beyond = reach + graded(math.pi * R - reach, h, 1.5, 0.3 * R)[1:]
     angle = np.concatenate([-beyond[::-1], rim, beyond]) / R
