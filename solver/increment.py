@@ -47,8 +47,7 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
-_TOUCHING = 1e-9
-"""Overlap that counts as touching before anything is loaded [mm]."""
+_TOUCHING = 1e-9  # overlap before anything is loaded [mm]
 _LATE = 1
 """Iterations after which a step without stiffness tells that the structure flows."""
 
@@ -277,7 +276,7 @@ class Increment:
         ]
         return Converged(
             plastic_work=sum(work for work, _ in spent),
-            dissipation=min(0.0, *(least for _, least in spent)),
+            dissipation=float(np.min([0.0, *(least for _, least in spent)])),
             state=State(self.load, u, tuple(r.state for r in responses), contacts, scale),
             responses=responses,
             iterations=iterations,

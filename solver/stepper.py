@@ -73,7 +73,7 @@ class Tally:
             pivoted=self.pivoted + converged.pivoted,
             blended=self.blended + converged.blended,
             plastic_work=self.plastic_work + converged.plastic_work,
-            dissipation=min(self.dissipation, converged.dissipation),
+            dissipation=float(np.minimum(self.dissipation, converged.dissipation)),
         )
 
 
