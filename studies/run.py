@@ -107,7 +107,13 @@ def run_study(
         when the scheduler is gone; the same call computes the rest
     """
     started = time.monotonic()
-    stop = should_stop or (lambda: False)
+    asked = False
+
+    def stop() -> bool:
+        nonlocal asked
+        asked = asked or (should_stop is not None and should_stop())
+        return asked
+
     with store.writing():
         store.save_study(study)
         cases = list(study.cases())
@@ -135,7 +141,7 @@ def run_study(
         computed=sorted(work.computed),
         dataset=dataset,
         wall_seconds=time.monotonic() - started,
-        stopped=bool(wanted - work.computed),
+        stopped=asked and bool(wanted - work.computed),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+from solver.record import Record
 from solver.scenes import Scene
 from studies import dataset as layout
 from studies.design import Case, Path
@@ -40,7 +41,7 @@ def walk(
 
     A run that is already there is left alone: a worker that took the path over from a dead one
     continues where that stopped. When the path raises, the runs it still owed are
-    written as broken, with the reason.
+    written as broken, with the reason; a record that cannot be written breaks its own run only.
     """
     if task.source != solver_hash():
         raise RuntimeError(
@@ -69,12 +70,26 @@ def walk(
         if owed:
             monitor(0.0, "")
             for record in task.scene.path(task.path.parameters, list(owed), monitor):
-                case = owed.pop(getattr(record.parameters, task.scene.branch))
-                keep(store.write_run(layout.run_dataset(task.scene, case, record)))
+                value = getattr(record.parameters, task.scene.branch)
+                row = _written(store, task.scene, owed[value], record)
+                del owed[value]
+                keep(row)
     except Stopped:
         return rows
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
+        reason = _reason(error)
     for case in owed.values():
         keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
     return rows
+
+
+def _written(store: Store, scene: Scene, case: Case, record: Record) -> dict[str, Any]:
+    """Write the run a record tells of, as broken when the record cannot be written."""
+    try:
+        return store.write_run(layout.run_dataset(scene, case, record))
+    except Exception as error:
+        return store.write_run(layout.broken_dataset(scene, case, _reason(error)))
+
+
+def _reason(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

@@ -34,9 +34,9 @@ class FakeParameters:
     points: Annotated[int, Interval(ge=2, le=400)] = described(5, "points of the map")
     seconds: Annotated[float, Interval(ge=0.0), Unit("s")] = described(0.0, "duration of a path")
     state: Literal["plane_strain", "plane_stress"] = described("plane_stress", "out of plane")
-    trouble: Literal["none", "warn", "limit", "raise", "short", "die", "die_once", "bare"] = (
-        described("none", "what goes wrong at load_ratio 0.8 and above")
-    )
+    trouble: Literal[
+        "none", "warn", "limit", "raise", "short", "die", "die_once", "bare", "unwritable"
+    ] = described("none", "what goes wrong at load_ratio 0.8 and above")
     mark: str = described("", "directory that counts how often a path was begun")
 
     def __post_init__(self) -> None:
@@ -76,6 +76,8 @@ def troubled(run: FakeParameters) -> Record:
         )
     if run.trouble == "warn":
         return replace(record(run), message="strains are large")
+    if run.trouble == "unwritable" and run.load_ratio < 1.0:
+        return replace(record(run), fields={"residual_stress": (("nowhere",), np.zeros(1))})
     if run.trouble == "bare":
         return Record(parameters=run, status=Status.NOT_CONVERGED, message="increment 3")
     return record(run)

@@ -122,6 +122,24 @@ def test_failed_runs_are_tried_again(store: Store, tmp_path: Path) -> None:
     assert sorted(mark.read_text() for mark in tmp_path.glob("0.*")) == ["0.3 0.9", "0.9"]
 
 
+def test_a_record_that_cannot_be_written_breaks_its_own_run_only(store: Store) -> None:
+    study = fake_study(sweep={"load_ratio": [0.3, 0.9, 1.2]}, trouble="unwritable")
+    outcome = run_study(study, store, workers=1)
+    assert outcome.counts == {"ok": 2, "error": 1}
+    assert not outcome.stopped
+    reason = "ValueError: residual_stress has dimensions without coordinates: ['nowhere']"
+    assert list(outcome.failed) == [(list(study.cases())[1].id, "error", reason)]
+
+
+def test_runs_left_over_without_a_wish_to_stop_are_no_stop(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.run._Work.compute", lambda *arguments: None)
+    outcome = run_study(fake_study(), store, workers=1)
+    assert outcome.counts == {"missing": 4}
+    assert not outcome.stopped
+
+
 def test_a_study_shares_the_runs_of_another(store: Store, tmp_path: Path) -> None:
     narrow = fake_study("narrow", {"friction": [0.0]}, load_ratio=0.3, mark=str(tmp_path))
     wide = fake_study("wide", {"friction": [0.0, 0.4]}, load_ratio=0.3, mark=str(tmp_path))
