@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import subprocess
 import sys
@@ -31,7 +33,7 @@ PROGRAMS = {
 
 KEYS = {
     "image", "build", "restart", "init", "command", "healthcheck", "volumes", "depends_on",
-    "ports", "stop_grace_period",
+    "ports", "stop_grace_period", "environment",
 }  # fmt: skip
 DURATION = re.compile(r"\d+s")
 
@@ -83,6 +85,34 @@ def test_who_needs_the_scheduler_waits_for_its_health() -> None:
         assert address == f"tcp://scheduler:{scheduler[scheduler.index('--port') + 1]}"
 
 
+CONFIGURATION = """
+import json, dask, distributed
+from studies.grid import _CONFIGURATION as own
+names = [name for name in own if name.startswith("distributed.scheduler.")]
+known = dask.config.merge(*dask.config.defaults)
+print(json.dumps({name: [own[name], dask.config.get(name)] for name in names
+                  if dask.config.get(name, None, config=known) is not None}))
+"""
+
+
+def test_the_scheduler_is_configured_like_that_of_the_services_own_workers() -> None:
+    given = SERVICES["scheduler"]["environment"]
+    assert all(isinstance(value, str) for value in given.values())
+    found = json.loads(
+        subprocess.run(
+            [sys.executable, "-c", CONFIGURATION],
+            env=os.environ | {"PYTHONPATH": str(ROOT)} | given,
+            capture_output=True,
+            check=True,
+        ).stdout
+    )
+    assert found == {
+        "distributed.scheduler.allowed-failures": [1, 1],
+        "distributed.scheduler.worker-saturation": [1.0, 1.0],
+    }
+    assert len(given) == len(found)
+
+
 def test_the_image_runs_as_an_ordinary_user_with_pinned_packages() -> None:
     steps = re.findall(r"^([A-Z]+) (.*)$", DOCKERFILE, re.MULTILINE)
     assert steps[0] == ("FROM", "python:3.11-slim")
@@ -119,7 +149,7 @@ class Stage:
         process = subprocess.Popen(
             self.translated(SERVICES[name]["command"]),
             cwd=self.home,
-            env=self.environment,
+            env=self.environment | SERVICES[name].get("environment", {}),
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
