@@ -35,6 +35,10 @@ def is_id(text: str) -> bool:
     return ID_PATTERN.fullmatch(text) is not None
 
 
+FORM = ("dataset.py", "quantities.py", "design.py", "parameters.py")
+"""Modules of this package that lay records out: names, units, dimensions, attributes."""
+
+
 @cache
 def solver_hash() -> str:
     """Return the digest of all that decides what a run's file holds.
@@ -43,7 +47,7 @@ def solver_hash() -> str:
     """
     root, here = Path(solver.__file__).parent, Path(__file__).parent
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
-    files |= {f"studies/{name}": here / name for name in ("dataset.py", "quantities.py")}
+    files |= {f"studies/{name}": here / name for name in FORM}
     digests = {name: _digest(path.read_bytes()) for name, path in files.items()}
     return _digest(json.dumps(digests, sort_keys=True).encode())
 

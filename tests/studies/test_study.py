@@ -154,6 +154,21 @@ def test_the_solver_hash_covers_every_source_and_its_place(
     assert len({first, second, source()}) == 3
 
 
+@pytest.mark.parametrize("name", ["dataset", "quantities", "design", "parameters"])
+def test_the_solver_hash_covers_what_gives_a_file_its_form(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Path(studies.identity.__file__).parent
+    for source in here.glob("*.py"):
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    monkeypatch.setattr("studies.identity.__file__", str(tmp_path / "identity.py"))
+    digest = studies.identity.solver_hash.__wrapped__
+    before = digest()
+    with (tmp_path / f"{name}.py").open("a") as module:
+        module.write("# changed\n")
+    assert digest() != before
+
+
 def test_axes_follow_the_scene_and_values_stay_as_written() -> None:
     study = Study.from_dict(GOOD)
     assert list(study.axes) == ["load_ratio", "friction"]
