@@ -66,7 +66,7 @@ class Job:
     size : number of its runs
     state, message : where it stands, and why when that needs a reason
     progress : percentage of the work that is done
-    again : whether runs that failed are to be computed again
+    again : whether runs that failed are to be computed again; over once the work has begun
     submitted, started, finished : ISO 8601, UTC
     """
 
@@ -168,6 +168,13 @@ class Jobs:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
                 (message, progress, job_id, State.RUNNING),
+            )
+
+    def begun(self, job_id: str) -> None:
+        """Write that a running job computes: what fails from now on has failed for good."""
+        with self._transaction() as connection:
+            connection.execute(
+                "UPDATE job SET again = 0 WHERE id = ? AND state = ?", (job_id, State.RUNNING)
             )
 
     def dismiss(self, job_id: str) -> Job:

@@ -9,7 +9,7 @@ import logging
 import sys
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from service.jobs import Job, Jobs, State
 from service.settings import Settings
@@ -27,6 +27,7 @@ class Attempt:
     Attributes
     ----------
     progress : percentage of the study that is done
+    begun : whether it came so far that something was computed
     runs : how many runs came to an end
     counts : runs by status, once the study has come to its end
     reason : why there is no such end
@@ -35,6 +36,7 @@ class Attempt:
     """
 
     progress: float
+    begun: bool = False
     runs: int = 0
     counts: dict[str, int] | None = None
     reason: str = "its process ended without a word"
@@ -96,6 +98,7 @@ class Runner:
                 await asyncio.to_thread(self.jobs.finish, job.id, *verdict(attempt.counts))
                 return
             progress = attempt.progress
+            job = replace(job, again=job.again and not attempt.begun)
             barren = 0 if attempt.runs or attempt.patient else barren + 1
             message = f"the study stopped: {attempt.reason}"
             log.error("%s: %s", job.id, message)
@@ -107,18 +110,28 @@ class Runner:
 
     async def _attempt(self, job: Job, progress: float) -> Attempt:
         """Start one child, follow its events to their end, and stop it when nobody wants it."""
-        attempt = Attempt(progress)
+        attempt, again = Attempt(progress), job.again
         child = await self._start(job)
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
                 await asyncio.wait({events}, timeout=self.settings.poll_seconds)
+                if again and attempt.begun:
+                    again = False
+                    await asyncio.to_thread(self.jobs.begun, job.id)
                 if attempt.progress != progress:
                     progress = attempt.progress
                     await asyncio.to_thread(self.jobs.note, job.id, progress)
         finally:
             await self._end(child)
-            await events
+            await asyncio.wait({events})
+        if error := events.exception():
+            log.error("%s: its process cannot be understood", job.id, exc_info=error)
+            return Attempt(
+                attempt.progress,
+                begun=attempt.begun,
+                reason=f"its process cannot be understood: {type(error).__name__}: {error}",
+            )
         return attempt
 
     async def _start(self, job: Job) -> Process:
@@ -175,6 +188,7 @@ async def follow(child: Process, attempt: Attempt) -> None:
         content = message["content"]
         match message["kind"]:
             case "event":
+                attempt.begun = True
                 attempt.progress = 100 * content["progress"]
                 attempt.runs += content["kind"] == "run"
             case "outcome":

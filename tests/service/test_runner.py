@@ -1,0 +1,83 @@
+"""The consumer of the queue, with children that do as they are told."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from asyncio.subprocess import PIPE, Process
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.jobs import Job, Jobs, State
+from service.runner import Runner
+from service.settings import Settings
+
+RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5}}
+AWAY = {"kind": "wait", "content": {"reason": "the store is busy"}}
+ALL_FAILED = {"kind": "outcome", "content": {"error": 2}}
+GIBBERISH = "gibberish"
+ENDLESS = "x" * 1_100_000
+
+
+@dataclass
+class Scripted(Runner):
+    """Starts children that say what the script has for them; the last part holds for the rest."""
+
+    script: list[list[Any]] = field(default_factory=list)
+    orders: list[bool] = field(default_factory=list)
+
+    async def _start(self, job: Job) -> Process:
+        said = self.script[min(len(self.orders), len(self.script) - 1)]
+        self.orders.append(job.again)
+        lines = [line if isinstance(line, str) else json.dumps(line) for line in said]
+        path = self.settings.data / "said"
+        path.write_text("".join(f"{line}\n" for line in lines))
+        return await asyncio.create_subprocess_exec(
+            "cat", str(path), stdin=PIPE, stdout=PIPE, limit=1_000_000
+        )
+
+
+def carried_out(data: Path, *script: list[Any], again: bool = False) -> tuple[Job, list[bool]]:
+    """Return what became of a study, and with which wish to repeat each child was started."""
+    jobs = Jobs(data / "jobs.sqlite")
+    jobs.accept("a", {"name": "a"}, ["b", "c"])
+    if again:
+        jobs.dismiss("a")
+        jobs.retry("a")
+    settings = Settings(data=data, attempts=2, poll_seconds=0.01)
+    runner = Scripted(settings, jobs, lock=0, script=list(script))
+
+    async def work() -> None:
+        async with asyncio.timeout(30.0), runner.working():
+            while not jobs.get("a").state.final:
+                await asyncio.sleep(0.01)
+
+    asyncio.run(work())
+    return jobs.get("a"), runner.orders
+
+
+def test_failed_runs_are_repeated_by_the_first_child_of_a_retry_only(tmp_path: Path) -> None:
+    job, orders = carried_out(tmp_path, [RUN], [RUN], [ALL_FAILED], again=True)
+    assert orders == [True, False, False]
+    assert (job.state, job.again) == (State.FAILED, False)
+
+
+def test_a_retry_that_could_not_begin_is_still_a_retry(tmp_path: Path) -> None:
+    _, orders = carried_out(tmp_path, [AWAY], [], [RUN], [ALL_FAILED], again=True)
+    assert orders == [True, True, True, False]
+
+
+def test_a_study_that_brings_nothing_new_is_given_up(tmp_path: Path) -> None:
+    job, orders = carried_out(tmp_path, [RUN], [], again=True)
+    assert orders == [True, False, False]
+    assert job.state is State.FAILED and "without a word" in job.message
+
+
+@pytest.mark.parametrize("line", [GIBBERISH, ENDLESS], ids=["gibberish", "endless"])
+def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line: str) -> None:
+    job, orders = carried_out(tmp_path, [RUN, line])
+    assert len(orders) == 2
+    assert job.state is State.FAILED and "cannot be understood" in job.message
