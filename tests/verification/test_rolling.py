@@ -184,7 +184,7 @@ def test_translated_hertz_pressure_first_yields_at_the_known_load(ratio, yields)
         ({"passes": 0}, "passes"),
         ({"element_size": 1e-6}, "element_size"),
         ({"advance_step": 1e-9}, "advance_step"),
-        ({"track": 1500.0}, "track"),
+        ({"track": 2000.0}, "track"),
     ],
 )
 def test_bad_parameters_are_named(fields, name):
