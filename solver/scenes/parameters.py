@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
 
 from solver.errors import ModelError
-from solver.material import Material
+from solver.material import Hardening, Material
 
 
 def described(default: Any, description: str) -> Any:
@@ -28,7 +28,6 @@ Fraction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
 Stress = Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")]
 Length = Annotated[float, Interval(gt=0.0, le=1e6), Unit("mm")]
 Poisson = Annotated[float, Interval(ge=0.0, le=0.4999), Unit("1")]
-Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
