@@ -1,0 +1,206 @@
+"""What the command ``residua`` does: one function a subcommand, each returning an exit status."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from studies.errors import StudyError
+from studies.study import Study
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+SHOWN = 100
+"""Most runs that `run` prints; `show` prints all."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute a study, print its runs and draw one of them."""
+    from studies.progress import Progress
+    from studies.reading import open_study
+    from studies.run import run_study
+    from studies.store import Store
+    from studies.tables import runs_table
+
+    study = Study.from_toml(options.study)
+    progress = Progress(study)
+    with _interruption() as interrupted:
+        outcome = run_study(
+            study,
+            Store(options.out),
+            workers=options.workers,
+            scheduler=options.scheduler,
+            resume=options.resume,
+            on_event=progress,
+            should_stop=lambda: bool(interrupted),
+        )
+    progress.close()
+    with open_study(outcome.dataset) as dataset:
+        if study.size <= SHOWN:
+            print(runs_table(dataset))
+        warned = _warned(dataset)
+        picture = _picture(dataset, outcome.dataset.with_name("residual_stress_xx.png"))
+    for run_id, status, message in outcome.failed:
+        print(f"{status}  runs/{run_id}.nc  {message}", file=sys.stderr)
+    counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
+    computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
+    print(f"\n{study.name}: {study.size} runs ({counts}{warned}), {computed}")
+    for written in (outcome.dataset, *picture):
+        print(f"wrote {written}")
+    if outcome.stopped:
+        return INTERRUPTED
+    return OK if outcome.ok else FAILED
+
+
+def scenes(options: argparse.Namespace) -> int:
+    """List the scenes, or the parameters of one."""
+    from studies.tables import scene_table, scenes_table
+
+    print(scene_table(options.name) if options.name else scenes_table())
+    return OK
+
+
+def show(options: argparse.Namespace) -> int:
+    """Print what is known of a run, a study or all studies of a directory."""
+    from studies.reading import find_datasets, open_netcdf
+    from studies.tables import run_details, runs_table
+
+    for path in find_datasets(options.path):
+        with open_netcdf(path) as dataset:
+            single = dataset["status"].size == 1
+            print(f"{dataset.attrs['title']}  ({path})\n")
+            print(run_details(dataset) if single else runs_table(dataset), end="\n\n")
+    return OK
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a field of one run."""
+    from studies.plots import figure
+    from studies.reading import one_run, open_study
+
+    selection = dict(_assignment(text) for text in options.select)
+    with open_study(options.path) as dataset:
+        run = one_run(dataset, selection)
+        _save(figure(run, options.field, options.component, options.zoom), options.out)
+    print(f"wrote {options.out}")
+    return OK
+
+
+def serve(options: argparse.Namespace) -> int:
+    """Start the HTTP service."""
+    # By name, since studies must work where the service is not installed.
+    service: Any = importlib.import_module("service.app")
+    service.serve(options.host, options.port, options.data, options.scheduler)
+    return OK
+
+
+def remote(options: argparse.Namespace) -> int:
+    """Talk to a running service."""
+    import httpx
+
+    from studies.client import Refused, Service
+
+    try:
+        service = Service(options.url)
+        print(options.talk(service, options))
+    except Refused as error:
+        return complain(error, BAD_INPUT)
+    except (httpx.HTTPError, httpx.InvalidURL) as error:
+        return complain(f"{options.url}: {error}", FAILED)
+    return OK
+
+
+def submit(service: Any, options: argparse.Namespace) -> str:
+    """Send a study to a running service and print its id."""
+    return str(service.submit(options.study)["id"])
+
+
+def status(service: Any, options: argparse.Namespace) -> str:
+    """Print the state of a study on a running service."""
+    state = service.status(options.id)
+    return f"{state['status']}  {state['progress']:g} %"
+
+
+def cancel(service: Any, options: argparse.Namespace) -> str:
+    """Stop a study on a running service."""
+    service.cancel(options.id)
+    return f"cancelled {options.id}"
+
+
+def fetch(service: Any, options: argparse.Namespace) -> str:
+    """Save the data set of a study on a running service."""
+    target = options.out or Path(f"{options.id}.nc")
+    service.fetch(options.id, target)
+    return f"wrote {target}"
+
+
+@contextmanager
+def _interruption() -> Iterator[list[int]]:
+    """Give a list that is empty until Ctrl-C; a second Ctrl-C does not wait."""
+    received: list[int] = []
+
+    def receive(number: int, frame: object) -> None:
+        if received:
+            raise KeyboardInterrupt
+        received.append(number)
+        print("\nstopping; what is finished is kept", file=sys.stderr)
+
+    before = signal.signal(signal.SIGINT, receive)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _warned(dataset: Any) -> str:
+    """Return how many runs succeeded with a warning, which their details show."""
+    from studies.dataset import STATUSES
+
+    warned = (dataset["status"] == STATUSES.index("ok")) & (dataset["message"] != "")
+    return f"; {int(warned.sum())} with a warning" if warned.any() else ""
+
+
+def _picture(dataset: Any, path: Path) -> list[Path]:
+    """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
+    from studies.plots import map_figure
+    from studies.reading import one_run
+
+    try:
+        drawn = map_figure(one_run(dataset), "residual_stress", "xx")
+    except StudyError:
+        return []
+    _save(drawn, path)
+    return [path]
+
+
+def _save(drawn: Any, path: Path) -> None:
+    """Write a figure in the format that the name of the file asks for."""
+    from studies.store import appearing
+
+    kinds = drawn.canvas.get_supported_filetypes()
+    kind = path.suffix.removeprefix(".").lower() or "png"
+    if kind not in kinds:
+        raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
+    try:
+        with appearing(path) as part:
+            drawn.savefig(part, format=kind)
+    except OSError as error:
+        raise StudyError("--out", str(path), f"cannot be written: {error.strerror}") from None
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, sign, value = text.partition("=")
+    if not sign:
+        raise StudyError("--select", text, "must be AXIS=VALUE")
+    return name.strip(), value.strip()
+
+
+def complain(reason: object, status: int) -> int:
+    """Say why a command ends, and return its exit status."""
+    print(f"residua: {reason}", file=sys.stderr)
+    return status
