@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.body import Body
+    from solver.surface import Surface
 
 
 def choose_pins(rigid: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -100,9 +101,10 @@ class Discretisation(Part):
         self.free = free
         self.active = choose_pins(motions, free)
 
-    def operators(self, linear_solver: str) -> Operators:
-        """Return the operators of this part."""
-        return Operators(self, linear_solver)
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
+        """Return the operators of this part, whose contact surfaces are given."""
+        contact = [surface.dofs for surface in surfaces]
+        return Operators(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
 
     def external(self, load: float) -> NDArray[np.float64]:
         """Return the external nodal forces (n,) at a load factor or time [N]."""

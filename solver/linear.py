@@ -1,6 +1,7 @@
 """Symmetric sparse systems behind one interface: analyse once, factorise, solve many.
 
-A matrix is given by its upper triangle in CSR form. `analyse` chooses MKL PARDISO where it is
+A matrix is given by its upper triangle in CSR form, with the unknowns ``kept`` on which
+compliances will be asked. `analyse` chooses MKL PARDISO where it is
 installed and SuperLU elsewhere; ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) decides
 otherwise.
 """
@@ -20,7 +21,6 @@ from solver.errors import ModelError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_NOT_POSITIVE = -4
 SOLVERS = ("auto", "pardiso", "superlu")
 
 
@@ -37,15 +37,16 @@ class LinearSolver(Protocol):
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for ``b`` (n,) or (n, k)."""
 
-    def compliance(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return ``columns' A^-1 columns`` for ``columns`` (n, k)."""
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return ``rows A^-1 rows'`` for ``rows`` (k, m) on the m unknowns kept."""
 
 
 class SuperLU:
     """The factorisation every machine has."""
 
-    def __init__(self, upper: sparse.csr_array) -> None:
+    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
         self._upper = upper.copy()
+        self._kept = kept
 
     def factorise(self, data: NDArray[np.float64]) -> None:
         """See `LinearSolver`."""
@@ -65,20 +66,18 @@ class SuperLU:
         """See `LinearSolver`."""
         return np.asarray(self._factor.solve(np.ascontiguousarray(b)))
 
-    def compliance(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `LinearSolver`."""
-        if columns.shape[1] == 0:
-            return np.zeros((0, 0))
-        W = columns.T @ self.solve(columns)
-        return 0.5 * (W + W.T)
+        return _compliance(self, rows, self._upper.shape[0], self._kept)
 
 
 class PardisoSolver:
     """MKL PARDISO: Cholesky, and LDL' when a pivot is not positive."""
 
-    def __init__(self, upper: sparse.csr_array) -> None:
+    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
         self._upper = upper
-        self._definite = pardiso.Pardiso(upper, pardiso.POSITIVE_DEFINITE)
+        self._kept = kept
+        self._definite = pardiso.Pardiso(upper, kept)
         self._indefinite: pardiso.Pardiso | None = None
         self._current = self._definite
 
@@ -90,10 +89,10 @@ class PardisoSolver:
             self._definite.factorise(data)
             self._current = self._definite
         except pardiso.PardisoError as failure:
-            if failure.code != _NOT_POSITIVE:
+            if failure.code != pardiso.NOT_POSITIVE:
                 raise Singular(str(failure)) from failure
             if self._indefinite is None:
-                self._indefinite = pardiso.Pardiso(self._upper, pardiso.INDEFINITE)
+                self._indefinite = pardiso.Pardiso(self._upper, kind=pardiso.INDEFINITE)
             try:
                 self._indefinite.factorise(data)
             except pardiso.PardisoError as error:
@@ -104,13 +103,29 @@ class PardisoSolver:
         """See `LinearSolver`."""
         return self._current.solve(b)
 
-    def compliance(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `LinearSolver`."""
-        return self._current.compliance(columns)
+        if self._current is self._definite:
+            return self._definite.compliance(rows)
+        return _compliance(self, rows, self._upper.shape[0], self._kept)
 
 
-def analyse(upper: sparse.csr_array, name: str = "auto") -> LinearSolver:
+def _compliance(
+    solver: LinearSolver, rows: NDArray[np.float64], n: int, kept: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return ``rows A^-1 rows'`` from a solution for each row."""
+    columns = np.zeros((n, len(rows)))
+    columns[kept] = rows.T
+    W = rows @ solver.solve(columns)[kept]
+    return 0.5 * (W + W.T)
+
+
+def analyse(
+    upper: sparse.csr_array, name: str = "auto", kept: NDArray[np.int64] | None = None
+) -> LinearSolver:
     """Return a solver for matrices with the pattern of ``upper``.
+
+    ``kept`` (m,), increasing, are the unknowns on which `LinearSolver.compliance` will be asked.
 
     Raises
     ------
@@ -122,4 +137,5 @@ def analyse(upper: sparse.csr_array, name: str = "auto") -> LinearSolver:
     available = pardiso.library() is not None
     if name == "pardiso" and not available:
         raise ModelError("linear_solver", name, "needs MKL: pip install 'residua[mkl]'")
-    return PardisoSolver(upper) if available and name != "superlu" else SuperLU(upper)
+    kept = np.zeros(0, dtype=np.int64) if kept is None else kept
+    return PardisoSolver(upper, kept) if available and name != "superlu" else SuperLU(upper, kept)

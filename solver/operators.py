@@ -24,60 +24,72 @@ class Operator(Protocol):
         """Return displacements (n,) for nodal forces (n,)."""
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on the unknowns ``dofs``."""
+        """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on unknowns of contact surfaces."""
+
+
+class Analysed:
+    """The stiffness pattern of a part, and its unknowns on contact surfaces.
+
+    Attributes
+    ----------
+    part : the body
+    kept : (n,) position of each unknown among those kept, -1 for the others
+    solver : of the active unknowns
+    """
+
+    def __init__(self, part: Discretisation, contact: NDArray[np.int64], name: str) -> None:
+        self.part = part
+        kept = np.isin(part.active, contact)
+        self.kept = np.full(part.n, -1)
+        self.kept[part.active[kept]] = np.arange(kept.sum())
+        self.solver = linear.analyse(part.pattern, name, np.flatnonzero(kept))
 
 
 class Factored:
     """A factorised tangent."""
 
-    def __init__(self, part: Discretisation, solver: linear.LinearSolver) -> None:
-        self._part = part
-        self._solver = solver
+    def __init__(self, analysed: Analysed, data: NDArray[np.float64]) -> None:
+        self._analysed = analysed
+        analysed.solver.factorise(data)
 
     def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
-        u = np.zeros(self._part.n)
-        u[self._part.active] = self._solver.solve(force[self._part.active])
+        part = self._analysed.part
+        u = np.zeros(part.n)
+        u[part.active] = self._analysed.solver.solve(force[part.active])
         return u
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
-        columns = np.zeros((self._part.n, len(rows)))
-        columns[dofs] = rows.T
-        return self._solver.compliance(columns[self._part.active])
-
-
-class Elastic(Factored):
-    """The elastic stiffness: factorised once, and condensed once to each surface."""
-
-    def __init__(self, part: Discretisation, solver: linear.LinearSolver) -> None:
-        super().__init__(part, solver)
-        solver.factorise(part.elastic_data)
-        self._surfaces: dict[bytes, NDArray[np.float64]] = {}
-
-    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `Operator`."""
-        key = dofs.tobytes()
-        if key not in self._surfaces:
-            self._surfaces[key] = super().compliance(dofs, np.eye(len(dofs)))
-        return np.asarray(rows @ self._surfaces[key] @ rows.T)
+        place = self._analysed.kept[dofs]
+        block = np.zeros((len(rows), self._analysed.kept.max() + 1))
+        block[:, place[place >= 0]] = rows[:, place >= 0]
+        return self._analysed.solver.compliance(block)
 
 
 class Operators:
-    """The operators of one part; elastic ones are made once and kept."""
+    """The operators of one part; the elastic one is made once and kept.
 
-    def __init__(self, part: Discretisation, linear_solver: str) -> None:
+    Parameters
+    ----------
+    contact : unknowns of its contact surfaces
+    """
+
+    def __init__(
+        self, part: Discretisation, contact: NDArray[np.int64], linear_solver: str
+    ) -> None:
         self._part = part
+        self._contact = contact
         self._name = linear_solver
 
     @cached_property
-    def elastic(self) -> Elastic:
+    def elastic(self) -> Operator:
         """The elastic operator."""
-        return Elastic(self._part, linear.analyse(self._part.pattern, self._name))
+        return Factored(Analysed(self._part, self._contact, self._name), self._part.elastic_data)
 
     @cached_property
-    def _solver(self) -> linear.LinearSolver:
-        return linear.analyse(self._part.pattern, self._name)
+    def _analysed(self) -> Analysed:
+        return Analysed(self._part, self._contact, self._name)
 
     def tangent(self, response: Response, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
@@ -86,8 +98,7 @@ class Operators:
         data = self._part.tangent_data(response)
         if blend:
             data = (1 - blend) * data + blend * self._part.elastic_data
-        self._solver.factorise(data)
-        return Factored(self._part, self._solver)
+        return Factored(self._analysed, data)
 
 
 class Dense:

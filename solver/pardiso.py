@@ -1,8 +1,8 @@
 """MKL PARDISO through its documented C interface, phases apart.
 
 The `mkl` wheel ships the library; its phases are called here one by one (analysis once per
-pattern, a factorisation per matrix, half solves for compliances), which wrappers of the whole
-call do not offer.
+pattern, a factorisation per matrix, elimination down to a Schur complement), which wrappers of
+the whole call do not offer.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
 _SEQUENTIAL = 1
-_ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _RELEASE = 11, 22, 33, 331, -1
+_ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
+NOT_POSITIVE = -4
 POSITIVE_DEFINITE, INDEFINITE = 2, -2
 
 
@@ -40,7 +42,7 @@ def library() -> ctypes.CDLL | None:
 
 
 class PardisoError(RuntimeError):
-    """PARDISO's error number; -4 is a zero or negative pivot."""
+    """PARDISO's error number; `NOT_POSITIVE` is a zero or negative pivot."""
 
     def __init__(self, phase: int, code: int) -> None:
         super().__init__(f"PARDISO phase {phase} failed with error {code}")
@@ -50,15 +52,28 @@ class PardisoError(RuntimeError):
 class Pardiso:
     """One analysed pattern and the factor of the matrix last given.
 
+    With ``kept`` unknowns all others are eliminated; the Schur complement on those kept is
+    factorised densely, so that compliances of kept unknowns cost no sparse solves.
+
     Parameters
     ----------
     upper : upper triangle of a symmetric matrix in CSR, diagonal present
+    kept : (m,) increasing, unknowns eliminated last, of a positive definite matrix; none by
+        default
     kind : `POSITIVE_DEFINITE` or `INDEFINITE`
     """
 
-    def __init__(self, upper: csr_array, kind: int = POSITIVE_DEFINITE) -> None:
+    def __init__(
+        self,
+        upper: csr_array,
+        kept: NDArray[np.int64] | None = None,
+        kind: int = POSITIVE_DEFINITE,
+    ) -> None:
         self.kind = kind
         self.n = upper.shape[0]
+        self._kept = np.zeros(0, dtype=np.int64) if kept is None else kept
+        self._last = np.zeros(self.n, dtype=np.int32)
+        self._last[self._kept] = 1
         self._indptr = upper.indptr.astype(np.int32)
         self._indices = upper.indices.astype(np.int32)
         self._data = upper.data.astype(float)
@@ -68,42 +83,53 @@ class Pardiso:
         self._iparm[1] = 2  # nested dissection
         self._iparm[9] = 8 if kind == INDEFINITE else 0  # pivot perturbation 1e-8
         self._iparm[34] = 1  # zero-based
-        self._call(_ANALYSE)
+        self._iparm[35] = 2 if len(self._kept) else 0  # Schur complement, and factors to solve with
+        nothing = np.zeros(1)
+        self._call(_ANALYSE, nothing, nothing)
         self._free = weakref.finalize(self, _release, self._handle, kind, self._iparm)
 
     def factorise(self, data: NDArray[np.float64]) -> None:
         """Factorise the matrix with these values on the analysed pattern."""
         self._data = np.ascontiguousarray(data, dtype=float)
-        self._call(_FACTORISE)
+        m = len(self._kept)
+        schur = np.zeros((m, m)) if m else np.zeros(1)
+        self._call(_FACTORISE, np.zeros(1), schur)
+        if m:
+            try:
+                self._schur = cho_factor(schur, lower=True)
+            except LinAlgError as failure:
+                raise PardisoError(_FACTORISE, NOT_POSITIVE) from failure
 
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for ``b`` (n,) or (n, k)."""
-        return self._call(_SOLVE, b)
+        # PARDISO reads right-hand sides column by column
+        b = np.asfortranarray(b, dtype=float)
+        x = np.zeros_like(b)
+        if b.size == 0:
+            return x
+        if not len(self._kept):
+            self._call(_SOLVE, b, x)
+            return x
+        half = np.zeros_like(b)
+        self._call(_FORWARD, b, half)
+        half[self._kept] = cho_solve(self._schur, half[self._kept])
+        self._call(_BACKWARD, half, x)
+        return x
 
-    def compliance(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return ``columns' A^-1 columns``, from forward substitution alone where A = L L'."""
-        if self.kind == POSITIVE_DEFINITE:
-            half = self._call(_FORWARD, columns)
-            return half.T @ half
-        W = columns.T @ self.solve(columns)
-        return 0.5 * (W + W.T)
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return ``rows F rows'``, F (m, m) the inverse matrix's part on the kept unknowns."""
+        half = solve_triangular(self._schur[0], rows.T, lower=True)
+        return np.asarray(half.T @ half)
 
     def close(self) -> None:
         """Free the memory MKL holds."""
         self._free()
 
-    def _call(self, phase: int, b: NDArray[np.float64] | None = None) -> Any:
-        # PARDISO reads right-hand sides column by column
-        rhs = np.zeros(1) if b is None else np.asfortranarray(b, dtype=float)
-        x = np.zeros_like(rhs)
-        count = rhs.shape[1] if rhs.ndim == 2 else 1
-        if count == 0:
-            return x
+    def _call(self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64]) -> None:
         _pardiso(
-            phase, self._handle, self.kind, self._iparm, self.n, count,
-            (self._data, self._indptr, self._indices), rhs, x,
+            phase, self._handle, self.kind, self._iparm, self.n, b.shape[1] if b.ndim == 2 else 1,
+            (self._data, self._indptr, self._indices), self._last, b, x,
         )  # fmt: skip
-        return x
 
 
 def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:
@@ -118,6 +144,7 @@ def _pardiso(
     n: int,
     count: int,
     matrix: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+    last: NDArray[Any],
     b: NDArray[Any],
     x: NDArray[Any],
 ) -> None:
@@ -131,7 +158,7 @@ def _pardiso(
 
     mkl.pardiso(
         _pointer(handle), integer(1), integer(1), integer(kind), integer(phase), integer(n),
-        *(_pointer(part) for part in matrix), _pointer(np.zeros(1, dtype=np.int32)),
+        *(_pointer(part) for part in matrix), _pointer(last),
         integer(count), _pointer(iparm), integer(0), _pointer(b), _pointer(x),
         ctypes.byref(error),
     )  # fmt: skip
@@ -141,5 +168,5 @@ def _pardiso(
 
 def _release(handle: NDArray[Any], kind: int, iparm: NDArray[Any]) -> None:
     empty = np.zeros(1, dtype=np.int32)
-    _pardiso(_RELEASE, handle, kind, iparm, 1, 1, (np.zeros(1), empty, empty), np.zeros(1),
-             np.zeros(1))  # fmt: skip
+    _pardiso(_RELEASE, handle, kind, iparm, 1, 1, (np.zeros(1), empty, empty), empty,
+             np.zeros(1), np.zeros(1))  # fmt: skip

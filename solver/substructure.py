@@ -91,9 +91,9 @@ class Substructure(Part):
         nodes = np.searchsorted(self._condensed.nodes, surface.nodes)
         return Surface(nodes, surface.edges, surface.X, surface.measure)
 
-    def operators(self, linear_solver: str) -> Fixed:
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the one operator an elastic part has."""
-        del linear_solver
+        del surfaces, linear_solver
         S = self._condensed.stiffness[np.ix_(self.active, self.active)]
         return Fixed(Dense(S, self.active, self.n))
 

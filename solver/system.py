@@ -101,8 +101,7 @@ def _surfaces(model: Model) -> dict[tuple[str, str], Surface]:
     }
 
 
-def _part(body: Body, surfaces: dict[tuple[str, str], Surface], linear_solver: str) -> Part:
-    own = [chain for (name, _), chain in surfaces.items() if name == body.name]
+def _part(body: Body, own: list[Surface], linear_solver: str) -> Part:
     if body.axle is not None:
         return Wheel(body.discretisation, own, linear_solver)
     if body.material.elastic and body.condense and own:
@@ -138,10 +137,16 @@ class System:
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
         self.model = model
         surfaces = _surfaces(model)
+        own = [[chain for (name, _), chain in surfaces.items() if name == body.name]
+               for body in model.bodies]  # fmt: skip
         self.parts: tuple[Part, ...] = tuple(
-            _part(body, surfaces, linear_solver) for body in model.bodies
+            _part(body, chains, linear_solver)
+            for body, chains in zip(model.bodies, own, strict=True)
         )
-        self.operators = tuple(part.operators(linear_solver) for part in self.parts)
+        self.operators = tuple(
+            part.operators(chains, linear_solver)
+            for part, chains in zip(self.parts, own, strict=True)
+        )
         names = [body.name for body in model.bodies]
         self.interfaces = tuple(
             _interface(contact, self.parts, names, surfaces) for contact in model.contacts

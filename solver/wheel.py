@@ -44,9 +44,9 @@ class Wheel(Substructure):
         self.rigid[self.rim + np.array(moving), np.arange(len(moving))] = 1.0
         self.free = np.concatenate([self.free, self.rim + np.array(moving)])
 
-    def operators(self, linear_solver: str) -> Fixed:
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the one operator of the rim; the hub has no stiffness."""
-        del linear_solver
+        del surfaces, linear_solver
         S = self._condensed.stiffness[np.ix_(self.active, self.active)]
         return Fixed(Dense(S, self.active, self.n))
 

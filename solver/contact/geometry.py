@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6
+_BEYOND = 1.5
 _EDGE_TOLERANCE = 1e-8
 _MIN_COVERED = 1e-3
 
@@ -76,25 +77,36 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     return np.asarray(a[0] * b[1] - a[1] * b[0])
 
 
+def _near(start: NDArray[np.float64], end: NDArray[np.float64]) -> tuple[NDArray[np.int64], ...]:
+    """Return where a line that passes an edge's ends at these signed distances may cross it.
+
+    The chord decides, with room for the edge's curvature: at most `_BEYOND` edge half-lengths
+    past either end.
+    """
+    return np.nonzero(np.abs(start + end) <= _BEYOND * np.abs(start - end))
+
+
 def _project_on_slave(
     x: NDArray[np.float64],
     normals: NDArray[np.float64],
     slave: Surface,
     points: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return xi (n_edges, n_points) where the slave's normal passes through each point."""
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return edges, and xi on them, where the slave's normal passes through a point."""
     count = slave.edges.shape[1]
-    xe = x[:, slave.edges][:, :, None, :]
-    n0, n1 = normals[:, :-1, None], normals[:, 1:, None]
-    xi = np.zeros((len(slave.edges), points.shape[1]))
+    passing = _cross(normals[:, :, None], x[:, slave.vertices, None] - points[:, None])
+    edge, point = _near(passing[:-1], passing[1:])
+    xe, points = x[:, slave.edges[edge]], points[:, point]
+    n0, n1 = normals[:, edge], normals[:, edge + 1]
+    xi = np.zeros(len(edge))
     for _ in range(_NEWTON_STEPS):
-        offset = _combine(xe, shape_functions(xi, count)) - points[:, None]
+        offset = _combine(xe, shape_functions(xi, count)) - points
         slope = _combine(xe, shape_derivatives(xi, count))
         n = (1 - xi) / 2 * n0 + (1 + xi) / 2 * n1
         value = _cross(n, offset)
         derivative = _cross((n1 - n0) / 2, offset) + _cross(n, slope)
         xi = np.clip(xi - value / np.where(derivative == 0, 1.0, derivative), -3.0, 3.0)
-    return xi
+    return edge, xi
 
 
 def _project_on_master(
@@ -103,13 +115,10 @@ def _project_on_master(
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return eta and the distance along ``normals`` of points on the given master edges.
-
-    ``edges`` (..., 2 or 3) broadcasts against ``points`` and ``normals`` (2, ...).
-    """
+    """Return eta (n,) and the distance along ``normals`` of points (2, n) on master edges."""
     count = edges.shape[-1]
     xe = x[:, edges]
-    eta = np.zeros(np.broadcast_shapes(edges.shape[:-1], points.shape[1:]))
+    eta = np.zeros(len(edges))
     for _ in range(_NEWTON_STEPS):
         offset = _combine(xe, shape_functions(eta, count)) - points
         slope = _cross(normals, _combine(xe, shape_derivatives(eta, count)))
@@ -118,13 +127,29 @@ def _project_on_master(
     return eta, (normals * offset).sum(axis=0)
 
 
+def _nearest(
+    x: NDArray[np.float64],
+    master: Surface,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the master edge nearest to each point along its normal, and whether there is one."""
+    passing = _cross(normals[:, :, None], x[:, None, master.vertices] - points[:, :, None])
+    point, edge = _near(passing[:, :-1], passing[:, 1:])
+    eta, along = _project_on_master(x, master.edges[edge], points[:, point], normals[:, point])
+    distance = np.full((points.shape[1], len(master.edges)), np.inf)
+    distance[point, edge] = np.where(np.abs(eta) <= 1 + 1e-6, np.abs(along), np.inf)
+    partner = distance.argmin(axis=1)
+    return partner, np.isfinite(distance[np.arange(len(partner)), partner])
+
+
 def _segments(
-    xi: NDArray[np.float64], n_edges: int
+    edge: NDArray[np.int64], xi: NDArray[np.float64], n_edges: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return edge, start and end of the pieces the breakpoints ``xi`` (n_edges, m) cut."""
-    edge, which = np.nonzero(np.abs(xi) < 1 - _EDGE_TOLERANCE)
-    owner = np.concatenate([edge, np.arange(n_edges), np.arange(n_edges)])
-    place = np.concatenate([xi[edge, which], np.full(n_edges, -1.0), np.full(n_edges, 1.0)])
+    """Return edge, start and end of the pieces that breakpoints ``xi`` on ``edge`` cut."""
+    inner = np.abs(xi) < 1 - _EDGE_TOLERANCE
+    owner = np.concatenate([edge[inner], np.arange(n_edges), np.arange(n_edges)])
+    place = np.concatenate([xi[inner], np.full(n_edges, -1.0), np.full(n_edges, 1.0)])
     order = np.lexsort((place, owner))
     owner, place = owner[order], place[order]
     inside = (owner[1:] == owner[:-1]) & (place[1:] - place[:-1] > _EDGE_TOLERANCE)
@@ -140,8 +165,8 @@ def pair(
     """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm]."""
     xs, xm = slave.X + slave_u, master.X + master_u
     normals = vertex_normals(xs, slave)
-    xi = _project_on_slave(xs, normals, slave, xm[:, master.vertices])
-    edge, start, end = _segments(xi, len(slave.edges))
+    cut, xi = _project_on_slave(xs, normals, slave, xm[:, master.vertices])
+    edge, start, end = _segments(cut, xi, len(slave.edges))
 
     def on_slave(
         e: NDArray[np.int64], at: NDArray[np.float64]
@@ -151,11 +176,8 @@ def pair(
         return position, n / np.linalg.norm(n, axis=0)
 
     middle, n = on_slave(edge, (start + end) / 2)
-    eta, distance = _project_on_master(xm, master.edges[None], middle[:, :, None], n[:, :, None])
-    distance = np.where(np.abs(eta) <= 1 + 1e-6, np.abs(distance), np.inf)
-    partner = distance.argmin(axis=1)
-    facing = np.isfinite(distance[np.arange(len(edge)), partner])
-    edge, start, end, partner = (a[facing] for a in (edge, start, end, partner))
+    partner, facing = _nearest(xm, master, middle, n)
+    edge, partner, start, end = edge[facing], partner[facing], start[facing], end[facing]
 
     at = ((start + end)[:, None] + (end - start)[:, None] * _GAUSS_XI) / 2
     edge, partner = (np.repeat(a, len(_GAUSS_XI)) for a in (edge, partner))

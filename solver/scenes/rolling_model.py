@@ -21,6 +21,7 @@ from solver.scenes.parameters import Friction, Length, MaterialParameters, descr
 _MARGIN = 2.5  # fine track beyond the ends / Hertz half-width
 _RIM = 4.0  # fine rim beyond the track / Hertz half-width
 _HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
+_DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
 _HUB = 0.3  # radius of the rigid hub / R
 _LONGEST_REACH = 0.8  # of half the rim
 _MOST_COLUMNS = 3000
@@ -154,7 +155,9 @@ def _half_space(parameters: RollingParameters) -> Body:
     beyond = fine + graded(far, h, 1.4, far / 4)[1:]
     track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
     x = np.concatenate([-beyond[::-1], track, beyond])
-    y = -graded(far, h, parameters.growth, far / 4)[::-1]
+    deep = graded(_DEEP * a, h, parameters.growth, _DEEP * a)
+    deeper = deep[-1] + graded(far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[1:]
+    y = -np.concatenate([deep, deeper])[::-1]
     travelling = None
     if parameters.load == "hertz":
         knots = parameters.schedule.knots()
