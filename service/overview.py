@@ -23,6 +23,7 @@ def detail(job: Job, jobs: Jobs, store: Store, window: Window) -> StudyDetail:
     ids = jobs.runs(job.id)
     rows = store.catalogue.rows(ids)
     outcomes = [(rows[i]["status"], rows[i]["message"]) if i in rows else PENDING for i in ids]
+    axes = {name: list(axis) for name, axis in job.study["sweep"].items()}  # of a table, its labels
     page = range(window.offset, min(window.offset + window.limit, len(ids)))
     return StudyDetail(
         **_columns(job),
@@ -34,17 +35,17 @@ def detail(job: Job, jobs: Jobs, store: Store, window: Window) -> StudyDetail:
                 id=ids[position],
                 status=outcomes[position][0],
                 message=outcomes[position][1],
-                at=point(job.study["sweep"], position),
+                at=point(axes, position),
             )
             for position in page
         ],
     )
 
 
-def point(sweep: dict[str, list[Any]], position: int) -> dict[str, Any]:
+def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
     """Return the values on the axes of the run at ``position``; the last axis runs fastest."""
     values = {}
-    for name, axis in reversed(sweep.items()):
+    for name, axis in reversed(axes.items()):
         position, index = divmod(position, len(axis))
         values[name] = axis[index]
     return dict(reversed(values.items()))

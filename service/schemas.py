@@ -8,6 +8,7 @@ from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.jobs import State
+from studies.sweep import Axes
 
 ContentId = Annotated[
     str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")
@@ -75,14 +76,14 @@ class StudyRun(BaseModel):
     id: str
     status: str = Field(description="outcome, or ``pending``")
     message: str
-    at: dict[str, Any] = Field(description="its values on the axes of the sweep")
+    at: dict[str, Any] = Field(description="its values, or labels, on the axes of the sweep")
 
 
 class StudyDetail(StudySummary):
     """A study with its definition and a page of its runs."""
 
     parameters: dict[str, Any]
-    sweep: dict[str, list[Any]]
+    sweep: Axes
     counts: dict[str, int] = Field(description="runs by status")
     runs: list[StudyRun] = Field(description="a page of its runs")
 

@@ -15,6 +15,7 @@ import numpy as np
 from solver.scenes import SCENES, Scene
 from studies import dataset as layout
 from studies.design import Case
+from studies.parameters import parameters_of
 from studies.store import Store, appearing
 from studies.study import Study
 
@@ -25,18 +26,20 @@ SAME = 1e-9
 def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
     """Write the combined data set of `study` and return its path.
 
-    Sweep dimensions come first: the usual ones, then the other axes. Runs are matched by
+    Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is
+    no dimension but a coordinate over the labels of that axis. Runs are matched by
     *label* along labelled dimensions (``component``, ``stage``, ``body``), which get the union
     of the labels. Along numeric dimensions (``x``, ``depth``) they are matched by label too
-    where all runs have the same grid. Where grids differ, as they do when a length is swept,
-    runs are matched by position, and the coordinate becomes a variable over the sweep, so that
-    ``x`` of each run stays with the run; shorter grids are filled up with NaN. Runs without a
-    record are NaN, and `status` says why.
+    where all runs have the same grid, or the beginning of the longest one. Where grids differ,
+    as they do when a length is swept, runs are matched by position, and the coordinate becomes a
+    variable over the sweep, so that ``x`` of each run stays with the run. Shorter grids are
+    filled up with NaN. Runs without a record are NaN, and `status` says why.
     """
     scene = SCENES[study.scene]
     target = store.dataset_path(study.id)
     found = [case for case in cases if store.run_path(case.id).exists()]
-    frame = _Frame(axes=_axes(study, scene), usual=layout.usual_dimensions(scene))
+    axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
+    frame = _Frame(axes=axes, usual=usual, linked=study.linked)
     for case in found:
         with h5py.File(store.run_path(case.id), "r") as run:
             frame.learn(run)
@@ -47,7 +50,8 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
         frame.create_fields(file)
         for case in found:
             with h5py.File(store.run_path(case.id), "r") as run:
-                frame.place(file, run, frame.position(case))
+                place = dict(zip(study.axes, case.index, strict=True))
+                frame.place(file, run, tuple(place.get(name, 0) for name in axes))
         frame.write_small(file)
     return target
 
@@ -55,8 +59,8 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
 def _axes(study: Study, scene: Scene) -> dict[str, list[Any]]:
     """Return all sweep dimensions; a usual one that is not swept has its single value."""
     values = next(study.cases()).values
-    usual = {name: [values[name]] for name in layout.usual_dimensions(scene)}
-    return usual | study.axes
+    usual = [name for name in layout.usual_dimensions(scene) if name not in study.linked]
+    return {name: [values[name]] for name in usual} | study.axes
 
 
 @dataclass(slots=True, kw_only=True)
@@ -65,9 +69,11 @@ class _Frame:
 
     Attributes
     ----------
-    axes, usual : all sweep dimensions with their values; those that every run has
+    axes, usual : all sweep dimensions with their values; those that the file of a run has
+    linked : parameter set by a linked axis -> the axis, the values over it
     labels : labelled dimension -> union of the labels
-    grids, sizes : numeric dimension -> the first grid found; the longest one's length
+    grids, sizes : numeric dimension -> the grid found, of several alike the longest; the
+        greatest length
     ragged : numeric dimensions whose grid differs from run to run
     fields : variable -> (dimensions after the sweep's, attributes)
     small : variable -> its values over the sweep: scalars, flags, grids that differ
@@ -75,6 +81,7 @@ class _Frame:
 
     axes: Mapping[str, Sequence[Any]]
     usual: Sequence[str]
+    linked: dict[str, tuple[str, list[Any]]]
     labels: dict[str, list[str]] = field(default_factory=dict)
     grids: dict[str, np.ndarray] = field(default_factory=dict)
     sizes: dict[str, int] = field(default_factory=dict)
@@ -91,9 +98,10 @@ class _Frame:
         """Number of values on each sweep dimension."""
         return tuple(len(values) for values in self.axes.values())
 
-    def position(self, case: Case) -> tuple[int, ...]:
-        """Return where a case lies on the sweep dimensions."""
-        return tuple(values.index(case.values[name]) for name, values in self.axes.items())
+    @property
+    def auxiliary(self) -> dict[str, str]:
+        """CF attribute of a variable over the sweep: its coordinates that are no dimensions."""
+        return {"coordinates": " ".join(self.linked)} if self.linked else {}
 
     def learn(self, run: h5py.File) -> None:
         """Take in the grids and variables of one run."""
@@ -116,25 +124,29 @@ class _Frame:
             known = self.labels.setdefault(name, [])
             known.extend(label for label in values if label not in known)
             return
-        first = self.grids.setdefault(name, values)
+        grid = self.grids.setdefault(name, values)
         self.sizes[name] = max(self.sizes.get(name, 0), len(values))
-        if len(first) != len(values) or not np.allclose(
-            first, values, rtol=0.0, atol=SAME * np.abs(first).max(initial=0.0)
-        ):
+        both = min(len(grid), len(values))
+        tolerance = SAME * np.abs(grid).max(initial=0.0)
+        if not np.allclose(grid[:both], values[:both], rtol=0.0, atol=tolerance):
             self.ragged.add(name)
+        elif len(values) > len(grid):
+            self.grids[name] = values
 
     def create_axes(self, file: h5netcdf.File, scene: Scene) -> None:
         """Make the dimensions and their coordinates."""
         lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
         file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
-        for name, values in self.axes.items():
-            _write(file, name, (name,), _axis_array(values), layout.axis_attributes(scene, name))
+        own = {name: (name, values) for name, values in self.axes.items()}
+        for name, (axis, values) in (own | self.linked).items():
+            attributes = _axis_attributes(scene, name)
+            _write(file, name, (axis,), _axis_array(values), attributes, complete=True)
         for name, labels in self.labels.items():
             texts = np.array(labels, dtype=object)
-            _write(file, name, (name,), texts, layout.attributes_of(name))
+            _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
         for name, grid in self.grids.items():
             if name not in self.ragged:
-                _write(file, name, (name,), grid, layout.attributes_of(name))
+                _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
                 continue
             by_run = np.full((*self.shape, self.sizes[name]), np.nan)
             self.small[name] = (by_run, layout.attributes_of(name))
@@ -152,7 +164,7 @@ class _Frame:
                 compression_opts=1,
                 shuffle=True,
             )
-            variable.attrs.update(attributes)
+            variable.attrs.update(attributes | self.auxiliary)
 
     def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Put the values of one run in their place."""
@@ -171,8 +183,11 @@ class _Frame:
     def write_small(self, file: h5netcdf.File) -> None:
         """Write what was held in memory: scalars, flags, grids that differ."""
         for name, (values, attributes) in self.small.items():
-            inner = (name,) if name in self.ragged else ()
-            _write(file, name, (*self.axes, *inner), values, attributes)
+            if name in self.ragged:
+                _write(file, name, (*self.axes, name), values, attributes)
+            else:
+                held = attributes | self.auxiliary
+                _write(file, name, tuple(self.axes), values, held, complete=name == "status")
 
     def _inner_shape(self, inner: Sequence[str]) -> tuple[int, ...]:
         return tuple(self.sizes.get(name) or len(self.labels[name]) for name in inner)
@@ -182,6 +197,12 @@ class _Frame:
         if dimension in self.labels:
             return [self.labels[dimension].index(label) for label in _values(run[dimension])]
         return list(range(len(run[dimension])))
+
+
+def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:
+    """Return the attributes of a parameter of the scene, or of a linked axis."""
+    known = name in parameters_of(scene)
+    return layout.axis_attributes(scene, name) if known else layout.attributes_of(name)
 
 
 def _values(variable: h5py.Dataset) -> np.ndarray:
@@ -195,9 +216,11 @@ def _write(
     dimensions: Sequence[str],
     values: np.ndarray,
     attributes: Mapping[str, Any],
+    *,
+    complete: bool = False,
 ) -> None:
+    """Write a variable; one that is not complete gets a fill value."""
     text = values.dtype.kind == "O"
-    complete = name == "status" or tuple(dimensions) == (name,)
     variable = file.create_variable(
         name,
         tuple(dimensions),

@@ -126,11 +126,12 @@ def line_figure(
         raise _too_close(zoom) if zoom is not None else StudyError("field", field, "has no values")
     sheet = Figure(figsize=(8.0, 4.6), dpi=150, layout="constrained")
     axes = sheet.add_subplot()
-    _entitle(axes, run, values, 8.0)
+    _entitle(axes, run, values, 5.6 if others else 8.0)  # the legend takes the rest
     for at in np.ndindex(*(values.sizes[name] for name in others)):
         line = values.isel(dict(zip(others, at, strict=True))).dropna(along)
-        name = ", ".join(_value(line[each]) for each in others)
-        axes.plot(line[along], line, label=name, linewidth=1.6)
+        if line.size:
+            name = ", ".join(_value(line[each]) for each in others)
+            axes.plot(line[along], line, label=name, linewidth=1.6)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
 from typing import TextIO
 
 from studies.dataset import OK
+from studies.design import Case
 from studies.run import StudyEvent
 from studies.study import Study
 
@@ -28,7 +28,7 @@ class Progress:
     def __init__(self, study: Study, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr
         self._bar = self._stream.isatty()
-        self._names = {case.id: _place(study, case.values) for case in study.cases()}
+        self._names = {case.id: _place(study, case) for case in study.cases()}
         self._started = time.monotonic()
         self._begun: float | None = None
         self._progress = 0.0
@@ -78,5 +78,6 @@ class Progress:
         return f"  {int(seconds // 60)}:{int(seconds % 60):02d} left"
 
 
-def _place(study: Study, values: Mapping[str, object]) -> str:
-    return ", ".join(f"{name} = {values[name]}" for name in study.axes) or study.name
+def _place(study: Study, case: Case) -> str:
+    place = study.place(case).items()
+    return ", ".join(f"{name} = {value}" for name, value in place) or study.name

@@ -58,26 +58,41 @@ def sweep_axes(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset["status"].dims]
 
 
+def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the coordinates that tell runs apart, each with its sweep dimension.
+
+    These are the dimensions themselves, and after them what linked axes set.
+    """
+    axes = {axis: axis for axis in sweep_axes(dataset)}
+    return axes | {
+        str(name): axis
+        for axis in axes
+        for name, each in dataset.coords.items()
+        if each.dims == (axis,)
+    }
+
+
 def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = None) -> xr.Dataset:
     """Return one successful run of a study.
 
     Parameters
     ----------
     dataset : of a study or of a run
-    selection : axis -> wanted value. What it leaves open is decided in favour of the largest
-        number and the first label: usually the run with most residual stress.
+    selection : axis, or parameter set by a linked axis -> wanted value. What it leaves open is
+        decided in favour of the largest number and the first label: usually the run with most
+        residual stress.
 
     Raises
     ------
     StudyError
         when an axis or a value is unknown, or no run that matches succeeded
     """
-    axes = sweep_axes(dataset)
+    axes, coordinates = sweep_axes(dataset), sweep_coordinates(dataset)
     chosen = dataset
-    for axis, value in (selection or {}).items():
-        if axis not in axes:
-            raise StudyError(axis, value, f"must be one of {', '.join(axes)}")
-        chosen = chosen.isel({axis: [_position(chosen[axis], value)]})
+    for name, value in (selection or {}).items():
+        if name not in coordinates:
+            raise StudyError(name, value, f"must be one of {', '.join(coordinates)}")
+        chosen = chosen.isel({coordinates[name]: _positions(chosen[name], value)})
     ok = np.argwhere(chosen["status"].to_numpy() == STATUSES.index(OK))
     if not len(ok):
         reasons = sorted({str(text) for text in chosen["message"].to_numpy().flat if text})
@@ -90,7 +105,7 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
 
 
-def _position(axis: xr.DataArray, value: str | float) -> int:
+def _positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
     values = axis.to_numpy()
     try:
         same = (
@@ -101,9 +116,9 @@ def _position(axis: xr.DataArray, value: str | float) -> int:
     except ValueError:
         same = np.zeros(len(values), dtype=bool)
     if not same.any():
-        known = ", ".join(str(each) for each in values)
+        known = ", ".join(dict.fromkeys(str(each) for each in values))
         raise StudyError(str(axis.name), value, f"must be one of {known}")
-    return int(np.argmax(same))
+    return np.flatnonzero(same)
 
 
 def _own_grid(run: xr.Dataset) -> xr.Dataset:

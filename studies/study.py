@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -15,13 +14,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from solver.scenes import SCENES
 from studies import design
 from studies.errors import StudyError
-from studies.identity import canonical, content_id
-from studies.parameters import Parameter, nearest, parameters_of, scene_named
-
-MAXIMUM_RUNS = 100_000
-"""Largest number of points a sweep may have."""
-
-_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
+from studies.identity import content_id
+from studies.parameters import nearest, parameters_of, scene_named
+from studies.sweep import (
+    Axes,
+    checked_axes,
+    checked_table,
+    checked_text,
+    expanded,
+    linked_values,
+    owners,
+)
 
 
 class Study(BaseModel):
@@ -34,8 +37,8 @@ class Study(BaseModel):
     name : 1 to 80 of ``A-Z a-z 0-9 . _ -``, not beginning with a dot
     scene : name of the scene
     parameters : fixed parameters; the rest are the scene's defaults
-    sweep : axes, in the order in which the scene declares its parameters; the values of an
-        axis stay in the order given
+    sweep : axes: lists of values by parameter, and linked axes, which have names of their own
+        and set several parameters by label; see `checked_axes` for their order
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,7 +46,7 @@ class Study(BaseModel):
     name: str
     scene: str
     parameters: dict[str, Any] = Field(default_factory=dict)
-    sweep: dict[str, list[Any]] = Field(default_factory=dict)
+    sweep: Axes = Field(default_factory=dict)
 
     @classmethod
     def from_toml(cls, path: FilePath | str) -> Self:
@@ -85,20 +88,19 @@ class Study(BaseModel):
                 )
         scene = scene_named(content.get("scene"))
         known = parameters_of(scene)
-        fixed = _table("parameters", content.get("parameters", {}), known)
-        swept = _table("sweep", content.get("sweep", {}), known)
-        _check_size(swept)
-        for name in fixed:
-            if name in swept:
-                raise StudyError(f"parameters.{name}", fixed[name], "is swept too: keep one")
-        name = _checked_name(content.get("name"))
+        fixed = checked_table("parameters", content.get("parameters", {}), known)
+        axes = checked_axes(content.get("sweep", {}), known)
+        for parameter, axis in owners(axes).items():
+            if parameter in fixed:
+                allowed = f"is swept too, by sweep.{axis}: keep one"
+                raise StudyError(f"parameters.{parameter}", fixed[parameter], allowed)
+        name = checked_text("name", content.get("name"))
         parameters = {
             key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
         }
-        sweep = {key: _axis(known[key], swept[key]) for key in known if key in swept}
-        for _ in design.cases(scene, parameters, sweep):
+        for _ in expanded(scene, parameters, axes):
             pass  # building a case is how the scene checks combinations of parameters
-        return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": sweep}
+        return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": axes}
 
     @cached_property
     def id(self) -> str:
@@ -106,29 +108,45 @@ class Study(BaseModel):
 
         The name counts, because it is the title of what the study writes: a copy under
         another name is another data set. That costs nothing, since the two share every run.
+        The order of values counts, and so does that of labels.
         """
-        return content_id("study", self.name, self.scene, self.fixed, self.sweep)
+        axes = {
+            name: list(axis.items()) if isinstance(axis, dict) else axis
+            for name, axis in self.sweep.items()
+        }
+        return content_id("study", self.name, self.scene, self.fixed, axes)
 
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
         known = parameters_of(SCENES[self.scene])
-        defaults = {name: p.default for name, p in known.items() if name not in self.sweep}
+        swept = owners(self.sweep)
+        defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
 
-    @property
+    @cached_property
     def axes(self) -> dict[str, list[Any]]:
-        """Swept parameters and their values, in the order of `Case.index`."""
-        return self.sweep
+        """Values on each axis, labels on a linked one, in the order of `Case.index`."""
+        return {name: list(axis) for name, axis in self.sweep.items()}
+
+    @property
+    def linked(self) -> dict[str, tuple[str, list[Any]]]:
+        """Parameters that linked axes set: the axis, and the values over its labels."""
+        return linked_values(self.sweep)
 
     @property
     def size(self) -> int:
         """Number of runs."""
-        return math.prod(len(values) for values in self.sweep.values())
+        return math.prod(len(axis) for axis in self.sweep.values())
 
     def cases(self) -> Iterator[design.Case]:
         """Yield the runs of the study."""
-        return design.cases(SCENES[self.scene], self.parameters, self.sweep)
+        return expanded(SCENES[self.scene], self.parameters, self.sweep)
+
+    def place(self, case: design.Case) -> dict[str, Any]:
+        """Return the value, or the label, of a run of the study on each axis."""
+        pairs = zip(self.axes.items(), case.index, strict=True)
+        return {name: values[position] for (name, values), position in pairs}
 
     def paths(self) -> list[design.Path]:
         """Return the loading paths of the study: the cases that one task computes together."""
@@ -137,42 +155,3 @@ class Study(BaseModel):
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""
         return self.model_dump()
-
-
-def _checked_name(name: Any) -> str:
-    if isinstance(name, str) and _NAME.fullmatch(name):
-        return name
-    raise StudyError("name", name, "must be 1 to 80 of A-Z a-z 0-9 . _ -, not beginning with a dot")
-
-
-def _table(field: str, content: Any, known: Mapping[str, Parameter]) -> dict[str, Any]:
-    if not isinstance(content, Mapping):
-        raise StudyError(field, content, "must be a table of parameters")
-    for name, value in content.items():
-        if name not in known:
-            allowed = f"the scene has no such parameter; it has {', '.join(known)}"
-            raise StudyError(f"{field}.{name}", value, allowed + nearest(name, known))
-    return dict(content)
-
-
-def _check_size(swept: Mapping[str, Any]) -> None:
-    for name, values in swept.items():
-        if not isinstance(values, list | tuple) or not values:
-            raise StudyError(f"sweep.{name}", values, "must be a list of one value or more")
-    runs = math.prod(len(values) for values in swept.values())
-    if runs > MAXIMUM_RUNS:
-        sizes = " x ".join(f"{len(values)} {name}" for name, values in swept.items())
-        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({sizes})")
-
-
-def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
-    seen: dict[str, int] = {}
-    axis = []
-    for position, value in enumerate(values):
-        field = f"sweep.{parameter.name}[{position}]"
-        normal = parameter.normalise(value, field)
-        first = seen.setdefault(canonical(normal), position)
-        if first != position:
-            raise StudyError(field, value, f"occurs already at position {first}: keep one")
-        axis.append(normal)
-    return axis

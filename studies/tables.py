@@ -13,15 +13,20 @@ import xarray as xr
 from solver.scenes import SCENES
 from studies.dataset import STATUSES
 from studies.parameters import parameters_of, scene_named
-from studies.reading import sweep_axes
+from studies.reading import sweep_axes, sweep_coordinates
 
 FIGURES: Mapping[str, str] = {
     "residual_x_half_plane": "residual x half plane",
     "residual_x_punch": "residual x punch",
     "surface_residual_x": "surface residual x",
     "lowest_residual_x": "lowest residual x",
+    "depth_of_lowest_residual_x": "at depth",
     "surface_residual_z": "surface residual z",
     "lowest_residual_z": "lowest residual z",
+    "depth_of_lowest_residual_z": "at depth",
+    "surface_plastic_strain": "surface plastic strain",
+    "highest_plastic_strain": "mid-track plastic strain",
+    "depth_of_highest_plastic_strain": "at depth",
     "peak_contact_pressure": "contact pressure",
     "max_plastic_strain": "plastic strain",
     "increments": "increments",
@@ -33,35 +38,39 @@ FIGURES: Mapping[str, str] = {
 
 _HEADING = 9
 """Characters after which a heading goes on in the next line."""
+_WIDTH = 120
+"""Characters after which a table goes on below, with the axes repeated."""
+_GAP = "  "
 
 
 def runs_table(dataset: xr.Dataset) -> str:
     """Return a line for each run: where it lies in the sweep, its status, its main figures.
 
-    Residual stresses and plastic strain are what contact left; increments, those cut, and the
-    median of Newton's iterations tell how hard it was to find.
+    Beside the labels of a linked axis stands what they set. Residual stresses and plastic strain
+    are what contact left; increments, those cut, and the median of Newton's iterations tell how
+    hard it was to find.
     """
-    axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
-    figures = [name for name in FIGURES if name in dataset]
-    columns = [*axes, "status", *figures]
+    places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+    keys = sum(name == axis for name, axis in places.items())
+    columns = [*places, "status", *(name for name in FIGURES if name in dataset)]
     headings = [FIGURES.get(name, name.replace("_", " ")) for name in columns]
     units = [_unit(dataset[name]) for name in columns]
-    values = {name: dataset[name].to_numpy() for name in ("status", *figures)}
-    grids = {axis: dataset[axis].to_numpy() for axis in axes}
+    values = {name: dataset[name].to_numpy() for name in columns}
     rows = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
-        where = [_text(grids[axis][place[axis]]) for axis in axes]
-        rows.append(
-            [*where, STATUSES[values["status"][at]], *(_text(values[name][at]) for name in figures)]
-        )
-    return _table([*_stacked(headings), units, *rows], right=len(axes) + 1)
+        where = [_text(values[name][place[places[name]]]) for name in columns[: len(places)]]
+        status = STATUSES[values["status"][at]]
+        figures = [_text(values[name][at]) for name in columns[len(places) + 1 :]]
+        rows.append([*where, status, *figures])
+    return _blocks([*_stacked(headings), units, *rows], keys, right=len(places) + 1)
 
 
 def run_details(dataset: xr.Dataset) -> str:
     """Return the parameters, outcome and figures of a single run."""
     lines = [["scene", dataset.attrs["scene"]]]
-    lines += [[name, _text(value)] for name, value in _parameters(dataset).items()]
+    swept = {name: dataset[name].item() for name in sweep_coordinates(dataset)}
+    lines += [[name, _text(value)] for name, value in (_parameters(dataset) | swept).items()]
     lines.append(["status", STATUSES[int(dataset["status"].item())]])
     if message := str(dataset["message"].item()):
         lines.append(["message", message])
@@ -88,7 +97,7 @@ def scene_table(name: str) -> str:
     return f"{scene.name}: {scene.summary}\n\n{_table(lines)}"
 
 
-def _parameters(dataset: xr.Dataset) -> Mapping[str, Any]:
+def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
     return json.loads(dataset.attrs["parameters"])
 
 
@@ -114,12 +123,31 @@ def _stacked(headings: Sequence[str]) -> list[list[str]]:
     ]
 
 
+def _blocks(lines: Sequence[Sequence[str]], keys: int, right: int) -> str:
+    """Return a table in blocks that fit the terminal, the first `keys` columns in each of them."""
+    widths = _widths(lines)
+    blocks = [list(range(keys))]
+    for column in range(keys, len(widths)):
+        needed = sum(widths[i] + len(_GAP) for i in blocks[-1]) + widths[column]
+        if needed > _WIDTH and len(blocks[-1]) > keys:
+            blocks.append(list(range(keys)))
+        blocks[-1].append(column)
+    return "\n\n".join(
+        _table([[line[i] for i in block] for line in lines], sum(i < right for i in block))
+        for block in blocks
+    )
+
+
+def _widths(lines: Sequence[Sequence[str]]) -> list[int]:
+    return [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+
+
 def _table(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
     """Return columns as wide as their widest entry, set flush right from column `right` on."""
-    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+    widths = _widths(lines)
     first = len(widths) if right is None else right
     return "\n".join(
-        "  ".join(
+        _GAP.join(
             cell.rjust(width) if i >= first else cell.ljust(width)
             for i, (cell, width) in enumerate(zip(line, widths, strict=True))
         ).rstrip()

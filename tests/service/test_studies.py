@@ -185,3 +185,36 @@ def test_runs_are_shared_between_studies(service: Server, done: dict[str, Any]) 
     assert copy["id"] != done["id"]
     assert [run["id"] for run in copy["runs"]] == [run["id"] for run in done["runs"]]
     assert len(service.computed()) == before
+
+
+def test_a_linked_axis_is_answered_by_its_labels(service: Server, tmp_path: Path) -> None:
+    study = fake_study("table")
+    study["sweep"] = {
+        "load_ratio": [0.25, 0.5],
+        "case": {"T2": {"friction": 0.375}, "T1": {"hardening": "isotropic"}},
+    }
+    found = service.finished(service.post(study))
+    assert (found["status"], found["counts"]) == ("successful", {"ok": 4})
+    assert found["sweep"]["case"] == {
+        "T2": {"hardening": "none", "friction": 0.375},
+        "T1": {"hardening": "isotropic", "friction": 0.0},
+    }
+    assert [run["at"] for run in found["runs"]] == [
+        {"case": label, "load_ratio": load_ratio}
+        for label in ("T2", "T1")
+        for load_ratio in (0.25, 0.5)
+    ]
+    for run in found["runs"]:
+        parameters = service.client.get(f"/runs/{run['id']}").json()["parameters"]
+        assert found["sweep"]["case"][run["at"]["case"]].items() <= parameters.items()
+        assert run["at"]["load_ratio"] == parameters["load_ratio"]
+    fetched = tmp_path / "table.nc"
+    answer = service.client.get(f"/studies/{found['id']}/dataset.nc")
+    fetched.write_bytes(answer.content)
+    with xr.open_dataset(fetched) as together:
+        stress = together["residual_stress"].sel(case="T2", load_ratio=0.5)
+        assert stress.max() == 0.5 * 1.375
+        assert stress["friction"] == 0.375
+        assert together["hardening"].dims == ("case",)
+    study["sweep"]["case"] = dict(reversed(study["sweep"]["case"].items()))
+    assert service.post(study) != found["id"], "the order of labels is that of the data set"

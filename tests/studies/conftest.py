@@ -17,9 +17,7 @@ from tests.studies.fakes import FAKE
 AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.4]}
 
 
-def fake_study(
-    name: str = "fake", sweep: dict[str, list[Any]] | None = None, **fixed: Any
-) -> Study:
+def fake_study(name: str = "fake", sweep: dict[str, Any] | None = None, **fixed: Any) -> Study:
     return Study.from_dict(
         {"name": name, "scene": "fake", "parameters": fixed, "sweep": sweep or AXES}
     )

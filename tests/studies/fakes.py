@@ -32,6 +32,7 @@ class FakeParameters:
     hardening: Literal["none", "isotropic"] = described("none", "hardening rule")
     half_width: Annotated[float, Gt(0.0), Unit("mm")] = described(50.0, "half-width")
     points: Annotated[int, Interval(ge=2, le=400)] = described(5, "points of the map")
+    passes: Annotated[int, Interval(ge=1, le=10)] = described(1, "passes over the body")
     seconds: Annotated[float, Interval(ge=0.0), Unit("s")] = described(0.0, "duration of a path")
     state: Literal["plane_strain", "plane_stress"] = described("plane_stress", "out of plane")
     trouble: Literal[
@@ -115,12 +116,14 @@ def record(run: FakeParameters) -> Record:
             "y": y,
             "s": s,
             "component": np.array(components),
+            "pass": np.arange(1, run.passes + 1),
             "stage": np.array(["loaded", "unloaded"]),
             "body": np.array(["punch", "half_plane"]),
         },
         fields={
             "residual_stress": (("component", "y", "x"), stress),
             "plastic_strain": (("y", "x"), np.abs(stress[0]) * 1e-5),
+            "pass_creepage": (("pass",), size * np.arange(1.0, run.passes + 1.0)),
             "contact_pressure": (("stage", "s"), np.array([size + s, 0.0 * s])),
         },
         scalars={

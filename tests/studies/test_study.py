@@ -15,7 +15,7 @@ import pytest
 import studies.identity
 from solver.scenes import SCENES
 from studies import Study, StudyError, scene_schema
-from studies.study import MAXIMUM_RUNS
+from studies.sweep import MAXIMUM_RUNS
 from tests.studies.conftest import fake_study
 
 ROOT = Path(__file__).parents[2]
