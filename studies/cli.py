@@ -77,6 +77,13 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--zoom", type=float, metavar="MM", help="only this close to the edge")
     one.add_argument("--out", type=Path, required=True, metavar="PNG")
 
+    one = add("compare", commands.compare)
+    one.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="data set, study or DIR")
+    one.add_argument("--reference", type=Path, metavar="CSV", help="published numbers of your own")
+    one.add_argument("--select", nargs="+", default=[], metavar="AXIS=VALUE")
+    one.add_argument("--out", type=Path, metavar="PNG", help="draw profiles and published numbers")
+    one.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
+
     one = add("serve", commands.serve)
     one.add_argument("--host", default="127.0.0.1")
     one.add_argument("--port", type=_integer(0, 65535), default=8000)

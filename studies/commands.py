@@ -91,6 +91,28 @@ def plot(options: argparse.Namespace) -> int:
     return OK
 
 
+def compare(options: argparse.Namespace) -> int:
+    """Set computed residual stress beside published numbers."""
+    from studies.compare import compare as compared_with
+    from studies.comparison_plot import comparison_figure
+    from studies.comparison_table import comparison_table, write_comparisons
+    from studies.profiles import read_profiles
+    from studies.reference import read_reference, reference_of
+
+    computed = read_profiles(options.paths, dict(map(_assignment, options.select)))
+    published = read_reference(options.reference or reference_of(computed.scene))
+    compared, absent = compared_with(computed, published)
+    print(comparison_table(computed, compared, absent))
+    if options.out:
+        _save(comparison_figure(computed, published), options.out)
+        print(f"wrote {options.out}")
+    if options.csv:
+        with _written("--csv", options.csv) as part:
+            write_comparisons(part, computed, compared)
+        print(f"wrote {options.csv}")
+    return OK
+
+
 def serve(options: argparse.Namespace) -> int:
     """Start the HTTP service."""
     # By name, since studies must work where the service is not installed.
@@ -180,17 +202,24 @@ def _picture(dataset: Any, path: Path) -> list[Path]:
 
 def _save(drawn: Any, path: Path) -> None:
     """Write a figure in the format that the name of the file asks for."""
-    from studies.store import appearing
-
     kinds = drawn.canvas.get_supported_filetypes()
     kind = path.suffix.removeprefix(".").lower() or "png"
     if kind not in kinds:
         raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
+    with _written("--out", path) as part:
+        drawn.savefig(part, format=kind)
+
+
+@contextmanager
+def _written(option: str, path: Path) -> Iterator[Path]:
+    """Give a path to write to, for the file that an option names."""
+    from studies.store import appearing
+
     try:
         with appearing(path) as part:
-            drawn.savefig(part, format=kind)
+            yield part
     except OSError as error:
-        raise StudyError("--out", str(path), f"cannot be written: {error.strerror}") from None
+        raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
 
 
 def _assignment(text: str) -> tuple[str, str]:

@@ -72,6 +72,27 @@ def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
     }
 
 
+def select(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> xr.Dataset:
+    """Return the part of a data set where the sweep has the wanted values, all axes kept.
+
+    Parameters
+    ----------
+    dataset : of a study or of a run
+    selection : axis, or parameter set by a linked axis -> wanted value
+
+    Raises
+    ------
+    StudyError
+        when an axis or a value is unknown
+    """
+    coordinates = sweep_coordinates(dataset)
+    for name, value in selection.items():
+        if name not in coordinates:
+            raise StudyError(name, value, f"must be one of {', '.join(coordinates)}")
+        dataset = dataset.isel({coordinates[name]: _positions(dataset[name], value)})
+    return dataset
+
+
 def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = None) -> xr.Dataset:
     """Return one successful run of a study.
 
@@ -87,12 +108,8 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     StudyError
         when an axis or a value is unknown, or no run that matches succeeded
     """
-    axes, coordinates = sweep_axes(dataset), sweep_coordinates(dataset)
-    chosen = dataset
-    for name, value in (selection or {}).items():
-        if name not in coordinates:
-            raise StudyError(name, value, f"must be one of {', '.join(coordinates)}")
-        chosen = chosen.isel({coordinates[name]: _positions(chosen[name], value)})
+    axes = sweep_axes(dataset)
+    chosen = select(dataset, selection or {})
     ok = np.argwhere(chosen["status"].to_numpy() == STATUSES.index(OK))
     if not len(ok):
         reasons = sorted({str(text) for text in chosen["message"].to_numpy().flat if text})

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from solver.scenes import SCENES
+from studies.columns import aligned, in_blocks, stacked
 from studies.dataset import STATUSES
 from studies.parameters import parameters_of, scene_named
 from studies.reading import sweep_axes, sweep_coordinates
@@ -36,12 +36,6 @@ FIGURES: Mapping[str, str] = {
 }
 """Variables a table of runs shows, where the scene gives them, and their headings."""
 
-_HEADING = 9
-"""Characters after which a heading goes on in the next line."""
-_WIDTH = 120
-"""Characters after which a table goes on below, with the axes repeated."""
-_GAP = "  "
-
 
 def runs_table(dataset: xr.Dataset) -> str:
     """Return a line for each run: where it lies in the sweep, its status, its main figures.
@@ -63,7 +57,7 @@ def runs_table(dataset: xr.Dataset) -> str:
         status = STATUSES[values["status"][at]]
         figures = [_text(values[name][at]) for name in columns[len(places) + 1 :]]
         rows.append([*where, status, *figures])
-    return _blocks([*_stacked(headings), units, *rows], keys, right=len(places) + 1)
+    return in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
 
 
 def run_details(dataset: xr.Dataset) -> str:
@@ -80,12 +74,12 @@ def run_details(dataset: xr.Dataset) -> str:
         for name, each in dataset.data_vars.items()
         if each.ndim == rank and name not in {"status", "message"}
     ]
-    return _table(lines)
+    return aligned(lines)
 
 
 def scenes_table() -> str:
     """Return a line for each scene."""
-    return _table([[scene.name, scene.summary] for scene in SCENES.values()])
+    return aligned([[scene.name, scene.summary] for scene in SCENES.values()])
 
 
 def scene_table(name: str) -> str:
@@ -94,7 +88,7 @@ def scene_table(name: str) -> str:
     known = parameters_of(scene).values()
     lines = [["parameter", "default", "allowed", "meaning"]]
     lines += [[each.name, _text(each.default), each.allowed, each.description] for each in known]
-    return f"{scene.name}: {scene.summary}\n\n{_table(lines)}"
+    return f"{scene.name}: {scene.summary}\n\n{aligned(lines)}"
 
 
 def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
@@ -112,44 +106,3 @@ def _text(value: Any) -> str:
 def _unit(variable: xr.DataArray) -> str:
     unit = variable.attrs.get("units", "")
     return "" if unit in {"", "1"} else f"[{unit}]"
-
-
-def _stacked(headings: Sequence[str]) -> list[list[str]]:
-    """Return headings in as many lines as the longest needs, the last line full."""
-    parts = [textwrap.wrap(text, _HEADING, break_long_words=False) for text in headings]
-    deepest = max(map(len, parts))
-    return [
-        list(line) for line in zip(*([""] * (deepest - len(p)) + p for p in parts), strict=True)
-    ]
-
-
-def _blocks(lines: Sequence[Sequence[str]], keys: int, right: int) -> str:
-    """Return a table in blocks that fit the terminal, the first `keys` columns in each of them."""
-    widths = _widths(lines)
-    blocks = [list(range(keys))]
-    for column in range(keys, len(widths)):
-        needed = sum(widths[i] + len(_GAP) for i in blocks[-1]) + widths[column]
-        if needed > _WIDTH and len(blocks[-1]) > keys:
-            blocks.append(list(range(keys)))
-        blocks[-1].append(column)
-    return "\n\n".join(
-        _table([[line[i] for i in block] for line in lines], sum(i < right for i in block))
-        for block in blocks
-    )
-
-
-def _widths(lines: Sequence[Sequence[str]]) -> list[int]:
-    return [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
-
-
-def _table(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
-    """Return columns as wide as their widest entry, set flush right from column `right` on."""
-    widths = _widths(lines)
-    first = len(widths) if right is None else right
-    return "\n".join(
-        _GAP.join(
-            cell.rjust(width) if i >= first else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    )

@@ -1,0 +1,53 @@
+"""Text in columns: aligned, under stacked headings, in blocks that fit a terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+_HEADING = 9
+"""Characters after which a heading goes on in the next line."""
+_WIDTH = 120
+"""Characters after which a table goes on below, with the axes repeated."""
+_GAP = "  "
+
+
+def stacked(headings: Sequence[str]) -> list[list[str]]:
+    """Return headings in as many lines as the longest needs, the last line full."""
+    parts = [textwrap.wrap(text, _HEADING, break_long_words=False) for text in headings]
+    deepest = max(map(len, parts))
+    return [
+        list(line) for line in zip(*([""] * (deepest - len(p)) + p for p in parts), strict=True)
+    ]
+
+
+def in_blocks(lines: Sequence[Sequence[str]], keys: int, right: int) -> str:
+    """Return a table in blocks that fit the terminal, the first `keys` columns in each of them."""
+    widths = _widths(lines)
+    blocks = [list(range(keys))]
+    for column in range(keys, len(widths)):
+        needed = sum(widths[i] + len(_GAP) for i in blocks[-1]) + widths[column]
+        if needed > _WIDTH and len(blocks[-1]) > keys:
+            blocks.append(list(range(keys)))
+        blocks[-1].append(column)
+    return "\n\n".join(
+        aligned([[line[i] for i in block] for line in lines], sum(i < right for i in block))
+        for block in blocks
+    )
+
+
+def _widths(lines: Sequence[Sequence[str]]) -> list[int]:
+    return [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+
+
+def aligned(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
+    """Return columns as wide as their widest entry, set flush right from column `right` on."""
+    widths = _widths(lines)
+    first = len(widths) if right is None else right
+    return "\n".join(
+        _GAP.join(
+            cell.rjust(width) if i >= first else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    )

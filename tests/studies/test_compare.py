@@ -1,0 +1,246 @@
+"""Published numbers beside computed profiles, on profiles whose features are known."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver.record import Record, Status
+from solver.scenes import SCENES
+from studies import Store, Study
+from studies.cli import main
+from studies.combine import combine
+from studies.compare import Comparison, compare
+from studies.comparison_table import comparison_table
+from studies.dataset import STATUSES, run_dataset
+from studies.errors import StudyError
+from studies.profiles import Computed, read_profiles
+from studies.reference import Published
+from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
+
+
+def published(**given: object) -> Published:
+    usual = {"case": "A", "quantity": "minimum", "component": "xx", "unit": "MPa", "source": "p. 1"}
+    return Published.model_validate(usual | given)
+
+
+@pytest.fixture(scope="module")
+def refined(tmp_path_factory: pytest.TempPathFactory) -> Computed:
+    """Two cases at three meshes and two increments."""
+    path = tmp_path_factory.mktemp("refined") / "a.nc"
+    written(data_set({"A": 2, "B": 1}, (2.0, 1.0, 0.5), (2.0, 1.0)), path)
+    return read_profiles([path], {})
+
+
+def only(computed: Computed, each: Published) -> Comparison:
+    compared, absent = compare(computed, [each])
+    (one,) = compared
+    assert not absent
+    return one
+
+
+@pytest.mark.parametrize(
+    ("quantity", "value", "depth"),
+    [
+        ("surface", -100.0, 0.0),
+        ("minimum", -200.0, LOWEST),
+        ("maximum", 50.0, PEAK),
+        ("local_maximum", 50.0, PEAK),
+    ],
+)
+def test_features_are_read_from_the_profile_under_mid_track(
+    refined: Computed, quantity: str, value: float, depth: float
+) -> None:
+    found, at = refined.profiles["B", 1][0.5, 1.0].feature(published(case="B", quantity=quantity))
+    assert found == pytest.approx(value - 5.0 + 4.0)
+    assert at == pytest.approx(depth)
+
+
+def test_a_local_maximum_is_sought_between_the_given_depths_and_may_not_exist(
+    refined: Computed,
+) -> None:
+    beyond = published(quantity="local_maximum", **{"from": 4.0, "to": 12.0})
+    assert np.isnan(refined.profiles["A", 1][0.5, 1.0].feature(beyond)).all()
+    told = comparison_table(refined, *compare(refined, [beyond.model_copy(update={"value": 1.0})]))
+    assert told.count("none") == 6
+    assert told.endswith("compared 1 of 1 published numbers: 0 of 1 within 50 MPa")
+
+
+def test_a_local_maximum_is_found_below_a_surface_that_lies_higher(refined: Computed) -> None:
+    strain = published(quantity="local_maximum", component="plastic_strain", unit="1")
+    assert refined.profiles["A", 1][1.0, 1.0].feature(strain) == pytest.approx((0.02, PEAK))
+
+
+def test_difference_is_that_of_the_finest_level_and_changes_are_between_the_two_finest(
+    refined: Computed,
+) -> None:
+    one = only(refined, published(value=-220.0))
+    assert list(one.ours) == [
+        (2.0, 2.0),
+        (2.0, 1.0),
+        (1.0, 2.0),
+        (1.0, 1.0),
+        (0.5, 2.0),
+        (0.5, 1.0),
+    ]
+    assert one.difference == pytest.approx(-201.0 + 220.0)
+    assert one.changes == pytest.approx((+5.0, -4.0))
+
+
+def test_changes_are_found_where_mesh_and_increment_are_refined_apart(tmp_path: Path) -> None:
+    meshes = written(
+        data_set({"A": 1}, (2.0, 1.0, 0.5), fixed={"advance_step": 1.0}), tmp_path / "h.nc"
+    )
+    steps = written(
+        data_set({"A": 1}, steps=(2.0, 1.0, 0.5), fixed={"element_size": 1.0}), tmp_path / "s.nc"
+    )
+    one = only(read_profiles([meshes, steps], {}), published(value=-200.0))
+    assert list(one.ours) == [(2.0, 1.0), (1.0, 2.0), (1.0, 1.0), (1.0, 0.5), (0.5, 1.0)]
+    assert one.difference == pytest.approx(-1.0)
+    assert one.changes == pytest.approx((+5.0, -2.0))
+
+
+def test_a_level_that_is_neither_swept_nor_fixed_is_the_default_of_the_scene(
+    tmp_path: Path,
+) -> None:
+    dataset = data_set({"A": 1}, fixed={"element_size": 1.0, "advance_step": 1.0})
+    path = written(dataset, tmp_path / "a.nc")
+    with xr.open_dataset(path) as stored:
+        bare = stored.load().assign_attrs(parameters="{}")
+    bare.to_netcdf(tmp_path / "b.nc")
+    assert read_profiles([tmp_path / "b.nc"], {}).levels == [(1.0, 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "difference"),
+    [(-300.0, -250.0, +49.0), (-210.0, -190.0, 0.0), (None, -210.0, +9.0), (-190.0, None, -11.0)],
+)
+def test_the_difference_from_bounds_is_that_from_the_nearer_one(
+    refined: Computed, low: float | None, high: float | None, difference: float
+) -> None:
+    one = only(refined, published(low=low, high=high))
+    assert one.difference == pytest.approx(difference)
+
+
+def test_a_change_is_taken_against_another_pass_at_the_same_level(refined: Computed) -> None:
+    grown = published(
+        quantity="maximum", component="plastic_strain", value=100.0, unit="%", against="A/1",
+        **{"pass": 2},
+    )  # fmt: skip
+    one = only(refined, grown)
+    assert set(one.ours.values()) == {100.0}
+    assert one.difference == 0.0
+
+
+def test_value_and_depth_of_a_feature_are_two_numbers(refined: Computed) -> None:
+    value, depth = compare(refined, [published(value=-200.0, depth=7.0)])[0]
+    assert (value.unit, depth.unit) == ("MPa", "mm")
+    assert depth.difference == pytest.approx(+1.0)
+
+
+def test_numbers_of_cases_and_passes_that_were_not_computed_are_told_apart(
+    refined: Computed,
+) -> None:
+    wanted = [published(case="C", value=1.0), published(case="B", value=1.0, **{"pass": 2})]
+    against = published(value=1.0, unit="%", against="C/1")
+    assert compare(refined, [*wanted, against]) == ([], [*wanted, against])
+
+
+def test_profiles_are_found_in_the_data_set_of_a_study(tmp_path: Path) -> None:
+    cases = {"twice": {"passes": 2, "traction": 0.3}, "hard": {"hardening": "kinematic"}}
+    study = Study.from_dict(
+        {
+            "name": "linked",
+            "scene": "rolling",
+            "parameters": {"advance_step": 2.0},
+            "sweep": {"case": cases, "element_size": [2.0, 1.0]},
+        }
+    )
+    store = Store(tmp_path / "out")
+    for case in study.cases():
+        passes, size = case.values["passes"], case.values["element_size"]
+        numbers = np.arange(1, passes + 1)
+        line = profile(-100.0, -60.0, 50.0, -200.0) - size
+        stress = np.tile(line, (passes, 3, 4, 1)) * numbers[:, None, None, None]
+        record = Record(
+            parameters=case.parameters,
+            status=Status.OK,
+            coordinates={
+                "pass": numbers,
+                "station": np.array([-10.0, 0.0, 10.0]),
+                "component": np.array(COMPONENTS),
+                "depth": DEPTH,
+            },
+            fields={"residual_profile": (("pass", "station", "component", "depth"), stress)},
+        )
+        store.write_run(run_dataset(SCENES["rolling"], case, record))
+    store.save_study(study)
+    combine(study, store, list(study.cases()))
+    computed = read_profiles([store.directory], {})
+    assert set(computed.profiles) == {("twice", 1), ("twice", 2), ("hard", 1)}
+    assert computed.levels == [(2.0, 2.0), (1.0, 2.0)]
+    one = only(computed, published(case="twice", value=-400.0, **{"pass": 2}))
+    assert list(one.ours.values()) == pytest.approx([-404.0, -402.0])
+
+
+def test_failed_runs_are_not_compared(tmp_path: Path) -> None:
+    dataset = data_set({"A": 1, "B": 1})
+    dataset["status"][{"case": 1}] = STATUSES.index("limit_load")
+    assert set(read_profiles([written(dataset, tmp_path / "a.nc")], {}).profiles) == {("A", 1)}
+
+
+def test_two_results_for_one_level_are_refused_unless_one_is_chosen(tmp_path: Path) -> None:
+    path = written(data_set({"A": 1}, frictions=(0.1, 0.3)), tmp_path / "a.nc")
+    with pytest.raises(
+        StudyError, match=r"another result for case A, pass 1, .*: --select friction=VALUE$"
+    ):
+        read_profiles([path], {})
+    one = only(read_profiles([path], {"friction": "0.3"}), published(value=-206.0))
+    assert one.difference == pytest.approx(0.0)
+
+
+def test_the_same_result_given_twice_is_one_result(tmp_path: Path) -> None:
+    paths = [written(data_set({"A": passes}), tmp_path / f"{passes}.nc") for passes in (1, 2)]
+    assert read_profiles(paths, {}).levels == [(1.0, 1.0)]
+
+
+def test_data_without_cases_are_refused(tmp_path: Path) -> None:
+    path = written(data_set({"A": 1}).isel(case=0, drop=True), tmp_path / "a.nc")
+    with pytest.raises(StudyError, match="must hold residual profiles of cases"):
+        read_profiles([path], {})
+
+
+def test_compare_prints_writes_and_draws(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cases = {"T1": 2, "T3": 2, "T6": 1, "T7": 1}
+    data = written(data_set(cases, (2.0, 1.0, 0.5)), tmp_path / "a.nc")
+    picture, rows = tmp_path / "a.png", tmp_path / "a.csv"
+    assert main(["compare", str(data), "--out", str(picture), "--csv", str(rows)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (minimum,) = [line for line in lines if line.startswith("T1    1     sigma_x lowest  ")]
+    assert minimum.split()[-8:] == ["about", "-220", "-216", "-206", "-201", "+19", "+5", "-"]
+    assert "published, but not computed here: 2 of T8/1" in lines
+    assert lines[-3].startswith("compared 32 of 34 published numbers: ")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    with rows.open() as file:
+        (first, *_) = csv.DictReader(file)
+    assert float(first["element_size=0.5 advance_step=1"]) == pytest.approx(-201.0)
+
+
+def test_compare_takes_published_numbers_of_the_user(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = str(written(data_set({"mine": 1}), tmp_path / "a.nc"))
+    mine = tmp_path / "r.csv"
+    mine.write_text("case,quantity,component,value,unit,source\nmine,surface,zz,-100,MPa,my rig")
+    assert main(["compare", data, "--reference", str(mine)]) == 0
+    assert "1 of 1 within 50 MPa" in capsys.readouterr().out
+    assert main(["compare", data, "--reference", str(tmp_path / "none.csv")]) == 2
+    assert "cannot be read: No such file" in capsys.readouterr().err
+    assert main(["compare", str(tmp_path)]) == 2
+    assert "must be a data set, a study or an output directory" in capsys.readouterr().err
