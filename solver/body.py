@@ -39,6 +39,8 @@ class Body:
     condense : reduce the body to its contact surfaces where its material is elastic
     axle : makes an elastic body a wheel; its supports then hold it to the hub
     travelling : a pressure that moves along a boundary; load factors then are times
+    periodic : two straight boundaries, the second a copy of the first one period along x; the
+        body repeats itself beyond them
     """
 
     name: str
@@ -53,6 +55,7 @@ class Body:
     condense: bool = True
     axle: Axle | None = None
     travelling: TravellingPressure | None = None
+    periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         if self.state not in STATES:
@@ -79,6 +82,10 @@ class Body:
             self.facets(self.travelling.boundary, "travelling")
             if self.material.elastic and self.condense:
                 raise ModelError("travelling", self.name, "needs condense=False on elastic bodies")
+        for boundary in self.periodic or ():
+            self.facets(boundary, "periodic")
+            if boundary in self.supports:
+                raise ModelError(f"supports.{boundary}", self.supports[boundary], "is periodic")
         moved = self.axle is not None or self.travelling is not None
         if moved and self.pressure:
             allowed = "must be empty on a body with an axle or a travelling pressure"

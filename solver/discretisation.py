@@ -12,6 +12,7 @@ from skfem import CellBasis
 from solver import kinematics
 from solver.constitutive import PlasticState, Response, elastic_stiffness, respond
 from solver.elements import element_type
+from solver.errors import ModelError
 from solver.operators import Operators
 from solver.part import Part
 from solver.surface import pressure_forces, travelling_forces
@@ -35,11 +36,14 @@ class Discretisation(Part):
     """Unknowns, quadrature and constant operators of one body.
 
     Unknowns are numbered node by node: ``2 * node`` is x, ``2 * node + 1`` is y. Points are
-    numbered element by element.
+    numbered element by element. Nodes on the far side of a periodic body repeat those on the near
+    side: their unknowns are copies.
 
     Attributes
     ----------
     X : (2, n_nodes) node positions [mm]
+    same : (n_nodes,) the node whose unknowns a node has: itself, unless it is a copy
+    period : length after which a periodic body repeats itself, else 0 [mm]
     dofs : (n_elements, 2 n_element_nodes)
     B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
     weights : (n_elements, n_points) volume of the points, thickness or 2 pi r in it [mm3]
@@ -58,7 +62,9 @@ class Discretisation(Part):
         )
         self.X = self.basis.doflocs
         self.n = 2 * self.X.shape[1]
-        nodes = self.basis.element_dofs
+        self.same, self.period = self._copies()
+        self.copied = np.stack([2 * self.same, 2 * self.same + 1], axis=1).ravel()
+        nodes = self.same[self.basis.element_dofs]
         self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
         self.dofs = self.dofs.reshape(nodes.shape[1], -1)
         self.points = np.asarray(self.basis.global_coordinates())
@@ -85,18 +91,34 @@ class Discretisation(Part):
         """Return the nodes on a named boundary."""
         return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
 
+    def _copies(self) -> tuple[NDArray[np.int64], float]:
+        """Return the node whose unknowns each node has, and the period."""
+        same = np.arange(self.X.shape[1])
+        if self.body.periodic is None:
+            return same, 0.0
+        near, far = (self.boundary_nodes(name) for name in self.body.periodic)
+        near, far = (nodes[np.argsort(self.X[1, nodes])] for nodes in (near, far))
+        apart = self.X[:, far] - self.X[:, near] if len(far) == len(near) else np.ones((2, 1))
+        period = float(apart[0].mean())
+        if not (np.abs(apart - [[period], [0.0]]) < 1e-9 * abs(period)).all() or period <= 0:
+            allowed = "the second must be a copy of the first, one period along +x"
+            raise ModelError("periodic", self.body.periodic, allowed)
+        same[far] = near
+        return same, period
+
     def _hold(self) -> None:
         """Find supported unknowns, the rigid motions left, and as many pins to hold them."""
         fixed = np.zeros(self.n, dtype=bool)
-        for boundary, held in self.body.supports.items():
+        for boundary, axes in self.body.supports.items():
             nodes = self.boundary_nodes(boundary)
-            for axis in held:
+            for axis in axes:
                 fixed[2 * nodes + "xy".index(axis)] = True
         motions = kinematics.rigid_motions(self.X, self.body.state)
-        free = np.flatnonzero(~fixed)
-        if fixed.any():
-            left = linalg.null_space(motions[fixed], rcond=1e-9)
-            motions = motions @ left
+        copies = self.copied != np.arange(self.n)
+        free = np.flatnonzero(~fixed & ~copies)
+        held = np.vstack([motions[fixed], (motions - motions[self.copied])[copies]])
+        if len(held):
+            motions = motions @ linalg.null_space(held, rcond=1e-9)
         self.rigid = motions
         self.free = free
         self.active = choose_pins(motions, free)

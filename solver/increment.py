@@ -18,13 +18,13 @@ load a plastic tangent of the step before would diverge.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
-from solver.contact.complementarity import OPEN, ContactProblem, solve_contact
+from solver.contact.complementarity import ContactProblem, solve_contact
 from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
@@ -116,7 +116,7 @@ class Increment:
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
             if balanced and candidates.beyond >= 0:
-                return self._commit(u, responses, candidates, contacts, scale, iteration, error)
+                return self._commit(u, responses, candidates, scale, iteration, error)
             elastic_first = iteration == 0 and self.elastic_first
             step = self._step(residuals, responses, candidates, elastic_first)
             if iteration >= _LATE:
@@ -151,7 +151,8 @@ class Increment:
     def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
         if not self.contact:
             return no_candidates(self.system)
-        return find_candidates(self.system, self.start, u, contacts)
+        span = self.load - self.start.load
+        return find_candidates(self.system, self.start, u, contacts, span)
 
     def _on_parts(self, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
         return tuple(
@@ -261,13 +262,11 @@ class Increment:
         u: Vectors,
         responses: tuple[Response, ...],
         candidates: Candidates,
-        contacts: tuple[ContactState, ...],
         scale: float,
         iterations: int,
         error: float,
     ) -> Converged:
-        contacts = candidates.states(contacts, candidates.forces, candidates.status)
-        contacts = tuple(replace(c, touching=c.status != OPEN) for c in contacts)
+        contacts = candidates.kept(self.start.contacts, self.load - self.start.load)
         spent = [
             part.plastic_work(before, response)
             for part, before, response in zip(

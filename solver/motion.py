@@ -76,11 +76,19 @@ class TravellingPressure:
     position: NDArray[np.float64]
     shear_ratio: NDArray[np.float64]
 
-    def at(self, time: float, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Return the pressure at positions x [MPa] and the ratio of shear to it."""
+    def at(
+        self, time: float, x: NDArray[np.float64], period: float = 0.0
+    ) -> tuple[NDArray[np.float64], float]:
+        """Return the pressure at positions x [MPa] and the ratio of shear to it.
+
+        On a periodic body the pressure comes back after each ``period`` [mm].
+        """
         amplitude, centre, ratio = (
             float(np.interp(time, self.time, knots))
             for knots in (self.amplitude, self.position, self.shear_ratio)
         )
-        inside = 1 - ((x - centre) / self.half_width) ** 2
+        away = x - centre
+        if period:
+            away -= period * np.round(away / period)
+        inside = 1 - (away / self.half_width) ** 2
         return amplitude * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio

@@ -57,7 +57,7 @@ class Factored:
         part = self._analysed.part
         u = np.zeros(part.n)
         u[part.active] = self._analysed.solver.solve(force[part.active])
-        return u
+        return u[part.copied]
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""

@@ -13,6 +13,7 @@ then 1                the axle goes to where the next pass begins
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from solver.outcome import Converged
     from solver.stepper import Report
     from solver.system import System
+
+_NOTHING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +67,11 @@ class Schedule:
     def half_steps(self) -> int:
         """Increments from the start to mid-track."""
         return round(self.track / 2 / self.step)
+
+    @property
+    def cycle(self) -> int:
+        """Passes after which the same load comes again."""
+        return len(set(self.directions))
 
     @property
     def marks(self) -> tuple[float, ...]:
@@ -128,13 +136,24 @@ class Passes:
         )
 
     def results(self) -> Iterator[PassResult]:
-        """Yield the result of each pass; the last one carries the error that ended the path."""
+        """Yield the result of each pass; the last one carries the error that ended the path.
+
+        After a cycle of passes in each of which nothing yielded (a millionth of the plastic work
+        so far, or less) all are like those of that cycle, and are not computed again.
+        """
         state, tally = self.system.initial(), Tally()
+        cycle: deque[tuple[PassResult, bool]] = deque(maxlen=self.schedule.cycle)
         for number in range(self.schedule.n):
-            result = self._one(number, state, tally)
+            if len(cycle) == cycle.maxlen and not any(yielded for _, yielded in cycle):
+                result, yielded = replace(cycle[0][0], number=number, tally=tally), False
+            else:
+                result = self._one(number, state, tally)
+                work = result.tally.plastic_work
+                yielded = work - tally.plastic_work > _NOTHING * work
             yield result
             if result.unloaded is None:
                 return
+            cycle.append((result, yielded))
             state, tally = result.unloaded.state, result.tally
 
     def _one(self, number: int, state: State, tally: Tally) -> PassResult:
@@ -198,6 +217,5 @@ class Passes:
         gap = interface.pairing(tuple(u)).gap
         u[self._wheel][wheel.rim + 1] -= gap.min()
         touching = gap < gap.min() + 1e-9 * wheel.radius
-        zero = np.zeros(len(gap))
-        contact = ContactState(zero, zero, touching.astype(np.int64), touching)
-        return replace(state, load=time, u=tuple(u), contacts=(contact,))
+        contacts = (ContactState.at_rest(touching),)
+        return replace(state, load=time, u=tuple(u), contacts=contacts)

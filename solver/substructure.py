@@ -126,7 +126,7 @@ class Substructure(Part):
 
     def expand(self, u: NDArray[np.float64], load: float) -> NDArray[np.float64]:
         """Return the displacements of the whole body [mm]."""
-        return self._condensed.expand(u, load, self.whole.n)
+        return self._condensed.expand(u, load, self.whole.n)[self.whole.copied]
 
 
 def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:
@@ -139,7 +139,7 @@ def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:
         repr((
             linear_solver, material.youngs_modulus, material.poisson_ratio,
             body.state, body.element,
-            body.full_integration, body.thickness,
+            body.full_integration, body.thickness, body.periodic,
             sorted((name, held, body.facets(name).tobytes())
                    for name, held in body.supports.items()),
             sorted((name, value, body.facets(name).tobytes())

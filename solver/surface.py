@@ -84,7 +84,10 @@ def edges_of(part: Discretisation, boundary: str) -> NDArray[np.int64]:
 
 
 def extract(part: Discretisation, boundary: str) -> Surface:
-    """Return the surface of a named boundary, which must be one open chain."""
+    """Return the surface of a named boundary, which must be one open chain.
+
+    That of a periodic body goes on for half a period beyond either end.
+    """
     edges = edges_of(part, boundary)
     following = {int(start): i for i, start in enumerate(edges[:, 0])}
     heads = set(edges[:, 0].tolist()) - set(edges[:, 1].tolist())
@@ -96,9 +99,28 @@ def extract(part: Discretisation, boundary: str) -> Surface:
     if len(order) != len(edges):
         raise ModelError("boundary", boundary, "a contact surface must be one open chain of edges")
     nodes, local = np.unique(edges[order], return_inverse=True)
-    X = part.X[:, nodes]
+    X, chain = part.X[:, nodes], local.reshape(edges.shape)
+    if part.period:
+        nodes, X, chain = _repeated(part.same[nodes], X, chain, part.period)
     measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
-    return Surface(nodes, local.reshape(edges.shape), X, measure)
+    return Surface(nodes, chain, X, measure)
+
+
+def _repeated(
+    nodes: NDArray[np.int64], X: NDArray[np.float64], chain: NDArray[np.int64], period: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return nodes, positions and edges of a chain with half a copy of it at either end."""
+    start, end = chain[0, 0], chain[-1, 1]
+    shift = X[0, end] - X[0, start]
+    half = len(chain) // 2
+    size = len(nodes)
+    before, after = chain[half:] + size, chain[:half] + 2 * size
+    before[-1, 1], after[0, 0] = start, end
+    edges = np.vstack([before, chain, after])
+    across = np.array([[shift], [0.0]])
+    everywhere = np.hstack([X, X - across, X + across])
+    used, local = np.unique(edges, return_inverse=True)
+    return np.tile(nodes, 3)[used], everywhere[:, used], local.reshape(edges.shape)
 
 
 def pressure_forces(part: Discretisation, boundary: str, pressure: float) -> NDArray[np.float64]:
@@ -110,7 +132,9 @@ def travelling_forces(
     part: Discretisation, travelling: TravellingPressure, time: float
 ) -> NDArray[np.float64]:
     """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
-    return _tractions(part, travelling.boundary, lambda x: travelling.at(time, x[0]), 8)
+    return _tractions(
+        part, travelling.boundary, lambda x: travelling.at(time, x[0], part.period), 8
+    )
 
 
 def _tractions(
@@ -121,7 +145,7 @@ def _tractions(
 ) -> NDArray[np.float64]:
     """Integrate a pressure and a shear, a multiple of it against the edges' direction."""
     edges = edges_of(part, boundary)
-    X = part.X[:, edges]
+    X, edges = part.X[:, edges], part.same[edges]
     force = np.zeros((2, part.X.shape[1]))
     for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
         N = shape_functions(np.array(xi), edges.shape[1])

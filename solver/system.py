@@ -33,13 +33,23 @@ class ContactState:
 
     ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
     surface's tangent; ``status`` as in `solver.contact.complementarity`; ``touching`` tells
-    whether the vertex had contact, so that its friction has a history.
+    whether the vertex had contact, so that its friction has a history. ``approach`` (3, n) is
+    the gap [mm], and the rates of gap and slip with the load in the last increment, NaN where
+    not known.
     """
 
     normal: NDArray[np.float64]
     tangential: NDArray[np.float64]
     status: NDArray[np.int64]
     touching: NDArray[np.bool_]
+    approach: NDArray[np.float64]
+
+    @classmethod
+    def at_rest(cls, touching: NDArray[np.bool_]) -> ContactState:
+        """Return the state of vertices without forces, those that touch sticking."""
+        n = len(touching)
+        status = np.where(touching, STICK, OPEN)
+        return cls(np.zeros(n), np.zeros(n), status, touching, np.full((3, n), np.nan))
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,8 +237,5 @@ class System:
             gap = interface.pairing(u).gap
             length = np.ptp(interface.slave_surface.X, axis=1).max()
             touching = gap <= 1e-9 * length
-            n = len(gap)
-            contacts.append(
-                ContactState(np.zeros(n), np.zeros(n), np.where(touching, STICK, OPEN), touching)
-            )
+            contacts.append(ContactState.at_rest(touching))
         return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))

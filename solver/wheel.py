@@ -121,8 +121,10 @@ class Wheel(Substructure):
         return self.placed(float(self.program.time[0]))
 
     def placed(self, time: float) -> NDArray[np.float64]:
-        """Return the undeformed wheel where the program wants it, its meshed rim at the track."""
+        """Return the undeformed wheel where the program wants it.
+
+        A wheel free to turn stands as if it had rolled there from where it was meshed.
+        """
         u = np.zeros(self.n)
-        u[self.rim] = self.program.at(time, "advance")
         u[self.rim + 2] = self.radius * self.turned
-        return u
+        return self.moved(u, time)

@@ -17,6 +17,7 @@ import xarray as xr
 import solver
 from solver.record import Record, Status
 from solver.scenes import Scene
+from solver.shakedown import State as Shakedown
 from studies.design import USUAL_AXES, Case
 from studies.identity import solver_hash
 from studies.parameters import parameters_of
@@ -40,6 +41,10 @@ LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
         "flag_meanings": " ".join(STATUSES),
     },
     "message": {"long_name": "reason of the outcome"},
+    "shakedown_state": {
+        "flag_values": np.array(list(Shakedown), dtype=np.int32),
+        "flag_meanings": " ".join(state.name.lower() for state in Shakedown),
+    },
     "x": {"axis": "X"},
     "y": {"axis": "Y"},
     "depth": {"positive": "down"},

@@ -66,6 +66,18 @@ QUANTITIES: Mapping[str, Quantity] = {
     "pass": Quantity("number of the pass", count=True),
     "pass_creepage": Quantity("creepage of a pass: 1 + R d(rotation) / d(advance)"),
     "pass_max_plastic_strain": Quantity("largest equivalent plastic strain after a pass"),
+    "plastic_flow_profile": Quantity("signed plastic strain along depth"),
+    "pass_plastic_increment": Quantity(
+        "largest equivalent plastic strain accumulated in a cycle, mid-track"
+    ),
+    "pass_net_increment": Quantity(
+        "largest equivalent of the signed plastic strain a cycle leaves, mid-track"
+    ),
+    "pass_net_shear": Quantity("largest plastic shear (engineering) a cycle leaves, mid-track"),
+    "pass_surface_advance": Quantity("displacement along x a cycle gives the surface", "mm"),
+    "shakedown_state": Quantity("what the passes tend to", count=True),
+    "steady_plastic_increment": Quantity("plastic strain accumulated in a cycle, in the end"),
+    "steady_net_increment": Quantity("signed plastic strain a cycle leaves, in the end"),
     "creepage": Quantity("creepage of the last pass"),
     "travel": Quantity("length rolled in the last pass", "mm"),
     "surface_residual_x": Quantity("residual stress xx at the surface, mid-track", "MPa"),

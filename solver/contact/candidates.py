@@ -37,9 +37,10 @@ class Candidates:
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
-    friction : (n,) coefficient; zero where the vertex had no contact before, since a newly
-        touching point starts without tangential force
+    friction : (n,) coefficient; zero where the vertex had no contact before and nothing is
+        known of its approach: it then starts without tangential force
     motion : (n or 2n,) gap, and slip when there is friction [mm]
+    apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
     status : (n,) of the current iterate
     rows : one a part, None for a part without contact surface
@@ -49,6 +50,7 @@ class Candidates:
     vertices: tuple[NDArray[np.int64], ...]
     friction: NDArray[np.float64]
     motion: NDArray[np.float64]
+    apart: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
     rows: tuple[Rows | None, ...]
@@ -119,13 +121,28 @@ class Candidates:
             out.append(replace(state, normal=normal, tangential=tangential, status=statuses))
         return tuple(out)
 
+    def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
+        """Return the contact states after an increment over ``span`` of load."""
+        out, at = [], 0
+        after = self.states(before, self.forces, self.status)
+        for old, new, vertices in zip(before, after, self.vertices, strict=True):
+            here = slice(at, at + len(vertices))
+            at += len(vertices)
+            approach = np.full_like(old.approach, np.nan)
+            approach[0, vertices] = self.motion[: self.n][here]
+            approach[1] = (approach[0] - old.approach[0]) / span
+            if len(self.motion) > self.n:
+                approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] / span
+            out.append(replace(new, touching=new.status != OPEN, approach=approach))
+        return tuple(out)
+
 
 def no_candidates(system: System) -> Candidates:
     """Return the empty set: bodies taken apart."""
     empty = np.zeros(0)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
-    return Candidates(none, empty, empty, empty, empty.astype(int), rows, np.inf)
+    return Candidates(none, empty, empty, empty, empty, empty.astype(int), rows, np.inf)
 
 
 def find_candidates(
@@ -133,14 +150,19 @@ def find_candidates(
     start: State,
     u: tuple[NDArray[np.float64], ...],
     contacts: tuple[ContactState, ...],
+    span: float = 0.0,
 ) -> Candidates:
-    """Return the candidates at displacements ``u``; slips count from the state ``start``."""
+    """Return the candidates at displacements ``u``, the load having grown by ``span``.
+
+    Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
+    it touched, if the last increment tells how it came near.
+    """
     pairings = [interface.pairing(u) for interface in system.interfaces]
     vertices = [_near(p, c) for p, c in zip(pairings, contacts, strict=True)]
     n = sum(len(v) for v in vertices)
     frictional = any(interface.friction > 0 for interface in system.interfaces)
     m = 2 * n if frictional else n
-    motion, friction, beyond = np.zeros(m), np.zeros(n), np.inf
+    motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
     pieces: list[list[Rows]] = [[] for _ in system.parts]
     first = 0
     for interface, pairing, at, before in zip(
@@ -151,7 +173,9 @@ def find_candidates(
         first += len(at)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        friction[normal] = np.where(before.touching[at], interface.friction, 0.0)
+        apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
+        friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
+        apart[normal] = np.nan_to_num(apart[normal])
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
@@ -160,6 +184,9 @@ def find_candidates(
                 moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
                 motion[tangent] += block[tangent] @ moved.T.ravel()
             pieces[number].append(Rows(*part.pull_back(surface, u[number], block)))
+
+    if frictional:
+        motion[n:] -= apart
 
     def gather(name: str) -> NDArray[np.float64]:
         values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]
@@ -170,11 +197,19 @@ def find_candidates(
         vertices=tuple(vertices),
         friction=friction,
         motion=motion,
+        apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
         rows=tuple(_join(p) for p in pieces),
         beyond=float(beyond),
     )
+
+
+def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
+    """Return the slip (n,) while gaps that go on closing as they do stay open; NaN unknown."""
+    gap, closing, sliding = approach[0], approach[1] * span, approach[2] * span
+    share = np.divide(gap, -closing, out=np.full_like(gap, np.nan), where=closing < 0)
+    return np.asarray(sliding * np.clip(share, 0.0, 1.0))
 
 
 def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:

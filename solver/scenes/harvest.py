@@ -145,6 +145,19 @@ class Harvest:
         strain = self._lines(self.plastic(body, converged)).reshape(shape)
         return to_tensor(stress).swapaxes(0, 1), strain
 
+    def flow(self, converged: Converged) -> Array:
+        """Return signed plastic strain (station, 4, depth), tensor components."""
+        body, layout = self.layout.profile_body, self.layout
+        points = self.system.response(body, converged).state.plastic_strain
+        strain = self._lines((self._recover[body] @ points.T).T)
+        return to_tensor(strain.reshape(4, len(layout.station), -1)).swapaxes(0, 1)
+
+    def moved(self, converged: Converged) -> Array:
+        """Return the displacement (2, station) of the surface [mm]."""
+        body, layout = self.layout.profile_body, self.layout
+        u = self.system.displacement(body, converged.state).reshape(-1, 2).T
+        return np.asarray(self._lines(u).reshape(2, len(layout.station), -1)[:, :, 0])
+
     # -- the record's variables ----------------------------------------------------------------
 
     def _on_map(self, values: Callable[[str], Array]) -> Array:

@@ -17,16 +17,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from solver.errors import LimitLoad
 from solver.passes import Passes, PassResult
 from solver.record import Record
 from solver.scenes.harvest import End, Harvest, Layout
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Monitor, Scene
-from solver.stepper import PathControl
+from solver.scenes.trace import Trace, fields, shakedown
+from solver.stepper import PathControl, Tally
 from solver.system import System
 
 
@@ -47,28 +48,10 @@ def layout(parameters: RollingParameters) -> Layout:
     )
 
 
-def _by_pass(harvest: Harvest, done: list[PassResult]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the variables that have the pass as a dimension, and the pass coordinate."""
-    profiles = [harvest.profile(r.unloaded) for r in done if r.unloaded is not None]
-    strain = np.stack([p[1] for p in profiles])
-    peak = [float(r.unloaded.responses[-1].state.accumulated.max()) for r in done if r.unloaded]
-    fields = {
-        "residual_profile": (
-            ("pass", "station", "component", "depth"),
-            np.stack([p[0] for p in profiles]),
-        ),
-        "plastic_strain_profile": (("pass", "station", "depth"), strain),
-        "pass_creepage": (("pass",), np.array([r.creepage for r in done])),
-        "pass_max_plastic_strain": (("pass",), np.array(peak)),
-    }
-    return fields, {"pass": np.arange(1, len(profiles) + 1)}
-
-
-def _figures(harvest: Harvest, result: PassResult) -> dict[str, float]:
+def _figures(harvest: Harvest, trace: Trace, result: PassResult) -> dict[str, float]:
     """Return the figures of the last pass under mid-track that rolling is judged by."""
-    assert result.unloaded is not None
     assert result.mid_track is not None
-    stress, strain = harvest.profile(result.unloaded)
+    stress, strain = trace.stress, trace.strain
     depth = harvest.layout.depth
     middle = len(stress) // 2
     out = {"creepage": result.creepage, "travel": result.travel}
@@ -90,6 +73,25 @@ def _figures(harvest: Harvest, result: PassResult) -> dict[str, float]:
     return out
 
 
+def beyond_strength(parameters: RollingParameters) -> LimitLoad | None:
+    """Return why a prescribed shear has no equilibrium, if so.
+
+    No stress in or inside the yield surface has a shear above the shear yield stress, and the
+    traction is the stress at the surface: without hardening nothing can balance more.
+    """
+    shear = abs(parameters.friction * parameters.traction) * parameters.peak_pressure
+    strength = parameters.yield_stress / math.sqrt(3)
+    hardens = parameters.hardening != "none" and parameters.hardening_ratio > 0
+    if parameters.load != "hertz" or hardens or shear <= strength:
+        return None
+    return LimitLoad(
+        f"the prescribed shear, {shear:.4g} MPa, is above the shear yield stress, "
+        f"{strength:.4g} MPa: no equilibrium without hardening",
+        strength / shear,
+        1.0,
+    )
+
+
 def path(
     parameters: RollingParameters, values: Sequence[float], monitor: Monitor
 ) -> Iterator[Record]:
@@ -99,6 +101,11 @@ def path(
     schedule = parameters.schedule
     system = System(model(parameters))
     harvest = Harvest(system, layout(parameters))
+    if error := beyond_strength(parameters):
+        for n in wanted:
+            end = End(tally=Tally(), error=error, scalars={"travel": 0.0})
+            yield harvest.record(replace(parameters, passes=n), end)
+        return
     control = PathControl(load_step=1.0, max_cuts=4)
     increments = 2 * schedule.half_steps + schedule.press + schedule.release
     expected, done = increments * schedule.n, 0
@@ -108,21 +115,27 @@ def path(
         done += 1
         monitor(min(done / expected, 0.99), message)
 
-    results: list[PassResult] = []
+    traces: list[Trace] = []
     for result in Passes(system, schedule, control, report).results():
-        results.append(result)
+        if result.unloaded is not None:
+            traces.append(Trace.of(harvest, result))
         for n in wanted:
             if n == result.number + 1 or (result.unloaded is None and n > result.number):
-                yield _record(harvest, replace(parameters, passes=n), results)
+                yield _record(harvest, replace(parameters, passes=n), result, traces)
     monitor(1.0, "done")
 
 
-def _record(harvest: Harvest, parameters: RollingParameters, results: list[PassResult]) -> Record:
-    last = results[-1]
+def _record(
+    harvest: Harvest, parameters: RollingParameters, last: PassResult, traces: Sequence[Trace]
+) -> Record:
     if last.unloaded is None or last.mid_track is None or last.loaded is None:
         scalars = {"travel": last.travel}
         return harvest.record(parameters, End(tally=last.tally, error=last.error, scalars=scalars))
-    fields, coordinates = _by_pass(harvest, results)
+    cycle = parameters.schedule.cycle
+    state = shakedown(
+        traces, cycle, parameters.yield_stress / parameters.youngs_modulus,
+        periodic=parameters.periodic,
+    )  # fmt: skip
     end_of_track = parameters.schedule.directions[-1] * parameters.track / 2
     return harvest.record(
         parameters,
@@ -131,9 +144,14 @@ def _record(harvest: Harvest, parameters: RollingParameters, results: list[PassR
             loaded=last.mid_track,
             unloaded=last.unloaded,
             stages=((last.loaded, end_of_track), (last.mid_track, 0.0), (last.unloaded, 0.0)),
-            coordinates=coordinates,
-            fields=fields,
-            scalars=_figures(harvest, last),
+            coordinates={"pass": np.arange(1, len(traces) + 1)},
+            fields=fields(traces, cycle),
+            scalars=_figures(harvest, traces[-1], last)
+            | {
+                "shakedown_state": state.state,
+                "steady_plastic_increment": state.accumulated,
+                "steady_net_increment": state.net,
+            },
         ),
     )
 

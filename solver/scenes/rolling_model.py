@@ -19,9 +19,10 @@ from solver.passes import Schedule
 from solver.scenes.parameters import Friction, Length, MaterialParameters, described
 
 _MARGIN = 2.5  # fine track beyond the ends / Hertz half-width
-_RIM = 4.0  # fine rim beyond the track / Hertz half-width
+_RIM = 2.5  # fine rim beyond the track / Hertz half-width
 _HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
 _DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
+_PERIOD = 6.0  # least length of a track without ends / Hertz half-width
 _HUB = 0.3  # radius of the rigid hub / R
 _LONGEST_REACH = 0.8  # of half the rim
 _MOST_COLUMNS = 3000
@@ -60,6 +61,9 @@ class RollingParameters(MaterialParameters):
         0.0, "angle by which the wheel is turned before it is set down"
     )
     track: Length = described(50.0, "length rolled in a pass, centred on x = 0")
+    periodic: bool = described(
+        False, "whether the half-space repeats itself after each track length: a track without ends"
+    )
     element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
         1.0, "element side along the track and at the surface"
     )
@@ -102,6 +106,12 @@ class RollingParameters(MaterialParameters):
             raise ModelError(
                 "advance_step", self.advance_step,
                 f"makes {increments:.0f} increments; at most {_MOST_INCREMENTS}",
+            )  # fmt: skip
+        if self.periodic and self.track < _PERIOD * self.half_width:
+            raise ModelError(
+                "track", self.track,
+                f"must be at least {_PERIOD:g} Hertz half-widths when it repeats itself, "
+                f"{_PERIOD * self.half_width:.4g} mm",
             )  # fmt: skip
         if self.load == "contact" and self.reach > _LONGEST_REACH * math.pi * self.radius:
             raise ModelError("track", self.track, "must be shorter than the wheel's rim")
@@ -150,11 +160,12 @@ class RollingParameters(MaterialParameters):
 
 def _half_space(parameters: RollingParameters) -> Body:
     a, h = parameters.half_width, parameters.element_size
-    fine = parameters.track / 2 + _MARGIN * a
-    far = _HALF_SPACE * a
+    periodic = parameters.periodic
+    fine = parameters.track / 2 + (0.0 if periodic else _MARGIN * a)
+    far = parameters.track if periodic else _HALF_SPACE * a
     beyond = fine + graded(far, h, 1.4, far / 4)[1:]
     track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
-    x = np.concatenate([-beyond[::-1], track, beyond])
+    x = track if periodic else np.concatenate([-beyond[::-1], track, beyond])
     deep = graded(_DEEP * a, h, parameters.growth, _DEEP * a)
     deeper = deep[-1] + graded(far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[1:]
     y = -np.concatenate([deep, deeper])[::-1]
@@ -176,8 +187,9 @@ def _half_space(parameters: RollingParameters) -> Body:
         name="half_space",
         mesh=grid(x, y),
         material=parameters.material(),
-        supports={"left": "x", "right": "x", "bottom": "xy"},
+        supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
+        periodic=("left", "right") if periodic else None,
     )
 
 
@@ -202,12 +214,17 @@ def _wheel(parameters: RollingParameters) -> Body:
     knots = schedule.knots()
     way = np.repeat(schedule.directions, len(knots["time"]) // parameters.passes)
     full_slip = parameters.friction * parameters.force
+    rotation = None
+    if parameters.traction == 1.0:  # locked
+        rotation = np.full_like(knots["time"], -turned)
+    elif parameters.friction == 0.0:  # nothing turns the wheel: it is turned to roll
+        rotation = -turned - knots["position"] / R
     program = AxleProgram(
         time=knots["time"],
         force=parameters.force * knots["load"],
         moment=R * parameters.traction * full_slip * way * knots["moment"],
         advance=knots["position"],
-        rotation=np.full_like(knots["time"], -turned) if parameters.traction == 1.0 else None,
+        rotation=rotation,
     )
     return Body(
         name="wheel",

@@ -3,8 +3,8 @@
 Shear is the traction on the half-space along +x, the way the wheel goes; a braked wheel drags the
 half-space along (positive), its creepage is positive: it turns less than it advances.
 
-The advance in an increment limits the accuracy more than elements do: a point that comes down in
-an increment carries no tangential force before the next.
+Half-planes stand for the bodies in all of these theories: the contact has to be small against
+the wheel. Where that shows, the wheel is pressed lightly.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ DRIVEN = [0.25, 0.5, 0.75, -0.25, -0.5, -0.75]
 
 @pytest.mark.parametrize("traction", DRIVEN)
 def test_moment_makes_the_longitudinal_force_it_is_meant_to(traction):
-    run = rolled(15, traction=traction)
+    run = rolled(8, traction=traction)
     expected = traction * run.parameters.friction * run.parameters.force
     # the lever arm is R less the approach of the bodies, 0.1 % of R
     assert run.force == pytest.approx(expected, rel=5e-3)
@@ -147,7 +147,7 @@ def test_moment_makes_the_longitudinal_force_it_is_meant_to(traction):
 
 @pytest.mark.parametrize("traction", DRIVEN)
 def test_shear_of_equal_rollers_is_carters(traction):
-    run = rolled(15, traction=traction)
+    run = rolled(8, traction=traction)
     limit = run.parameters.friction * PEAK
     exact = np.sign(traction) * limit * carter_shear(run.x, abs(traction))
     assert run.mean_difference(run.shear, exact) < 0.045 * limit
@@ -155,7 +155,7 @@ def test_shear_of_equal_rollers_is_carters(traction):
 
 @pytest.mark.parametrize("traction", DRIVEN)
 def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction):
-    run = rolled(15, traction=traction)
+    run = rolled(8, traction=traction)
     sticks = np.abs(run.shear) < 0.97 * run.parameters.friction * run.pressure
     inside = np.abs(run.x) < 0.95
     trailing_end = run.x[inside & sticks].min()
@@ -164,12 +164,12 @@ def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction
     assert trailing_end == pytest.approx(1 - 2 * sqrt(1 - abs(traction)), abs=0.25)
 
 
-@pytest.mark.parametrize(("share", "within"), [(0.25, 0.05), (0.5, 0.03), (0.75, 0.05)])
-def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(share, within):
-    free, braking, accelerating = (rolled(15, traction=t) for t in (0.0, share, -share))
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(share):
+    free, braking, accelerating = (rolled(8, traction=t) for t in (0.0, share, -share))
     exact = carter_creepage(free.parameters, share)
-    assert braking.creepage - free.creepage == pytest.approx(exact, rel=within)
-    assert accelerating.creepage - free.creepage == pytest.approx(-exact, rel=within)
+    assert braking.creepage - free.creepage == pytest.approx(exact, rel=0.02)
+    assert accelerating.creepage - free.creepage == pytest.approx(-exact, rel=0.02)
 
 
 # -- dissimilar materials ----------------------------------------------------------------------
@@ -223,16 +223,6 @@ class Stuck:
         return -2 * self.theta * parameters.half_width / parameters.radius
 
 
-def creepage_of_dissimilarity(run):
-    """Return the creepage less that of the wheel's size.
-
-    Equal bodies creep too as the wheel is no half-space: the force stretches it, by P / (E R).
-    """
-    equal = rolled(15, traction=0.0)
-    first, now = (r.parameters.youngs_modulus * r.parameters.wheel_stiffness for r in (equal, run))
-    return run.creepage - equal.creepage * first / now
-
-
 def test_no_slip_solution_satisfies_its_integral_equations():
     stuck, n = Stuck(beta=0.4), 4000
     s, x = (np.cos(pi * (np.arange(n) + shift) / n) for shift in (0.5, 1.0))
@@ -250,10 +240,16 @@ def test_no_slip_solution_satisfies_its_integral_equations():
 @pytest.mark.parametrize("stiffness", [3.0, 1 / 3, 9.0])
 def test_free_creepage_of_dissimilar_rollers_is_bentall_and_johnsons(stiffness):
     """The wheel that pressure shortens more turns more: negative creepage of a soft wheel."""
-    run = rolled(10, stiffness=stiffness)
-    exact = Stuck.of(run.parameters).creepage(run.parameters)
-    assert np.sign(run.creepage) == np.sign(exact) == np.sign(stiffness - 1)
-    assert creepage_of_dissimilarity(run) == pytest.approx(exact, rel=0.03)
+    ratios = []
+    for lightly in (1 / 2, 1 / 4):  # a / R = 1.2 % and 0.6 %
+        load = lightly * PEAK / YIELD
+        run = rolled(10, stiffness=stiffness, friction=0.9, load_ratio=load)
+        exact = Stuck.of(run.parameters).creepage(run.parameters)
+        assert np.sign(run.creepage) == np.sign(exact) == np.sign(stiffness - 1)
+        ratios.append(run.creepage / exact)
+    # what is left is about 1.5 a / R, and half a per cent of mesh
+    assert ratios[1] == pytest.approx(1.0, rel=0.025)
+    assert ratios[0] < ratios[1] < 1
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 1 / 3, 9.0])
@@ -264,8 +260,7 @@ def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta
     exact = PEAK * Stuck.of(run.parameters).shear(run.x)
     for side in (-1, 1):
         flank = (side * run.x > 0.4) & (side * run.x < 0.9)
-        # increments of a/10 take a fifth from it
-        assert run.shear[flank].mean() == pytest.approx(exact[flank].mean(), rel=0.3)
+        assert run.shear[flank].mean() == pytest.approx(exact[flank].mean(), rel=0.15)
         assert (np.sign(run.shear[flank]) == side * np.sign(stiffness - 1)).all()
 
 
@@ -281,12 +276,12 @@ def test_little_friction_of_dissimilar_rollers_raises_creepage_and_slips_three_w
 
     No resultant asks for half the force in each, so for the middle |x| < 0.404 a, and the
     creepage is -beta a / R sqrt(1 - 0.404^2), 1.44 times that without slip. The little friction
-    and elements of a/8 take 4 % from it.
+    and elements of a/8 take some of it.
     """
     run = rolled(8, per_half_width=8, widths=2.5, stiffness=3.0, friction=0.002)
     p = run.parameters
     limit = -Stuck.of(p).beta * p.half_width / p.radius * sqrt(1 - 0.404**2)
-    assert creepage_of_dissimilarity(run) == pytest.approx(limit, rel=0.06)
+    assert run.creepage == pytest.approx(limit, rel=0.06)
     for sign, low, high in ((1, -0.9, -0.75), (-1, -0.2, 0.0), (1, 0.5, 0.6)):
         zone = (run.x > low) & (run.x < high)
         assert run.shear[zone] == pytest.approx(sign * 0.002 * run.pressure[zone], rel=0.05)

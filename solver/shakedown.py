@@ -1,0 +1,161 @@
+"""What becomes of a body that the same load passes again and again.
+
+============================  ===============================================================
+elastic                       it never yields
+elastic shakedown             it yields at first; residual stress then keeps it elastic
+plastic shakedown             every cycle yields, and plastic strain comes back to where it was
+ratchetting                   every cycle leaves plastic strain behind
+undecided                     the cycles have not become steady
+============================  ===============================================================
+
+The *signed* plastic strain tells a closed cycle from an open one; the accumulated strain tells
+whether there is flow at all. Both are judged by where they tend to, from their last three cycles.
+
+K.L. Johnson, Contact Mechanics (1985), section 9.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+QUIET = 1e-3
+"""Accumulated plastic strain of a cycle, over the yield strain, below which nothing flows."""
+CLOSED = 0.05
+"""Plastic strain left by a cycle over that accumulated in it, below which the cycle is closed."""
+STEADY = 0.02
+"""Relative change from cycle to cycle below which a sequence needs no extrapolation."""
+SLOWEST = 0.95
+"""Ratio of successive changes above which a sequence tends nowhere yet."""
+
+_X = np.linspace(-4.0, 4.0, 1601)
+
+
+class State(IntEnum):
+    """The shakedown state, with the value it is stored as."""
+
+    ELASTIC = 0
+    ELASTIC_SHAKEDOWN = 1
+    PLASTIC_SHAKEDOWN = 2
+    RATCHETTING = 3
+    UNDECIDED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Shakedown:
+    """The state, and the plastic strain a cycle accumulates and leaves in the end (NaN unknown)."""
+
+    state: State
+    accumulated: float
+    net: float
+
+
+def tends_to(sequence: Array) -> float:
+    """Return the limit of a sequence (n,), NaN where its last three values do not tell.
+
+    A sequence that changes geometrically is extrapolated (Aitken's process).
+    """
+    if len(sequence) < 3:
+        return np.nan
+    before, last = np.diff(sequence[-3:])
+    if abs(last) <= STEADY * abs(sequence[-1]):
+        return float(sequence[-1])
+    ratio = last / before if before else np.inf
+    if not 0 <= ratio < SLOWEST:
+        return np.nan
+    return float(max(sequence[-1] + last * ratio / (1 - ratio), 0.0))
+
+
+def classify(accumulated: Array, net: Array, yield_strain: float) -> Shakedown:
+    """Return the shakedown state from what each cycle did.
+
+    Parameters
+    ----------
+    accumulated : (n_cycles,) largest equivalent plastic strain accumulated at a depth in a cycle
+    net : (n_cycles,) largest equivalent of the signed plastic strain a cycle leaves at a depth
+    yield_strain : yield stress / Young's modulus
+    """
+    if not accumulated.any():
+        return Shakedown(State.ELASTIC, 0.0, 0.0)
+    quiet = QUIET * yield_strain
+    if accumulated[-1] <= quiet:
+        return Shakedown(State.ELASTIC_SHAKEDOWN, 0.0, 0.0)
+    flow, left = tends_to(accumulated), tends_to(net)
+    if flow <= quiet:
+        return Shakedown(State.ELASTIC_SHAKEDOWN, flow, 0.0)
+    if not (np.isfinite(flow) and np.isfinite(left)):
+        return Shakedown(State.UNDECIDED, flow, left)
+    closed = left <= CLOSED * flow
+    return Shakedown(State.PLASTIC_SHAKEDOWN if closed else State.RATCHETTING, flow, left)
+
+
+def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Array, Array]:
+    """Return sigma_x, sigma_y and tau over p0 under a Hertz pressure that slides along +x.
+
+    ``x`` (n,) and ``depth`` are over the half-width; tension is positive, and the shear traction
+    on the half-space is ``friction`` times the pressure along +x (y and depth point down).
+    E. McEwen, Phil. Mag. 40 (1949) 454-459; Johnson, eqs. (4.49), (7.8).
+    """
+    s = 1 - x**2 + depth**2
+    root = np.sqrt(s**2 + 4 * x**2 * depth**2)
+    m = np.sqrt((root + s) / 2)
+    n = np.sign(x) * np.sqrt(np.maximum(root - s, 0.0) / 2)
+    both = np.maximum(m**2 + n**2, np.finfo(float).tiny)
+    along = 2 * depth - m * (1 + (depth**2 + n**2) / both)
+    across = -m * (1 - (depth**2 + n**2) / both)
+    shear = -n * (m**2 - depth**2) / both
+    dragged = n * (2 + (m**2 - depth**2) / both) - 2 * x
+    return along + friction * dragged, across + friction * shear, shear + friction * along
+
+
+def largest_shear(friction: float) -> tuple[float, float]:
+    """Return the largest shear / p0 below a sliding Hertz contact, and its depth / half-width."""
+
+    def least(depth: float) -> float:
+        return -float(np.abs(sliding_contact(_X, depth, friction)[2]).max())
+
+    found = minimize_scalar(least, bounds=(0.05, 1.5), method="bounded")
+    return -float(found.fun), float(found.x)
+
+
+def johnson_limit(friction: float) -> float:
+    """Return p0 / k up to which a sliding Hertz line contact shakes down elastically.
+
+    Residual stress can take away the difference of normal stresses where the shear is largest,
+    but not the shear, which therefore decides: below the surface, or, from a friction of about
+    0.37 on, at it. Johnson, section 9.2 (maximum shear stress criterion).
+    """
+    return 1 / max(largest_shear(friction)[0], friction)
+
+
+def melan_limit(friction: float, poisson_ratio: float) -> float:
+    """Return `johnson_limit` for von Mises' criterion in plane strain.
+
+    At each depth one residual stress (sigma_x, sigma_z) must bring all stresses met there inside
+    the yield surface (Melan). Below the surface both criteria agree; at the surface the stress
+    out of plane, which follows the two others, makes von Mises' limit the lower one.
+    """
+
+    def least(depth: float) -> float:
+        along, across, shear = sliding_contact(_X, depth, friction)
+        out = poisson_ratio * (along + across)
+
+        def largest(residual: Array) -> float:
+            a, b, c = along + residual[0], across, out + residual[1]
+            return float((((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) / 6 + shear**2).max())
+
+        starts = ((0.1, 0.1), (0.5, 0.2))
+        options = {"xatol": 1e-6, "fatol": 1e-9, "maxiter": 4000}
+        return min(float(minimize(largest, start, method="Nelder-Mead", options=options).fun)
+                   for start in starts)  # fmt: skip
+
+    return float(1 / np.sqrt(max(least(0.0), least(largest_shear(friction)[1]))))

@@ -1,0 +1,189 @@
+"""Shakedown of a half-space under a rolling and sliding contact, against Melan's limits.
+
+K.L. Johnson, Contact Mechanics (1985), section 9.2: without friction a line contact shakes down
+elastically up to p0 = 4 k.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from solver import SCENES, Status
+from solver.scenes.rolling_model import RollingParameters
+from solver.shakedown import (
+    State,
+    classify,
+    johnson_limit,
+    largest_shear,
+    melan_limit,
+    sliding_contact,
+)
+
+YIELD_STRAIN = 502.0 / 2e5
+
+
+@cache
+def rolled(pressure, passes, *, half_width=8.0, status=Status.OK, **fields):
+    """The record of passes at p0 / k = ``pressure`` over a track without ends of 10 a."""
+    p0, modulus = pressure * 502.0 / sqrt(3), 2e5 / (2 * (1 - 0.3**2))
+    parameters = RollingParameters(
+        **{
+            "load": "hertz",
+            "friction": 0.0,
+            "periodic": True,
+            "load_ratio": p0 / 502.0,
+            "radius": half_width * modulus / (2 * p0),
+            "track": 10 * half_width,
+            "element_size": half_width / 4,
+            "advance_step": half_width / 2,
+            "passes": passes,
+        }
+        | fields
+    )
+    assert parameters.half_width == pytest.approx(half_width)
+    (record,) = SCENES["rolling"].path(parameters, [passes], lambda share, text: None)
+    assert record.status is status, record.message
+    return record
+
+
+def state(record):
+    return State(record.scalars["shakedown_state"])
+
+
+def of_passes(record, name):
+    return record.fields[f"pass_{name}"][1]
+
+
+# -- limits in closed form ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("depth", [0.2, 0.8])
+def test_stress_under_a_sliding_contact_is_flamants_summed_up(friction, depth):
+    n = 20_000
+    angle = (np.arange(n) + 0.5) * pi / n
+    s, weight = np.cos(angle), np.sin(angle) ** 2 * pi / n  # p ds
+    x = np.linspace(-2, 2, 9)
+    away = x[:, None] - s
+    radial = -2 / pi * weight * (depth + friction * away) / (away**2 + depth**2) ** 2
+    flamant = ((radial * of).sum(axis=1) for of in (away**2, depth**2, away * depth))
+    for exact, found in zip(flamant, sliding_contact(x, depth, friction), strict=True):
+        assert found == pytest.approx(exact, abs=1e-6)
+
+
+def test_frictionless_limit_is_four_and_its_depth_half_the_half_width():
+    assert johnson_limit(0.0) == pytest.approx(4.0, rel=1e-4)
+    assert melan_limit(0.0, 0.3) == pytest.approx(4.0, rel=1e-4)
+    assert largest_shear(0.0)[1] == pytest.approx(0.5, abs=0.01)
+
+
+def test_friction_lowers_the_limit_and_from_0_37_on_the_surface_governs():
+    limits = [johnson_limit(mu) for mu in (0.0, 0.1, 0.2, 0.3, 0.36)]
+    assert (np.diff(limits) < 0).all()
+    assert limits[-1] < 1 / 0.36
+    assert johnson_limit(0.37) == pytest.approx(1 / 0.37)
+    # the stress out of plane lets the surface govern earlier under von Mises' criterion
+    assert melan_limit(0.2, 0.3) == pytest.approx(johnson_limit(0.2), rel=1e-3)
+    assert melan_limit(0.4, 0.3) < 0.95 * johnson_limit(0.4)
+
+
+# -- the state from what cycles do -------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("accumulated", "net", "expected"),
+    [
+        ([0, 0, 0, 0], [0, 0, 0, 0], State.ELASTIC),
+        ([1e-3, 1e-5, 0, 0], [1e-3, 1e-5, 0, 0], State.ELASTIC_SHAKEDOWN),
+        ([8e-4, 4e-4, 2e-4, 1e-4], [8e-4, 4e-4, 2e-4, 1e-4], State.ELASTIC_SHAKEDOWN),
+        ([3e-3, 2e-3, 2e-3, 2e-3], [1e-3, 4e-4, 2e-4, 1e-4], State.PLASTIC_SHAKEDOWN),
+        ([3e-3, 2e-3, 2e-3, 2e-3], [1e-3, 8e-4, 7e-4, 6.5e-4], State.RATCHETTING),
+        ([3e-3, 2.5e-3, 2e-3, 1.5e-3], [1e-3, 8e-4, 6e-4, 4e-4], State.UNDECIDED),
+        ([3e-3, 2e-3], [3e-3, 2e-3], State.UNDECIDED),
+    ],
+)
+def test_state_follows_from_where_the_cycles_tend_to(accumulated, net, expected):
+    found = classify(np.array(accumulated, float), np.array(net, float), YIELD_STRAIN)
+    assert found.state is expected
+
+
+# -- computed ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("load", ["hertz", "contact"])
+def test_a_pass_does_the_same_all_along_a_track_without_ends(load):
+    flow = rolled(4.3, 6, load=load).fields["plastic_flow_profile"][1]
+    left = flow[-1] - flow[-2]  # (station, component, depth)
+    shear = left[:, 3]
+    assert np.abs(shear - shear.mean(axis=0)).max() < 0.15 * np.abs(shear).max()
+
+
+def test_frictionless_limit_lies_between_3_7_and_4_3():
+    below, above = rolled(3.7, 6), rolled(4.3, 6)
+    assert state(below) is State.ELASTIC_SHAKEDOWN
+    assert (of_passes(below, "plastic_increment")[2:] < 1e-5 * YIELD_STRAIN).all()
+    assert state(above) is State.RATCHETTING
+    assert (of_passes(above, "plastic_increment") > 0.2 * YIELD_STRAIN).all()
+    advance = of_passes(above, "surface_advance")
+    assert (advance[1:] < 0).all()  # against the way the load goes
+    assert advance[-1] == pytest.approx(advance[-2], rel=0.1)
+
+
+def test_advance_a_pass_does_not_depend_on_the_length_of_the_track():
+    short, long = rolled(4.3, 6), rolled(4.3, 6, track=120.0)
+    for name in ("plastic_increment", "net_increment", "surface_advance"):
+        values = of_passes(short, name), of_passes(long, name)
+        assert values[0][-1] == pytest.approx(values[1][-1], rel=0.15)
+
+
+def test_hardening_ends_ratchetting():
+    kinematic = rolled(4.3, 10, hardening="kinematic")
+    assert state(kinematic) is State.PLASTIC_SHAKEDOWN
+    isotropic = rolled(4.3, 10, hardening="isotropic")
+    assert state(isotropic) is State.ELASTIC_SHAKEDOWN
+    assert of_passes(kinematic, "plastic_increment")[-1] > 0.2 * YIELD_STRAIN
+    assert of_passes(isotropic, "plastic_increment")[-1] < 0.01 * YIELD_STRAIN
+
+
+@pytest.mark.parametrize(("friction", "below", "above"), [(0.15, 3.1, 3.65), (0.3, 2.65, 3.15)])
+def test_friction_lowers_the_computed_limit(friction, below, above):
+    assert below < johnson_limit(friction) < above < 4.0
+    shaken, moving = (rolled(p, 8, friction=friction, traction=1.0) for p in (below, above))
+    assert state(shaken) is State.ELASTIC_SHAKEDOWN
+    assert state(moving) is State.RATCHETTING
+    # the surface goes with the traction
+    assert of_passes(moving, "surface_advance")[-1] > 0
+
+
+def test_with_high_friction_the_surface_yields_first():
+    record = rolled(2.0, 3, friction=0.5, traction=1.0, element_size=1.0, advance_step=2.0)
+    assert record.scalars["highest_plastic_strain"] > 0
+    assert record.scalars["depth_of_highest_plastic_strain"] < 0.15 * 8.0
+
+
+def test_true_contact_shakes_down_below_the_limit_and_ratchets_less_above():
+    below, above = (rolled(p, 6, load="contact") for p in (3.7, 4.3))
+    assert state(below) is State.ELASTIC_SHAKEDOWN
+    assert state(above) is State.RATCHETTING
+    prescribed = of_passes(rolled(4.3, 6), "surface_advance")
+    advance = of_passes(above, "surface_advance")
+    assert prescribed[-1] < advance[-1] < 0
+
+
+def test_a_track_with_ends_decides_nothing_but_elastic():
+    ends = {"periodic": False, "track": 40.0}
+    assert state(rolled(3.0, 1, **ends)) is State.ELASTIC
+    assert state(rolled(3.7, 3, **ends)) is State.UNDECIDED
+
+
+def test_prescribed_shear_above_the_strength_is_a_limit_load():
+    load = {"friction": 0.3, "traction": 0.75, "status": Status.LIMIT_LOAD}
+    record = rolled(4.693, 1, **load)
+    assert "305.9" in record.message or "306" in record.message
+    assert "289.8" in record.message
+    assert record.scalars["travel"] == 0.0
+    rolled(4.693, 1, friction=0.3, traction=0.75, hardening="kinematic")  # hardening bears it
