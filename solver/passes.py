@@ -69,6 +69,15 @@ class Schedule:
         return round(self.track / 2 / self.step)
 
     @property
+    def advance(self) -> float:
+        """Advance of an increment, which divides half the track [mm]."""
+        return self.track / (2 * self.half_steps)
+
+    def refined(self, times: int) -> Schedule:
+        """Return the timetable with that many increments of advance in place of one."""
+        return replace(self, step=self.advance / times)
+
+    @property
     def cycle(self) -> int:
         """Passes after which the same load comes again."""
         return len(set(self.directions))

@@ -23,6 +23,8 @@ class Comparison:
     ours : level -> computed number, from coarse to fine; NaN where there is no such feature
     difference : of the finest computed number from the published one, or from its nearer bound
     changes : for each refinement, the change between its two finest levels
+    orders : for each refinement, the order at which its three finest levels settle; NaN where
+        there are fewer, or where they do not settle
     """
 
     published: Published
@@ -30,6 +32,7 @@ class Comparison:
     ours: Mapping[Level, float]
     difference: float
     changes: tuple[float, ...]
+    orders: tuple[float, ...]
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -83,18 +86,31 @@ def _comparison(published: Published, is_depth: bool, ours: Mapping[Level, float
         is_depth=is_depth,
         ours=ours,
         difference=float(ours[finest] - np.clip(ours[finest], low, high)),
-        changes=tuple(_change(ours, axis) for axis in range(len(finest))),
+        changes=tuple(_change(_line(ours, axis)) for axis in range(len(finest))),
+        orders=tuple(_order(_line(ours, axis)) for axis in range(len(finest))),
     )
 
 
-def _change(ours: Mapping[Level, float], axis: int) -> float:
-    """Return the change between the two finest levels along an axis, all else being equal."""
-    lines: dict[Level, dict[float, float]] = defaultdict(dict)
-    for level, value in ours.items():
-        lines[level[:axis] + level[axis + 1 :]][level[axis]] = value
-    refined = {others: sorted(line)[:2] for others, line in lines.items() if len(line) > 1}
-    if not refined:
+def _line(ours: Mapping[Level, float], axis: int) -> list[tuple[float, float]]:
+    """Return size and number, from fine to coarse, of levels that differ along one axis only.
+
+    Of several such lines, that with most levels, then the finest.
+    """
+    lines: dict[Level, list[tuple[float, float]]] = defaultdict(list)
+    for level, value in sorted(ours.items()):
+        lines[level[:axis] + level[axis + 1 :]].append((level[axis], value))
+    return min(lines.values(), key=lambda line: (-len(line), [size for size, _ in line]))
+
+
+def _change(line: Sequence[tuple[float, float]]) -> float:
+    return line[0][1] - line[1][1] if len(line) > 1 else np.nan
+
+
+def _order(line: Sequence[tuple[float, float]]) -> float:
+    """Return p where the three finest numbers differ as ``h^p`` for one ratio of sizes h."""
+    if len(line) < 3:
         return np.nan
-    others = min(refined, key=lambda key: (refined[key], key))
-    fine, coarse = refined[others]
-    return lines[others][fine] - lines[others][coarse]
+    (fine, a), (middle, b), (coarse, c) = line[:3]
+    if a == b or (c - b) / (b - a) <= 0 or not np.isclose(coarse / middle, middle / fine):
+        return np.nan
+    return float(np.log((c - b) / (b - a)) / np.log(middle / fine))

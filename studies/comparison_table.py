@@ -61,13 +61,14 @@ def write_comparisons(path: Path, computed: Computed, compared: Sequence[Compari
     names = ["case", "pass", "number", "unit", "low", "high"]
     names += [" ".join(map("{}={:g}".format, computed.axes, level)) for level in levels]
     names += ["difference", *(f"change_{REFINEMENTS[name]}" for name in computed.axes)]
+    names += [f"order_{REFINEMENTS[name]}" for name in computed.axes]
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*names, "source", "note"])
         for each in compared:
             of = each.published
             ours = [each.ours.get(level, math.nan) for level in levels]
-            numbers = [*each.bounds, *ours, each.difference, *each.changes]
+            numbers = [*each.bounds, *ours, each.difference, *each.changes, *each.orders]
             written = [f"{number:.8g}" if math.isfinite(number) else "" for number in numbers]
             table.writerow([*of.key, _name(each), each.unit, *written, of.source, of.note])
 
@@ -82,7 +83,9 @@ def _lines(computed: Computed, compared: Sequence[Comparison]) -> str:
     if not computed.axes:
         return table
     refined = f"computed at {' / '.join(computed.axes)}, from coarse to fine"
-    return f"{refined}; the difference is that of the finest\n\n{table}"
+    meaning = "the difference is that of the finest, a change that between the two finest"
+    orders = "in brackets the order at which the three finest settle"
+    return f"{refined};\n{meaning}, {orders}\n\n{table}"
 
 
 def _row(each: Comparison, levels: Sequence[Level]) -> list[str]:
@@ -94,7 +97,11 @@ def _row(each: Comparison, levels: Sequence[Level]) -> list[str]:
         "" if each.unit == "1" else each.unit,
         _published(each),
         *(_ours(each, level) for level in levels),
-        *(_number(number, each.unit, "+") for number in (each.difference, *each.changes)),
+        _number(each.difference, each.unit, "+"),
+        *(
+            _number(change, each.unit, "+") + ("" if math.isnan(order) else f" ({order:.1f})")
+            for change, order in zip(each.changes, each.orders, strict=True)
+        ),
     ]
 
 

@@ -38,6 +38,10 @@ _CONFIGURATION = {
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
+    # Arrays of some megabytes come and go in every iteration: dask's threshold of 64 kB would hand
+    # each back to the system, and a quarter of the time would go into clearing pages.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
     # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
     "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
 }

@@ -79,6 +79,10 @@ QUANTITIES: Mapping[str, Quantity] = {
     "steady_plastic_increment": Quantity("plastic strain accumulated in a cycle, in the end"),
     "steady_net_increment": Quantity("signed plastic strain a cycle leaves, in the end"),
     "creepage": Quantity("creepage of the last pass"),
+    "advance": Quantity("advance of an increment that was taken", "mm"),
+    "advance_error": Quantity(
+        "estimated error of residual stress under mid-track that the advance leaves", "MPa"
+    ),
     "travel": Quantity("length rolled in the last pass", "mm"),
     "surface_residual_x": Quantity("residual stress xx at the surface, mid-track", "MPa"),
     "surface_residual_z": Quantity("residual stress zz at the surface, mid-track", "MPa"),

@@ -21,13 +21,14 @@ from dataclasses import replace
 import numpy as np
 
 from solver.errors import LimitLoad
-from solver.passes import Passes, PassResult
+from solver.passes import PassResult
 from solver.record import Record
 from solver.scenes.harvest import End, Harvest, Layout
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Monitor, Scene
+from solver.scenes.settling import Settling
 from solver.scenes.trace import Trace, fields, shakedown
-from solver.stepper import PathControl, Tally
+from solver.stepper import Tally
 from solver.system import System
 
 
@@ -106,7 +107,6 @@ def path(
             end = End(tally=Tally(), error=error, scalars={"travel": 0.0})
             yield harvest.record(replace(parameters, passes=n), end)
         return
-    control = PathControl(load_step=1.0, max_cuts=4)
     increments = 2 * schedule.half_steps + schedule.press + schedule.release
     expected, done = increments * schedule.n, 0
 
@@ -115,21 +115,29 @@ def path(
         done += 1
         monitor(min(done / expected, 0.99), message)
 
+    tolerance = parameters.advance_tolerance * parameters.yield_stress
+    rolled = Settling(harvest, schedule, tolerance, report)
     traces: list[Trace] = []
-    for result in Passes(system, schedule, control, report).results():
+    for result in rolled.results():
         if result.unloaded is not None:
             traces.append(Trace.of(harvest, result))
         for n in wanted:
             if n == result.number + 1 or (result.unloaded is None and n > result.number):
-                yield _record(harvest, replace(parameters, passes=n), result, traces)
+                here = replace(parameters, passes=n)
+                accuracy = {"advance": rolled.advance, "advance_error": rolled.error}
+                yield _record(harvest, here, result, traces, accuracy)
     monitor(1.0, "done")
 
 
 def _record(
-    harvest: Harvest, parameters: RollingParameters, last: PassResult, traces: Sequence[Trace]
+    harvest: Harvest,
+    parameters: RollingParameters,
+    last: PassResult,
+    traces: Sequence[Trace],
+    accuracy: dict[str, float],
 ) -> Record:
     if last.unloaded is None or last.mid_track is None or last.loaded is None:
-        scalars = {"travel": last.travel}
+        scalars = accuracy | {"travel": last.travel}
         return harvest.record(parameters, End(tally=last.tally, error=last.error, scalars=scalars))
     cycle = parameters.schedule.cycle
     state = shakedown(
@@ -147,6 +155,7 @@ def _record(
             coordinates={"pass": np.arange(1, len(traces) + 1)},
             fields=fields(traces, cycle),
             scalars=_figures(harvest, traces[-1], last)
+            | accuracy
             | {
                 "shakedown_state": state.state,
                 "steady_plastic_increment": state.accumulated,

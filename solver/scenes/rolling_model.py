@@ -73,6 +73,11 @@ class RollingParameters(MaterialParameters):
     advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
         1.0, "advance of the axle in an increment"
     )
+    advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
+        0.0,
+        "largest change / yield stress that halving the advance may make to residual stress: it is "
+        "halved until then; 0 takes advance_step as it is",
+    )
     press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
         8, "increments of setting down, and of driving"
     )

@@ -102,6 +102,7 @@ def test_changes_are_found_where_mesh_and_increment_are_refined_apart(tmp_path: 
     assert list(one.ours) == [(2.0, 1.0), (1.0, 2.0), (1.0, 1.0), (1.0, 0.5), (0.5, 1.0)]
     assert one.difference == pytest.approx(-1.0)
     assert one.changes == pytest.approx((+5.0, -2.0))
+    assert one.orders == pytest.approx((1.0, 1.0))
 
 
 def test_a_level_that_is_neither_swept_nor_fixed_is_the_default_of_the_scene(
@@ -223,7 +224,9 @@ def test_compare_prints_writes_and_draws(
     assert main(["compare", str(data), "--out", str(picture), "--csv", str(rows)]) == 0
     lines = capsys.readouterr().out.splitlines()
     (minimum,) = [line for line in lines if line.startswith("T1    1     sigma_x lowest  ")]
-    assert minimum.split()[-8:] == ["about", "-220", "-216", "-206", "-201", "+19", "+5", "-"]
+    assert minimum.split()[-9:] == [
+        "about", "-220", "-216", "-206", "-201", "+19", "+5", "(1.0)", "-",
+    ]  # fmt: skip
     assert "published, but not computed here: 2 of T8/1" in lines
     assert lines[-3].startswith("compared 32 of 34 published numbers: ")
     assert picture.read_bytes().startswith(b"\x89PNG")

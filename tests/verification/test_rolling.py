@@ -138,3 +138,31 @@ def test_bad_parameters_are_named(fields, name):
     with pytest.raises(ModelError) as caught:
         RollingParameters(**fields)
     assert caught.value.field == name
+
+
+# -- the advance of an increment ---------------------------------------------------------------
+
+SLIDING = {"element_size": 2.0, "track": 24.0, "traction": -0.75}
+
+
+def test_advance_is_halved_until_residual_stress_settles():
+    tolerance = 0.04
+    record = roll(**SLIDING, advance_step=4.0, advance_tolerance=tolerance)
+    advance, error = record.scalars["advance"], record.scalars["advance_error"]
+    assert advance < 4.0
+    assert 0 < error <= tolerance * record.parameters.yield_stress
+    # the same as rolling at that advance from the start, and as far as said from twice of it
+    plain, coarse = (roll(**SLIDING, advance_step=step) for step in (advance, 2 * advance))
+    assert np.array_equal(profile(record, "xx"), profile(plain, "xx"))
+    change = max(np.abs(profile(plain, c) - profile(coarse, c)).max() for c in ("xx", "zz"))
+    assert error == pytest.approx(change)
+    # halving once more changes no more than was accepted
+    finer = roll(**SLIDING, advance_step=advance / 2)
+    left = max(np.abs(profile(plain, c) - profile(finer, c)).max() for c in ("xx", "zz"))
+    assert left < tolerance * record.parameters.yield_stress
+
+
+def test_advance_is_taken_as_given_without_a_tolerance():
+    record = roll(**SLIDING, advance_step=2.0)
+    assert record.scalars["advance"] == 2.0
+    assert np.isnan(record.scalars["advance_error"])
