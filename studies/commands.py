@@ -79,14 +79,24 @@ def show(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Draw a field of one run."""
+    """Draw a field of one run, or one value a run over the sweep."""
     from studies.plots import figure
-    from studies.reading import one_run, open_study
+    from studies.reading import one_run, open_study, select
+    from studies.sweep_plot import sweep_fields, sweep_figure
 
     selection = dict(_assignment(text) for text in options.select)
     with open_study(options.path) as dataset:
-        run = one_run(dataset, selection)
-        _save(figure(run, options.field, options.component, options.zoom), options.out)
+        if options.field in sweep_fields(dataset):
+            for name in ("component", "zoom"):
+                if (given := getattr(options, name)) is not None:
+                    raise StudyError(
+                        name, given, f"{options.field} is one value a run: leave it out"
+                    )
+            drawn = sweep_figure(select(dataset, selection), options.field)
+        else:
+            run = one_run(dataset, selection)
+            drawn = figure(run, options.field, options.component, options.zoom)
+        _save(drawn, options.out)
     print(f"wrote {options.out}")
     return OK
 

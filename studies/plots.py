@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import textwrap
-from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from studies.captions import capitalised, label, setting, value_text, words, wrapped
 from studies.errors import StudyError
 from studies.reading import one_run
 
@@ -91,10 +89,10 @@ def map_figure(
     over, under = bool((values > high).any()), signed and bool((values < -high).any())
     beyond = {(1, 1): "both", (1, 0): "max", (0, 1): "min"}.get((over, under), "neither")
     bar = sheet.colorbar(mesh, cax=beside, extend=beyond, extendfrac=0.03)
-    bar.set_label(_wrapped(_label(values), max(height, _TEXT / 2.0), 10))
+    bar.set_label(wrapped(label(values), max(height, _TEXT / 2.0), 10))
     bar.outline.set_visible(False)
     axes.annotate(
-        _wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords="axes fraction",
+        wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords="axes fraction",
         xytext=(0.0, -40.0), textcoords="offset points", va="top", fontsize=8, color="0.3",
     )  # fmt: skip
     _fit(sheet, axes)
@@ -130,16 +128,16 @@ def line_figure(
     for at in np.ndindex(*(values.sizes[name] for name in others)):
         line = values.isel(dict(zip(others, at, strict=True))).dropna(along)
         if line.size:
-            name = ", ".join(_value(line[each]) for each in others)
+            name = ", ".join(value_text(line[each]) for each in others)
             axes.plot(line[along], line, label=name, linewidth=1.6)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.0)
-    axes.set(xlabel=_label(run[along]), ylabel=_label(values))
+    axes.set(xlabel=label(run[along]), ylabel=label(values))
     if others:
-        title = ", ".join(_words(str(name)) for name in others)
+        title = ", ".join(words(str(name)) for name in others)
         sheet.legend(loc="outside right upper", frameon=False, title=title)
     return sheet
 
@@ -241,53 +239,15 @@ def _entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) ->
     """Set the title, and below it the run's place in the sweep, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
     of = f", {values['component'].item()}" if "component" in values.coords else ""
-    setting = _wrapped(_setting(run), width, 9)
-    axes.set_title(setting, loc="left", fontsize=9, color="0.3", pad=5.0)
+    below = wrapped(setting(run), width, 9)
+    axes.set_title(below, loc="left", fontsize=9, color="0.3", pad=5.0)
     axes.annotate(
-        f"{quantity[:1].upper()}{quantity[1:]}{of}", (0.0, 1.0), xycoords="axes fraction",
-        xytext=(0.0, 10.0 + 12.0 * len(setting.splitlines())), textcoords="offset points",
+        f"{capitalised(quantity)}{of}", (0.0, 1.0), xycoords="axes fraction",
+        xytext=(0.0, 10.0 + 12.0 * len(below.splitlines())), textcoords="offset points",
         weight="bold", fontsize=11,
     )  # fmt: skip
-
-
-def _wrapped(text: str, width: float, points: int) -> str:
-    """Return text in lines that fit `width` inches at a font size."""
-    return textwrap.fill(text, int(width * 72.0 / (0.52 * points)), break_long_words=False)
-
-
-def _setting(run: xr.Dataset) -> str:
-    """Return the scene and the parameters that tell this run from others, in words."""
-    parameters: Mapping[str, Any] = json.loads(run.attrs["parameters"])
-    state = parameters.get("state")
-    words = [
-        f"{str(name).replace('_', ' ')} {_value(each)}"
-        for name, each in run.coords.items()
-        if each.ndim == 0
-    ]
-    parts = [run.attrs["scene"], *([_words(state)] if state else []), *words]
-    return "  ·  ".join(part.replace(" ", "\N{NO-BREAK SPACE}") for part in parts)
-
-
-def _value(coordinate: xr.DataArray) -> str:
-    """Return a coordinate's single value with its unit."""
-    value = coordinate.item()
-    if isinstance(value, str):
-        return _words(value)
-    unit = coordinate.attrs.get("units", "1")
-    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"
-
-
-def _label(variable: xr.DataArray) -> str:
-    """Return what an axis shows, with its unit."""
-    unit = variable.attrs.get("units", "1")
-    name = variable.attrs.get("long_name", str(variable.name))
-    return name if unit == "1" else f"{name} [{unit}]"
 
 
 def _symbol(coordinate: xr.DataArray) -> str:
     """Return the name of a map's axis, with its unit."""
     return f"{coordinate.name} [{coordinate.attrs.get('units', '1')}]"
-
-
-def _words(identifier: str) -> str:
-    return identifier.replace("_", " ")

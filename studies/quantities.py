@@ -75,7 +75,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "pass_net_shear": Quantity("largest plastic shear (engineering) a cycle leaves, mid-track"),
     "pass_surface_advance": Quantity("displacement along x a cycle gives the surface", "mm"),
-    "shakedown_state": Quantity("what the passes tend to", count=True),
+    "shakedown_state": Quantity("shakedown state that the passes tend to", count=True),
     "steady_plastic_increment": Quantity("plastic strain accumulated in a cycle, in the end"),
     "steady_net_increment": Quantity("signed plastic strain a cycle leaves, in the end"),
     "creepage": Quantity("creepage of the last pass"),
