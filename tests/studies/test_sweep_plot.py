@@ -19,6 +19,7 @@ from studies.dataset import STATUSES, attributes_of
 from studies.sweep_plot import sweep_fields, sweep_figure
 from tests.studies.conftest import compute_here, fake_study
 
+ROOT = Path(__file__).parents[2]
 RATIOS, FRICTIONS = np.array([1.8, 1.2, 2.4]), np.array([0.0, 0.2, 0.5, 0.3])
 MARGINS = ("limit without hardening\n(Johnson)", "the same (Melan, von Mises)")
 
@@ -184,3 +185,13 @@ def test_the_command_draws_one_value_a_run_over_the_sweep(
     ]:
         assert main([*arguments, *wrong]) == 2
         assert named in capsys.readouterr().err
+
+
+def test_the_shakedown_map_keeps_its_mesh_and_brackets_the_limit_at_every_friction() -> None:
+    study = Study.from_toml(ROOT / "data" / "studies" / "shakedown-map.toml")
+    runs = [case.parameters for case in study.cases()]
+    assert all(run.half_width == pytest.approx(8.0, rel=1e-3) for run in runs)
+    assert all(run.traction == (run.friction > 0.0) for run in runs)
+    for friction in {run.friction for run in runs}:
+        loads = {sqrt(3) * run.load_ratio for run in runs if run.friction == friction}
+        assert min(loads) < melan_limit(friction, 0.3) <= johnson_limit(friction) < max(loads)
