@@ -42,6 +42,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "contact_pressure": Quantity("contact pressure", "MPa"),
     "contact_shear": Quantity("contact shear traction on the lower body along x", "MPa"),
     "contact_gap": Quantity("gap between the contact surfaces under load", "mm"),
+    "surface_mises": Quantity("von Mises stress at the surface of the lower body", "MPa"),
     "contact_half_width": Quantity("half-width of the contact under load", "mm"),
     "peak_contact_pressure": Quantity("largest contact pressure under load", "MPa"),
     "max_plastic_strain": Quantity("largest equivalent plastic strain"),
@@ -99,6 +100,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "largest difference of residual stress between stations / largest residual stress"
     ),
     "axle_height": Quantity("displacement of the axle at mid-track", "mm"),
+    "axle_rotation": Quantity("rotation of the wheel at mid-track, counter-clockwise", "rad"),
     "longitudinal_force": Quantity("longitudinal force on the track along x, mid-track", "N"),
     "increments": Quantity("load increments", count=True),
     "cut_increments": Quantity("load increments that were cut", count=True),

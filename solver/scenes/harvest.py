@@ -190,6 +190,10 @@ class Harvest:
                 name: (("stage", "s"), np.stack([c[k] for c in contact]))
                 for k, name in enumerate(("contact_pressure", "contact_shear", "contact_gap"))
             },
+            "surface_mises": (
+                ("stage", "s"),
+                np.stack([self._surface_mises(c, x) for c, x in end.stages]),
+            ),
         }
 
     def _contact(self, converged: Converged, centre: float) -> tuple[Array, Array, Array]:
@@ -214,6 +218,16 @@ class Harvest:
 
         apart = not state.contacts[0].normal.any()
         return along(pressure), along(-shear), along(np.full_like(gap, np.nan) if apart else gap)
+
+    def _surface_mises(self, converged: Converged, centre: float) -> Array:
+        """Return von Mises stress along s at the surface whose profiles are taken."""
+        name = self.layout.profile_body
+        body = self.system.full(name)
+        nodes = body.boundary_nodes(self.layout.surfaces[name])
+        nodes = nodes[np.argsort(body.X[0, nodes])]
+        stress = von_mises(self.stress(name, converged)[:, nodes])
+        x = body.X[0, nodes] - centre
+        return np.asarray(np.interp(self.layout.s, x, stress, left=np.nan, right=np.nan))
 
     def _scalars(self, loaded: Converged, unloaded: Converged) -> dict[str, float]:
         names = [body.name for body in self.system.model.bodies]

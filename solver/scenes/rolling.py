@@ -30,6 +30,7 @@ from solver.scenes.settling import Settling
 from solver.scenes.trace import Trace, fields, shakedown
 from solver.stepper import Tally
 from solver.system import System
+from solver.wheel import Wheel
 
 
 def layout(parameters: RollingParameters) -> Layout:
@@ -66,9 +67,11 @@ def _figures(harvest: Harvest, trace: Trace, result: PassResult) -> dict[str, fl
     out["depth_of_highest_plastic_strain"] = float(depth[strain[middle].argmax()])
     spread = np.ptp(stress[:, [0, 2]], axis=0).max()
     out["unsteadiness"] = float(spread / max(np.abs(stress[:, [0, 2]]).max(), 1e-30))
-    if harvest.system.interfaces:
+    part = harvest.system.parts[0]
+    if isinstance(part, Wheel):
         wheel = result.mid_track.state.u[0]
         out["axle_height"] = float(wheel[-2])
+        out["axle_rotation"] = float(wheel[-1]) / part.radius
         contact = result.mid_track.state.contacts[0]
         out["longitudinal_force"] = -float(contact.tangential.sum())
     return out

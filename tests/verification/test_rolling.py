@@ -140,6 +140,14 @@ def test_bad_parameters_are_named(fields, name):
     assert caught.value.field == name
 
 
+def test_von_mises_at_the_surface_is_the_strength_where_traction_makes_it_yield():
+    record = roll(**COARSE, traction=-0.75)
+    at = list(record.coordinates["stage"]).index("mid_track")
+    mises = record.fields["surface_mises"][1][at]
+    inside = np.abs(record.coordinates["s"]) < 0.5 * record.parameters.half_width
+    assert np.median(mises[inside]) == pytest.approx(record.parameters.yield_stress, rel=0.05)
+
+
 # -- the advance of an increment ---------------------------------------------------------------
 
 SLIDING = {"element_size": 2.0, "track": 24.0, "traction": -0.75}
