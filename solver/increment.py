@@ -116,7 +116,7 @@ class Increment:
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
             if balanced and candidates.beyond >= 0:
-                return self._commit(u, responses, candidates, scale, iteration, error)
+                return self._commit(u, responses, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             step = self._step(residuals, responses, candidates, elastic_first)
             if iteration >= _LATE:
@@ -264,7 +264,6 @@ class Increment:
         candidates: Candidates,
         scale: float,
         iterations: int,
-        error: float,
     ) -> Converged:
         contacts = candidates.kept(self.start.contacts, self.load - self.start.load)
         spent = [
@@ -280,7 +279,6 @@ class Increment:
             responses=responses,
             iterations=iterations,
             elastic=not any(r.yielding.any() for r in responses),
-            residual=error,
             pivoted=self._pivoted,
             blended=self._blended,
         )

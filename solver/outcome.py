@@ -34,17 +34,15 @@ class Tolerances:
 class Converged:
     """A converged increment.
 
-    ``iterations`` of Newton; ``elastic`` when no point yielded; ``residual`` the relative
-    out-of-balance force left; ``plastic_work`` of the increment [N mm] and the least
-    ``dissipation`` at a point [N mm/mm3]; ``pivoted`` and ``blended`` count the iterations whose
-    inner problem needed the fallback or a blended tangent.
+    ``iterations`` of Newton; ``elastic`` when no point yielded; ``plastic_work`` of the increment
+    [N mm] and the least ``dissipation`` at a point [N mm/mm3]; ``pivoted`` and ``blended`` count
+    the iterations whose inner problem needed the fallback or a blended tangent.
     """
 
     state: State
     responses: tuple[Response, ...]
     iterations: int
     elastic: bool
-    residual: float
     plastic_work: float
     dissipation: float
     pivoted: int

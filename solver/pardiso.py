@@ -86,7 +86,7 @@ class Pardiso:
         self._iparm[35] = 2 if len(self._kept) else 0  # Schur complement, and factors to solve with
         nothing = np.zeros(1)
         self._call(_ANALYSE, nothing, nothing)
-        self._free = weakref.finalize(self, _release, self._handle, kind, self._iparm)
+        weakref.finalize(self, _release, self._handle, kind, self._iparm)
 
     def factorise(self, data: NDArray[np.float64]) -> None:
         """Factorise the matrix with these values on the analysed pattern."""
@@ -120,10 +120,6 @@ class Pardiso:
         """Return ``rows F rows'``, F (m, m) the inverse matrix's part on the kept unknowns."""
         half = solve_triangular(self._schur[0], rows.T, lower=True)
         return np.asarray(half.T @ half)
-
-    def close(self) -> None:
-        """Free the memory MKL holds."""
-        self._free()
 
     def _call(self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64]) -> None:
         _pardiso(

@@ -93,6 +93,17 @@ class Schedule:
         """Time of a pass."""
         return self.marks[-1]
 
+    def place(self, time: float) -> str:
+        """Return in words where a time is."""
+        number, since = divmod(time, self.duration)
+        loaded, driven, arrived, released, _ = self.marks
+        stages = ((loaded, "set down by"), (driven, "driven by"), (released, "released by"))
+        where = f"rolled {since - driven:.4g} mm"
+        if not driven <= since <= arrived:
+            end, words = next(stage for stage in stages if since <= stage[0])
+            where = f"{words} {1 - (end - since):.0%}"
+        return f"pass {int(number) + 1}, {where}"
+
     def knots(self) -> dict[str, NDArray[np.float64]]:
         """Return time, share of the load, share of the moment and position, knot by knot."""
         loaded, driven, arrived, released, _ = self.marks
@@ -142,6 +153,7 @@ class Passes:
             report,
             self._move if wheels else (lambda before, now, load: None),
             elastic_first=True,
+            place=schedule.place,
         )
 
     def results(self) -> Iterator[PassResult]:

@@ -102,6 +102,7 @@ class Stepper:
     ----------
     predict : gives the state an increment iterates from, or None for the last converged one
     elastic_first : whether increments with a prediction still begin with the elastic operator
+    place : says in words where on the path a load factor (or time) is
     """
 
     def __init__(
@@ -112,11 +113,13 @@ class Stepper:
         predict: Predict | None = None,
         *,
         elastic_first: bool = False,
+        place: Callable[[float], str] = "load factor {:.6g}".format,
     ) -> None:
         self.system = system
         self.control = control
         self._predict = predict or extrapolate
         self._elastic_first = elastic_first
+        self._place = place
         self.report = report or (lambda load, message: None)
         self._clock = time.process_time()
 
@@ -150,32 +153,28 @@ class Stepper:
                 point = replace(point, tally=self.timed(tally), before=None)
                 step = (load - state.load) / 2
                 if abs(step) < least * (1 - ROUNDING):
-                    raise Stopped(_ended(failure, state.load, load), point) from failure
+                    raise Stopped(self._ended(failure, state.load, load), point) from failure
                 continue
             point = Point(converged, state, self.timed(point.tally.plus(converged)))
             self.report(load, f"load {load:.4g}: {converged.iterations} iterations")
         return point
+
+    def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
+        way = f"between {self._place(reached)} and {self._place(attempted)}"
+        if failure.flowing and abs(attempted) > abs(reached):
+            return LimitLoad(
+                f"no equilibrium {way}: the structure flows with {failure.stiffness:.1%} of its "
+                "elastic stiffness",
+                reached,
+                attempted,
+            )
+        return NotConverged(f"the increment {way} failed: {failure}", reached, attempted)
 
     def timed(self, tally: Tally) -> Tally:
         """Return the tally with the CPU time spent since the last call."""
         now = time.process_time()
         spent, self._clock = now - self._clock, now
         return replace(tally, seconds=tally.seconds + spent)
-
-
-def _ended(failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
-    if failure.flowing and abs(attempted) > abs(reached):
-        return LimitLoad(
-            f"no equilibrium between load factors {reached:.6g} and {attempted:.6g}: the "
-            f"structure flows with {failure.stiffness:.1%} of its elastic stiffness",
-            reached,
-            attempted,
-        )
-    return NotConverged(
-        f"the increment from load factor {reached:.6g} to {attempted:.6g} failed: {failure}",
-        reached,
-        attempted,
-    )
 
 
 def extrapolate(before: State | None, now: State, load: float) -> State | None:
