@@ -220,12 +220,16 @@ class Harvest:
         return along(pressure), along(-shear), along(np.full_like(gap, np.nan) if apart else gap)
 
     def _surface_mises(self, converged: Converged, centre: float) -> Array:
-        """Return von Mises stress along s at the surface whose profiles are taken."""
+        """Return von Mises stress along s at the surface whose profiles are taken.
+
+        It is recovered itself: that of a recovered stress would go far beyond the strength.
+        """
         name = self.layout.profile_body
         body = self.system.full(name)
         nodes = body.boundary_nodes(self.layout.surfaces[name])
         nodes = nodes[np.argsort(body.X[0, nodes])]
-        stress = von_mises(self.stress(name, converged)[:, nodes])
+        points = von_mises(self.system.response(name, converged).stress)
+        stress = np.clip((self._recover[name] @ points)[nodes], 0.0, points.max())
         x = body.X[0, nodes] - centre
         return np.asarray(np.interp(self.layout.s, x, stress, left=np.nan, right=np.nan))
 

@@ -71,7 +71,7 @@ class RollingParameters(MaterialParameters):
         1.15, "ratio of neighbouring element sides in depth"
     )
     advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
-        1.0, "advance of the axle in an increment"
+        0.5, "advance of the axle in an increment"
     )
     advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
         0.0,

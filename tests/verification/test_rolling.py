@@ -123,16 +123,17 @@ def test_von_mises_at_the_surface_is_the_strength_where_traction_makes_it_yield(
     at = list(record.coordinates["stage"]).index("mid_track")
     mises = record.fields["surface_mises"][1][at]
     inside = np.abs(record.coordinates["s"]) < 0.5 * record.parameters.half_width
-    assert np.median(mises[inside]) == pytest.approx(record.parameters.yield_stress, rel=0.05)
+    assert np.median(mises[inside]) == pytest.approx(record.parameters.yield_stress, rel=0.02)
+    assert np.nanmax(mises) <= record.parameters.yield_stress * (1 + 1e-9)
 
 
 # -- the advance of an increment ---------------------------------------------------------------
 
-SLIDING = {"element_size": 2.0, "track": 24.0, "traction": -0.75}
+SLIDING = {"element_size": 2.0, "track": 12.0, "traction": -0.75}
 
 
 def test_advance_is_halved_until_residual_stress_settles():
-    tolerance = 0.04
+    tolerance = 0.1
     record = roll(**SLIDING, advance_step=4.0, advance_tolerance=tolerance)
     advance, error = record.scalars["advance"], record.scalars["advance_error"]
     assert advance < 4.0
