@@ -75,7 +75,9 @@ def tends_to(sequence: Array) -> float:
     return float(max(sequence[-1] + last * ratio / (1 - ratio), 0.0))
 
 
-def classify(accumulated: Array, net: Array, yield_strain: float) -> Shakedown:
+def classify(
+    accumulated: Array, net: Array, yield_strain: float, *, hardens: bool = False
+) -> Shakedown:
     """Return the shakedown state from what each cycle did.
 
     Parameters
@@ -83,6 +85,8 @@ def classify(accumulated: Array, net: Array, yield_strain: float) -> Shakedown:
     accumulated : (n_cycles,) largest equivalent plastic strain accumulated at a depth in a cycle
     net : (n_cycles,) largest equivalent of the signed plastic strain a cycle leaves at a depth
     yield_strain : yield stress / Young's modulus
+    hardens : whether linear hardening bounds plastic strain, so that no cycle can go on leaving
+        some: ratchetting then has not come to its end, however slow it is
     """
     if not accumulated.any():
         return Shakedown(State.ELASTIC, 0.0, 0.0)
@@ -94,8 +98,9 @@ def classify(accumulated: Array, net: Array, yield_strain: float) -> Shakedown:
         return Shakedown(State.ELASTIC_SHAKEDOWN, flow, 0.0)
     if not (np.isfinite(flow) and np.isfinite(left)):
         return Shakedown(State.UNDECIDED, flow, left)
-    closed = left <= CLOSED * flow
-    return Shakedown(State.PLASTIC_SHAKEDOWN if closed else State.RATCHETTING, flow, left)
+    if left <= CLOSED * flow:
+        return Shakedown(State.PLASTIC_SHAKEDOWN, flow, left)
+    return Shakedown(State.UNDECIDED if hardens else State.RATCHETTING, flow, left)
 
 
 def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Array, Array]:

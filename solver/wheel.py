@@ -100,10 +100,10 @@ class Wheel(Substructure):
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return rows on rim, hub and rotation from rows on a surface's displacements."""
         Q, dQ = self._frame(u)
-        nodal = block.reshape(len(block), -1, 2)
+        nodal = block.reshape(len(block), block.shape[1] // 2, 2)
         turning = (nodal * (dQ @ self._arms(surface, u)).T).sum(axis=(1, 2))
         hub = nodal.sum(axis=1)
-        rows = np.hstack([(nodal @ Q).reshape(len(block), -1), hub, turning[:, None]])
+        rows = np.hstack([(nodal @ Q).reshape(block.shape), hub, turning[:, None]])
         return np.append(surface.dofs, self.rim + np.arange(3)), rows
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:

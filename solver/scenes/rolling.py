@@ -85,7 +85,7 @@ def beyond_strength(parameters: RollingParameters) -> LimitLoad | None:
     """
     shear = abs(parameters.friction * parameters.traction) * parameters.peak_pressure
     strength = parameters.yield_stress / math.sqrt(3)
-    hardens = parameters.hardening != "none" and parameters.hardening_ratio > 0
+    hardens = parameters.material().plastic_modulus > 0
     if parameters.load != "hertz" or hardens or shear <= strength:
         return None
     return LimitLoad(
@@ -145,7 +145,7 @@ def _record(
     cycle = parameters.schedule.cycle
     state = shakedown(
         traces, cycle, parameters.yield_stress / parameters.youngs_modulus,
-        periodic=parameters.periodic,
+        periodic=parameters.periodic, hardens=parameters.material().plastic_modulus > 0,
     )  # fmt: skip
     end_of_track = parameters.schedule.directions[-1] * parameters.track / 2
     return harvest.record(

@@ -80,7 +80,7 @@ def fields(traces: Sequence[Trace], cycle: int) -> dict[str, Any]:
 
 
 def shakedown(
-    traces: Sequence[Trace], cycle: int, yield_strain: float, *, periodic: bool
+    traces: Sequence[Trace], cycle: int, yield_strain: float, *, periodic: bool, hardens: bool
 ) -> Shakedown:
     """Return the state the passes tend to.
 
@@ -89,8 +89,8 @@ def shakedown(
     """
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)
-    found = classify(accumulated.max(axis=1)[last], _equivalent(left).max(axis=1)[last],
-                     yield_strain)  # fmt: skip
+    largest = accumulated.max(axis=1)[last], _equivalent(left).max(axis=1)[last]
+    found = classify(*largest, yield_strain, hardens=hardens)
     if periodic or found.state is State.ELASTIC:
         return found
     return Shakedown(State.UNDECIDED, found.accumulated, found.net)

@@ -111,6 +111,12 @@ def test_state_follows_from_where_the_cycles_tend_to(accumulated, net, expected)
     assert found.state is expected
 
 
+def test_linear_hardening_cannot_go_on_ratchetting():
+    flow, left = np.array([3e-3, 2e-3, 2e-3, 2e-3]), np.array([1e-3, 8e-4, 7.9e-4, 7.8e-4])
+    assert classify(flow, left, YIELD_STRAIN).state is State.RATCHETTING
+    assert classify(flow, left, YIELD_STRAIN, hardens=True).state is State.UNDECIDED
+
+
 # -- computed ----------------------------------------------------------------------------------
 
 
