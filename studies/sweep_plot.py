@@ -67,10 +67,12 @@ class _Look:
     colours: str
 
 
-_ABSENT = {OK: _Kind(name="no value", marker=".")} | {
-    "limit_load": _Kind(name="no equilibrium", marker="s", filled=False)
+_FAILED = _Kind(name="failed or missing", marker="x")
+_ABSENT = {
+    OK: _Kind(name="no value", marker="."),
+    "limit_load": _Kind(name="no equilibrium", marker="s", filled=False),
 }
-"""Runs without a value by status; others are crosses."""
+"""Runs without a value by status; others are `_FAILED`."""
 
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
@@ -141,7 +143,8 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
     numbers = sorted((each for each in standing if each.dtype.kind in "fiu"), key=_rank)[:2]
     if len(numbers) < 2:
         raise StudyError("field", field, "is one value a run: select two swept numbers or more")
-    others = [each for each in standing if not any(each is number for number in numbers)]
+    used = {each.dims for each in numbers}
+    others = [dataset[axis] for axis in several if (axis,) not in used]
     panels = math.prod(each.size for each in others)
     if panels > MOST_PANELS:
         named = ", ".join(str(each.dims[0]) for each in others)
@@ -203,9 +206,10 @@ def _draw(
     )
     known = np.isfinite(values)
     kinds = [(kind, values == value) for value, kind in look.flags.items()]
+    absent = {_ABSENT.get(name, _FAILED): np.zeros_like(known) for name in STATUSES}
     for value, name in enumerate(STATUSES):
-        if (there := ~known & (status == value)).any():
-            kinds.append((_ABSENT.get(name, _Kind(name=words(name), marker="x")), there))
+        absent[_ABSENT.get(name, _FAILED)] |= ~known & (status == value)
+    kinds += [(kind, there) for kind, there in absent.items() if there.any()]
     if not look.flags:
         axes.scatter(
             x[known], y[known], c=values[known], s=_POINTS**2, cmap=look.colours, norm=look.norm,

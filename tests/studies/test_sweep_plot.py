@@ -90,11 +90,10 @@ def test_a_run_without_success_is_marked_by_its_status_whatever_it_holds() -> No
     sheet = sweep_figure(dataset, "shakedown_state")
     marks = marks_of(sheet.axes[0])
     assert marks["no equilibrium"] == {(0.5, 1.2)}
-    assert marks["missing"] == {(0.0, 2.4)}
-    assert marks["audit failed"] == {(0.3, 1.8)}
+    assert marks["failed or missing"] == {(0.0, 2.4), (0.3, 1.8)}
     assert marks["no value"] == {(0.2, 1.2)}
     assert sum(map(len, marks.values())) == RATIOS.size * FRICTIONS.size
-    assert {"no equilibrium", "missing", "audit failed", "no value"} < set(legend_of(sheet))
+    assert {"no equilibrium", "failed or missing", "no value"} < set(legend_of(sheet))
     statuses = marks_of(sweep_figure(dataset, "status").axes[0])
     assert statuses["limit load"] == {(0.5, 1.2)}
     assert len(statuses["ok"]) == RATIOS.size * FRICTIONS.size - len(named)
@@ -156,6 +155,12 @@ def test_an_axis_whose_numbers_repeat_is_told_by_its_labels(store: Store) -> Non
         }
         with pytest.raises(StudyError, match="select two swept numbers"):
             sweep_figure(together.isel(half_width=[0]), "increments")
+
+
+def test_panels_of_a_linked_axis_are_headed_by_its_labels() -> None:
+    dataset = swept().rename(hardening="material").assign_coords(passes=("material", [10, 40]))
+    sheet = sweep_figure(dataset, "shakedown_state")
+    assert [axes.get_title() for axes in sheet.axes[:2]] == ["material none", "material kinematic"]
 
 
 def test_too_many_panels_are_refused() -> None:
