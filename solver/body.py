@@ -82,10 +82,8 @@ class Body:
             self.facets(self.travelling.boundary, "travelling")
             if self.material.elastic and self.condense:
                 raise ModelError("travelling", self.name, "needs condense=False on elastic bodies")
-        for boundary in self.periodic or ():
-            self.facets(boundary, "periodic")
-            if boundary in self.supports:
-                raise ModelError(f"supports.{boundary}", self.supports[boundary], "is periodic")
+        if self.periodic is not None:
+            self._check_periodic(self.periodic)
         moved = self.axle is not None or self.travelling is not None
         if moved and self.pressure:
             allowed = "must be empty on a body with an axle or a travelling pressure"
@@ -93,6 +91,17 @@ class Body:
         for boundary, value in self.pressure.items():
             if not np.isfinite(value):
                 raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")
+
+    def _check_periodic(self, sides: tuple[str, str]) -> None:
+        if not isinstance(sides, tuple) or len(sides) != 2:
+            raise ModelError("periodic", sides, "must be two names of boundaries")
+        if self.state == "axisymmetric":
+            raise ModelError("periodic", sides, "an axisymmetric body does not repeat itself")
+        for boundary in sides:
+            self.facets(boundary, "periodic")
+            for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
+                if boundary in names:
+                    raise ModelError(f"{kind}.{boundary}", names[boundary], "is periodic")
 
     def facets(self, boundary: str, field: str = "boundary") -> np.ndarray:
         """Return the facet numbers of a named boundary."""

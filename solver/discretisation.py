@@ -103,6 +103,10 @@ class Discretisation(Part):
         if not (np.abs(apart - [[period], [0.0]]) < 1e-9 * abs(period)).all() or period <= 0:
             allowed = "the second must be a copy of the first, one period along +x"
             raise ModelError("periodic", self.body.periodic, allowed)
+        travelling = self.body.travelling
+        if travelling is not None and 2 * travelling.half_width > period:
+            allowed = f"half_width must be at most half the period, {period / 2:g} mm"
+            raise ModelError("travelling", travelling.half_width, allowed)
         same[far] = near
         return same, period
 
@@ -113,6 +117,7 @@ class Discretisation(Part):
             nodes = self.boundary_nodes(boundary)
             for axis in axes:
                 fixed[2 * nodes + "xy".index(axis)] = True
+        fixed[self.copied[fixed]] = True
         motions = kinematics.rigid_motions(self.X, self.body.state)
         copies = self.copied != np.arange(self.n)
         free = np.flatnonzero(~fixed & ~copies)

@@ -62,6 +62,8 @@ class Factored:
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
         place = self._analysed.kept[dofs]
+        if (place < 0).all():  # a surface that supports hold
+            return np.zeros((len(rows), len(rows)))
         block = np.zeros((len(rows), self._analysed.kept.max() + 1))
         block[:, place[place >= 0]] = rows[:, place >= 0]
         return self._analysed.solver.compliance(block)

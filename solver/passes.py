@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 
     from solver.errors import NotConverged
     from solver.outcome import Converged
-    from solver.stepper import Report
+    from solver.stepper import Point, Report
     from solver.system import System
 
 _NOTHING = 1e-6
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,14 +96,15 @@ class Schedule:
 
     def place(self, time: float) -> str:
         """Return in words where a time is."""
-        number, since = divmod(time, self.duration)
+        number = int(time / self.duration + _ROUNDING)
+        since = max(0.0, time - number * self.duration)
         loaded, driven, arrived, released, _ = self.marks
         stages = ((loaded, "set down by"), (driven, "driven by"), (released, "released by"))
         where = f"rolled {since - driven:.4g} mm"
-        if not driven <= since <= arrived:
-            end, words = next(stage for stage in stages if since <= stage[0])
+        if not driven - _ROUNDING <= since <= arrived + _ROUNDING:
+            end, words = next((s for s in stages if since <= s[0] + _ROUNDING), stages[-1])
             where = f"{words} {1 - (end - since):.0%}"
-        return f"pass {int(number) + 1}, {where}"
+        return f"pass {number + 1}, {where}"
 
     def knots(self) -> dict[str, NDArray[np.float64]]:
         """Return time, share of the load, share of the moment and position, knot by knot."""
@@ -156,13 +158,15 @@ class Passes:
             place=schedule.place,
         )
 
-    def results(self) -> Iterator[PassResult]:
+    def results(self, tally: Tally | None = None) -> Iterator[PassResult]:
         """Yield the result of each pass; the last one carries the error that ended the path.
+
+        The cost of the passes is added to ``tally``.
 
         After a cycle of passes in each of which nothing yielded (a millionth of the plastic work
         so far, or less) all are like those of that cycle, and are not computed again.
         """
-        state, tally = self.system.initial(), Tally()
+        state, tally = self.system.initial(), tally or Tally()
         cycle: deque[tuple[PassResult, bool]] = deque(maxlen=self.schedule.cycle)
         for number in range(self.schedule.n):
             if len(cycle) == cycle.maxlen and not any(yielded for _, yielded in cycle):
@@ -188,8 +192,10 @@ class Passes:
             for k in range(1, schedule.press + 1):
                 point = self._stepper.advance(point, begin + k / schedule.press)
             if schedule.driven:
+                point = _halted(point)
                 for k in range(1, schedule.press + 1):
                     point = self._stepper.advance(point, loaded + k / schedule.press)
+            point = _halted(point)
             rolling = np.linspace(driven, arrived, 2 * n + 1)
             for k in range(1, 2 * n + 1):
                 point = self._stepper.advance(point, float(rolling[k]))
@@ -238,5 +244,12 @@ class Passes:
         gap = interface.pairing(tuple(u)).gap
         u[self._wheel][wheel.rim + 1] -= gap.min()
         touching = gap < gap.min() + 1e-9 * wheel.radius
-        contacts = (ContactState.at_rest(touching),)
+        contacts = (ContactState.at_rest(gap, touching),)
         return replace(state, load=time, u=tuple(u), contacts=contacts)
+
+
+def _halted(point: Point) -> Point:
+    """Return the point where time begins to mean another motion."""
+    state = point.now.state
+    contacts = tuple(contact.halted() for contact in state.contacts)
+    return replace(point, now=replace(point.now, state=replace(state, contacts=contacts)))

@@ -34,6 +34,8 @@ CLOSED = 0.05
 """Plastic strain left by a cycle over that accumulated in it, below which the cycle is closed."""
 STEADY = 0.02
 """Relative change from cycle to cycle below which a sequence needs no extrapolation."""
+DRIFT = 0.04
+"""The same over the second half of a sequence."""
 SLOWEST = 0.95
 """Ratio of successive changes above which a sequence tends nowhere yet."""
 
@@ -67,7 +69,8 @@ def tends_to(sequence: Array) -> float:
     if len(sequence) < 3:
         return np.nan
     before, last = np.diff(sequence[-3:])
-    if abs(last) <= STEADY * abs(sequence[-1]):
+    drift = sequence[-1] - sequence[len(sequence) // 2 - 1]
+    if abs(last) <= STEADY * abs(sequence[-1]) and abs(drift) <= DRIFT * abs(sequence[-1]):
         return float(sequence[-1])
     ratio = last / before if before else np.inf
     if not 0 <= ratio < SLOWEST:
@@ -76,14 +79,16 @@ def tends_to(sequence: Array) -> float:
 
 
 def classify(
-    accumulated: Array, net: Array, yield_strain: float, *, hardens: bool = False
+    accumulated: Array, net: Array, turnover: Array, yield_strain: float, *, hardens: bool = False
 ) -> Shakedown:
     """Return the shakedown state from what each cycle did.
 
     Parameters
     ----------
     accumulated : (n_cycles,) largest equivalent plastic strain accumulated at a depth in a cycle
-    net : (n_cycles,) largest equivalent of the signed plastic strain a cycle leaves at a depth
+    net : (n_cycles,) equivalent of the signed plastic strain a cycle leaves at the depth where the
+        last one leaves most
+    turnover : (n_cycles,) equivalent plastic strain accumulated in a cycle at that depth
     yield_strain : yield stress / Young's modulus
     hardens : whether linear hardening bounds plastic strain, so that no cycle can go on leaving
         some: ratchetting then has not come to its end, however slow it is
@@ -96,9 +101,10 @@ def classify(
     flow, left = tends_to(accumulated), tends_to(net)
     if flow <= quiet:
         return Shakedown(State.ELASTIC_SHAKEDOWN, flow, 0.0)
-    if not (np.isfinite(flow) and np.isfinite(left)):
+    turned = tends_to(turnover)
+    if not np.isfinite([flow, left, turned]).all():
         return Shakedown(State.UNDECIDED, flow, left)
-    if left <= CLOSED * flow:
+    if left <= CLOSED * turned:
         return Shakedown(State.PLASTIC_SHAKEDOWN, flow, left)
     return Shakedown(State.UNDECIDED if hardens else State.RATCHETTING, flow, left)
 

@@ -101,13 +101,17 @@ def extract(part: Discretisation, boundary: str) -> Surface:
     nodes, local = np.unique(edges[order], return_inverse=True)
     X, chain = part.X[:, nodes], local.reshape(edges.shape)
     if part.period:
-        nodes, X, chain = _repeated(part.same[nodes], X, chain, part.period)
+        length = abs(X[0, chain[-1, 1]] - X[0, chain[0, 0]])
+        if not np.isclose(length, part.period):
+            allowed = "a contact surface of a periodic body must run over the whole period"
+            raise ModelError("boundary", boundary, allowed)
+        nodes, X, chain = _repeated(part.same[nodes], X, chain)
     measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
     return Surface(nodes, chain, X, measure)
 
 
 def _repeated(
-    nodes: NDArray[np.int64], X: NDArray[np.float64], chain: NDArray[np.int64], period: float
+    nodes: NDArray[np.int64], X: NDArray[np.float64], chain: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Return nodes, positions and edges of a chain with half a copy of it at either end."""
     start, end = chain[0, 0], chain[-1, 1]

@@ -45,11 +45,18 @@ class ContactState:
     approach: NDArray[np.float64]
 
     @classmethod
-    def at_rest(cls, touching: NDArray[np.bool_]) -> ContactState:
+    def at_rest(cls, gap: NDArray[np.float64], touching: NDArray[np.bool_]) -> ContactState:
         """Return the state of vertices without forces, those that touch sticking."""
         n = len(touching)
         status = np.where(touching, STICK, OPEN)
-        return cls(np.zeros(n), np.zeros(n), status, touching, np.full((3, n), np.nan))
+        approach = np.stack([gap, np.full(n, np.nan), np.full(n, np.nan)])
+        return cls(np.zeros(n), np.zeros(n), status, touching, approach)
+
+    def halted(self) -> ContactState:
+        """Return the state where another motion begins: rates so far mean nothing."""
+        approach = self.approach.copy()
+        approach[1:] = np.nan
+        return replace(self, approach=approach)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,5 +244,5 @@ class System:
             gap = interface.pairing(u).gap
             length = np.ptp(interface.slave_surface.X, axis=1).max()
             touching = gap <= 1e-9 * length
-            contacts.append(ContactState.at_rest(touching))
+            contacts.append(ContactState.at_rest(gap, touching))
         return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))

@@ -206,10 +206,13 @@ def find_candidates(
 
 
 def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
-    """Return the slip (n,) while gaps that go on closing as they do stay open; NaN unknown."""
+    """Return the slip (n,) until gaps that go on closing as they do are closed.
+
+    NaN where a gap does not close, or not within ``span``, or nothing is known of it.
+    """
     gap, closing, sliding = approach[0], approach[1] * span, approach[2] * span
     share = np.divide(gap, -closing, out=np.full_like(gap, np.nan), where=closing < 0)
-    return np.asarray(sliding * np.clip(share, 0.0, 1.0))
+    return np.asarray(np.where(share < 1.0, sliding * np.maximum(share, 0.0), np.nan))
 
 
 def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:

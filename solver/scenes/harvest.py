@@ -80,6 +80,7 @@ class End:
     coordinates: Mapping[str, Any] = field(default_factory=dict)
     fields: Mapping[str, Any] = field(default_factory=dict)
     scalars: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
 
 class Harvest:
@@ -116,7 +117,7 @@ class Harvest:
         return Record(
             parameters=parameters,
             status=Status.OK if check.passed else Status.AUDIT_FAILED,
-            message="; ".join(check.violations + check.warnings),
+            message="; ".join(check.violations + check.warnings + end.warnings),
             coordinates=self.layout.coordinates | dict(end.coordinates),
             fields=self._fields(end) | dict(end.fields),
             scalars=scalars,
@@ -230,8 +231,9 @@ class Harvest:
         nodes = nodes[np.argsort(body.X[0, nodes])]
         points = von_mises(self.system.response(name, converged).stress)
         stress = np.clip((self._recover[name] @ points)[nodes], 0.0, points.max())
-        x = body.X[0, nodes] - centre
-        return np.asarray(np.interp(self.layout.s, x, stress, left=np.nan, right=np.nan))
+        x, beyond = body.X[0, nodes] - centre, {"left": np.nan, "right": np.nan}
+        way = {"period": body.period} if body.period else beyond
+        return np.asarray(np.interp(self.layout.s, x, stress, **way))
 
     def _scalars(self, loaded: Converged, unloaded: Converged) -> dict[str, float]:
         names = [body.name for body in self.system.model.bodies]

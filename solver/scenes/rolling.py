@@ -127,8 +127,7 @@ def path(
         for n in wanted:
             if n == result.number + 1 or (result.unloaded is None and n > result.number):
                 here = replace(parameters, passes=n)
-                accuracy = {"advance": rolled.advance, "advance_error": rolled.error}
-                yield _record(harvest, here, result, traces, accuracy)
+                yield _record(harvest, here, result, traces, rolled)
     monitor(1.0, "done")
 
 
@@ -137,8 +136,9 @@ def _record(
     parameters: RollingParameters,
     last: PassResult,
     traces: Sequence[Trace],
-    accuracy: dict[str, float],
+    rolled: Settling,
 ) -> Record:
+    accuracy = {"advance": rolled.advance, "advance_error": rolled.error}
     if last.unloaded is None or last.mid_track is None or last.loaded is None:
         scalars = accuracy | {"travel": last.travel}
         return harvest.record(parameters, End(tally=last.tally, error=last.error, scalars=scalars))
@@ -155,6 +155,7 @@ def _record(
             loaded=last.mid_track,
             unloaded=last.unloaded,
             stages=((last.loaded, end_of_track), (last.mid_track, 0.0), (last.unloaded, 0.0)),
+            warnings=rolled.warnings,
             coordinates={"pass": np.arange(1, len(traces) + 1)},
             fields=fields(traces, cycle),
             scalars=_figures(harvest, traces[-1], last)

@@ -17,6 +17,7 @@ from solver.model import ContactPair, Model
 from solver.motion import Axle, AxleProgram, TravellingPressure
 from solver.passes import Schedule
 from solver.scenes.parameters import Friction, Length, MaterialParameters, described
+from solver.scenes.settling import HALVINGS
 
 _MARGIN = 2.5  # fine track beyond the ends / Hertz half-width
 _RIM = 2.5  # fine rim beyond the track / Hertz half-width
@@ -107,6 +108,7 @@ class RollingParameters(MaterialParameters):
                 f"makes {columns:.0f} elements along the track; at most {_MOST_COLUMNS}",
             )  # fmt: skip
         increments = self.passes * self.track / self.advance_step
+        increments *= 2**HALVINGS if self.advance_tolerance else 1
         if increments > _MOST_INCREMENTS:
             raise ModelError(
                 "advance_step", self.advance_step,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import LimitLoad
 from solver.passes import Passes, PassResult
-from solver.stepper import PathControl
+from solver.stepper import PathControl, Tally
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from solver.scenes.harvest import Harvest
     from solver.stepper import Report
 
-_HALVINGS = 6
+HALVINGS = 6
 
 
 class Settling:
@@ -52,26 +53,39 @@ class Settling:
 
     def results(self) -> Iterator[PassResult]:
         """Yield what `Passes.results` yields."""
-        halvings = _HALVINGS if self._tolerance else 0
-        coarse = None
+        halvings = HALVINGS if self._tolerance else 0
+        coarse, tally = None, Tally()
         for halved in range(halvings + 1):
             schedule = self._schedule.refined(2**halved)
-            passes = self._passes(schedule)
+            passes = self._passes(schedule, tally)
             first = next(passes)
             self.advance = schedule.advance
-            if first.unloaded is None:
+            if first.unloaded is not None:
+                fine = self._profile(first)
+                if coarse is not None:
+                    self.error = float(np.abs(fine - coarse).max())
+                if self.error <= self._tolerance:
+                    break
+                coarse = fine
+            elif isinstance(first.error, LimitLoad):
                 break
-            fine = self._profile(first)
-            if coarse is not None:
-                self.error = float(np.abs(fine - coarse).max())
-            if self.error <= self._tolerance:
-                break
-            coarse = fine
+            # what trying has cost stays in the tally
+            tally = Tally(seconds=first.tally.seconds)
         yield from chain([first], passes)
 
-    def _passes(self, schedule: Schedule) -> Iterator[PassResult]:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what there is to say of the error."""
+        if not self._tolerance or self.error <= self._tolerance:
+            return ()
+        return (
+            f"an advance of {self.advance:.3g} mm still leaves an error of {self.error:.3g} MPa, "
+            f"above the tolerance of {self._tolerance:.3g} MPa",
+        )
+
+    def _passes(self, schedule: Schedule, tally: Tally) -> Iterator[PassResult]:
         control = PathControl(load_step=1.0, max_cuts=4)
-        return Passes(self._harvest.system, schedule, control, self._report).results()
+        return Passes(self._harvest.system, schedule, control, self._report).results(tally)
 
     def _profile(self, result: PassResult) -> NDArray[np.float64]:
         """Return the residual stress xx and zz under mid-track (2, depth) [MPa]."""

@@ -89,8 +89,12 @@ def shakedown(
     """
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)
-    largest = accumulated.max(axis=1)[last], _equivalent(left).max(axis=1)[last]
-    found = classify(*largest, yield_strain, hardens=hardens)
+    net = _equivalent(left)
+    most = net[-1].argmax()
+    found = classify(
+        accumulated.max(axis=1)[last], net[last, most], accumulated[last, most], yield_strain,
+        hardens=hardens,
+    )  # fmt: skip
     if periodic or found.state is State.ELASTIC:
         return found
     return Shakedown(State.UNDECIDED, found.accumulated, found.net)

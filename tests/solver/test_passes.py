@@ -28,6 +28,15 @@ def test_a_time_is_told_in_words(time, words):
     assert schedule().place(time) == words
 
 
+@pytest.mark.parametrize("track", [20.7, 82.9])
+def test_every_mark_of_many_passes_has_words(track):
+    timetable = schedule(track=track, n=20, directions=(1,) * 20)
+    for number in range(20):
+        for mark in timetable.marks[:-1]:
+            words = timetable.place(number * timetable.duration + mark)
+            assert words.startswith(f"pass {number + 1}, ")
+
+
 def test_there_and_back_is_a_cycle_of_two_passes():
     assert schedule().cycle == 2
     assert schedule(directions=(1, 1)).cycle == 1

@@ -107,14 +107,25 @@ def test_friction_lowers_the_limit_and_from_0_37_on_the_surface_governs():
     ],
 )
 def test_state_follows_from_where_the_cycles_tend_to(accumulated, net, expected):
-    found = classify(np.array(accumulated, float), np.array(net, float), YIELD_STRAIN)
+    flow = np.array(accumulated, float)
+    found = classify(flow, np.array(net, float), flow, YIELD_STRAIN)
     assert found.state is expected
 
 
 def test_linear_hardening_cannot_go_on_ratchetting():
     flow, left = np.array([3e-3, 2e-3, 2e-3, 2e-3]), np.array([1e-3, 8e-4, 7.9e-4, 7.8e-4])
-    assert classify(flow, left, YIELD_STRAIN).state is State.RATCHETTING
-    assert classify(flow, left, YIELD_STRAIN, hardens=True).state is State.UNDECIDED
+    assert classify(flow, left, flow, YIELD_STRAIN).state is State.RATCHETTING
+    assert classify(flow, left, flow, YIELD_STRAIN, hardens=True).state is State.UNDECIDED
+
+
+def test_a_closed_cycle_does_not_hide_another_depth_that_ratchets():
+    closed, open_ = np.full(4, 1e-2), np.full(4, 4e-4)
+    assert classify(closed, open_, open_, YIELD_STRAIN).state is State.RATCHETTING
+
+
+@pytest.mark.parametrize("slow", [1e-3 * 0.985 ** np.arange(12), 1e-2 / np.arange(1, 61)])
+def test_a_decay_too_slow_to_foresee_is_undecided(slow):
+    assert classify(slow, slow, slow, YIELD_STRAIN).state is State.UNDECIDED
 
 
 # -- computed ----------------------------------------------------------------------------------
