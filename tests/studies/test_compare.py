@@ -18,6 +18,7 @@ from studies.compare import Comparison, compare
 from studies.comparison_table import comparison_table
 from studies.dataset import STATUSES, run_dataset
 from studies.errors import StudyError
+from studies.parameters import parameters_of
 from studies.profiles import Computed, read_profiles
 from studies.reference import Published
 from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
@@ -113,7 +114,9 @@ def test_a_level_that_is_neither_swept_nor_fixed_is_the_default_of_the_scene(
     with xr.open_dataset(path) as stored:
         bare = stored.load().assign_attrs(parameters="{}")
     bare.to_netcdf(tmp_path / "b.nc")
-    assert read_profiles([tmp_path / "b.nc"], {}).levels == [(1.0, 1.0)]
+    known = parameters_of(SCENES["rolling"])
+    level = (known["element_size"].default, known["advance_step"].default)
+    assert read_profiles([tmp_path / "b.nc"], {}).levels == [level]
 
 
 @pytest.mark.parametrize(

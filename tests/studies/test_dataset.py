@@ -104,4 +104,5 @@ def test_a_dimension_without_coordinate_is_refused() -> None:
 
 
 def test_every_quantity_of_the_table_has_a_unit_that_is_si_or_one() -> None:
-    assert {each.units for each in QUANTITIES.values()} == {"1", "mm", "MPa", "N", "N mm", "s"}
+    si = {"1", "mm", "rad", "MPa", "N", "N mm", "s"}
+    assert {each.units for each in QUANTITIES.values()} == si
