@@ -9,7 +9,8 @@ undecided                     the cycles have not become steady
 ============================  ===============================================================
 
 The *signed* plastic strain tells a closed cycle from an open one; the accumulated strain tells
-whether there is flow at all. Both are judged by where they tend to, from their last three cycles.
+whether there is flow at all. Both are judged by the bounds between which they tend, and decided
+only where the whole of these bounds agrees.
 
 K.L. Johnson, Contact Mechanics (1985), section 9.2.
 """
@@ -33,11 +34,12 @@ QUIET = 1e-3
 CLOSED = 0.05
 """Plastic strain left by a cycle over that accumulated in it, below which the cycle is closed."""
 STEADY = 0.02
-"""Relative change from cycle to cycle below which a sequence needs no extrapolation."""
-DRIFT = 0.04
-"""The same over the second half of a sequence."""
+"""Relative change from cycle to cycle, with twice that over the second half of a sequence, up to
+which it has come to its limit."""
 SLOWEST = 0.95
 """Ratio of successive changes above which a sequence tends nowhere yet."""
+KNOWN = 0.1
+"""Distance of the bounds of a limit, over the upper one, up to which their mean is the limit."""
 
 _X = np.linspace(-4.0, 4.0, 1601)
 
@@ -61,21 +63,46 @@ class Shakedown:
     net: float
 
 
-def tends_to(sequence: Array) -> float:
-    """Return the limit of a sequence (n,), NaN where its last three values do not tell.
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Bounds of what a sequence of numbers that are not negative tends to."""
 
-    A sequence that changes geometrically is extrapolated (Aitken's process).
-    """
-    if len(sequence) < 3:
-        return np.nan
-    before, last = np.diff(sequence[-3:])
-    drift = sequence[-1] - sequence[len(sequence) // 2 - 1]
-    if abs(last) <= STEADY * abs(sequence[-1]) and abs(drift) <= DRIFT * abs(sequence[-1]):
-        return float(sequence[-1])
-    ratio = last / before if before else np.inf
-    if not 0 <= ratio < SLOWEST:
-        return np.nan
-    return float(max(sequence[-1] + last * ratio / (1 - ratio), 0.0))
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, sequence: Array) -> Limit:
+        """Return the limit of a sequence (n,) from its last four values, or three.
+
+        A steady sequence has come to its limit, one that changes geometrically is extrapolated
+        (Aitken's process), one that goes up and down keeps within what it showed, any other one
+        goes on as it does. Two triples of values have each their say.
+        """
+        last = sequence[-1]
+        drift = last - sequence[len(sequence) // 2 - 1] if len(sequence) > 2 else np.inf
+        near = STEADY * abs(last)
+        if abs(drift) <= 2 * near and abs(last - sequence[-2]) <= near:
+            return cls(float(last), float(last))
+        triples = [sequence[i - 3 : i] for i in (len(sequence) - 1, len(sequence)) if i > 2]
+        bounds = np.array([_tends(*triple) for triple in triples] or [(0.0, np.inf)])
+        return cls(float(bounds[:, 0].min()), float(bounds[:, 1].max()))
+
+    @property
+    def value(self) -> float:
+        """The limit where it is known, else NaN."""
+        known = self.high - self.low <= KNOWN * self.high < np.inf
+        return (self.low + self.high) / 2 if known else np.nan
+
+
+def _tends(first: float, second: float, third: float) -> tuple[float, float]:
+    """Return the bounds of the limit that three successive values show."""
+    before, last = second - first, third - second
+    if last * before < 0:
+        return min(first, second, third), max(first, second, third)
+    if abs(last) < SLOWEST * abs(before):
+        limit = max(third + last**2 / (before - last), 0.0)
+        return limit, limit
+    return (third, np.inf) if last > 0 else (0.0, third)
 
 
 def classify(
@@ -96,17 +123,16 @@ def classify(
     if not accumulated.any():
         return Shakedown(State.ELASTIC, 0.0, 0.0)
     quiet = QUIET * yield_strain
-    if accumulated[-1] <= quiet:
+    flow, left = Limit.of(accumulated), Limit.of(net)
+    if accumulated[-1] <= quiet or flow.high <= quiet:
         return Shakedown(State.ELASTIC_SHAKEDOWN, 0.0, 0.0)
-    flow, left = tends_to(accumulated), tends_to(net)
-    if flow <= quiet:
-        return Shakedown(State.ELASTIC_SHAKEDOWN, flow, 0.0)
-    turned = tends_to(turnover)
-    if not np.isfinite([flow, left, turned]).all():
-        return Shakedown(State.UNDECIDED, flow, left)
-    if left <= CLOSED * turned:
-        return Shakedown(State.PLASTIC_SHAKEDOWN, flow, left)
-    return Shakedown(State.UNDECIDED if hardens else State.RATCHETTING, flow, left)
+    opening = Limit.of(np.divide(net, turnover, out=np.zeros_like(net), where=turnover > 0))
+    state = State.UNDECIDED
+    if flow.low > quiet and opening.high <= CLOSED:
+        state = State.PLASTIC_SHAKEDOWN
+    elif left.low > quiet and opening.low > CLOSED and not hardens:
+        state = State.RATCHETTING
+    return Shakedown(state, flow.value, left.value)
 
 
 def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Array, Array]:

@@ -15,6 +15,7 @@ import pytest
 from solver import SCENES, Status
 from solver.scenes.rolling_model import RollingParameters
 from solver.shakedown import (
+    Limit,
     State,
     classify,
     johnson_limit,
@@ -104,12 +105,42 @@ def test_friction_lowers_the_limit_and_from_0_37_on_the_surface_governs():
         ([3e-3, 2e-3, 2e-3, 2e-3], [1e-3, 8e-4, 7e-4, 6.5e-4], State.RATCHETTING),
         ([3e-3, 2.5e-3, 2e-3, 1.5e-3], [1e-3, 8e-4, 6e-4, 4e-4], State.UNDECIDED),
         ([3e-3, 2e-3], [3e-3, 2e-3], State.UNDECIDED),
+        # by how much each cycle opens is not known, but that it does
+        ([0.148, 0.150, 0.153, 0.158], [0.140, 0.142, 0.144, 0.150], State.RATCHETTING),
+        ([0.09, 0.10, 0.093, 0.095], [0.08, 0.087, 0.079, 0.082], State.RATCHETTING),
+        ([3e-3, 3e-3, 3e-3, 3e-3], [1.3e-4, 1.27e-4, 1.24e-4, 1.21e-4], State.PLASTIC_SHAKEDOWN),
+        # what it tends to depends on which of its values are asked
+        ([9e-4, 6e-4, 3e-4, 2e-4], [9e-4, 6e-4, 3e-4, 2e-4], State.UNDECIDED),
     ],
 )
 def test_state_follows_from_where_the_cycles_tend_to(accumulated, net, expected):
     flow = np.array(accumulated, float)
     found = classify(flow, np.array(net, float), flow, YIELD_STRAIN)
     assert found.state is expected
+
+
+@pytest.mark.parametrize(
+    ("sequence", "low", "high"),
+    [
+        ([7.0, 3.0, 2.0, 2.0, 2.0, 2.0], 2.0, 2.0),
+        ([9.0, 5.0, 3.0, 2.0], 1.0, 1.0),  # halves its distance to 1
+        ([1.0, 2.0, 2.5, 2.75], 3.0, 3.0),
+        ([9.0, 8.0, 3.0, 4.0, 2.9], 2.9, 8.0),
+        ([1.0, 2.0, 3.0, 4.0], 3.0, np.inf),
+        ([4.0, 3.0, 2.0, 1.0], 0.0, 2.0),
+        ([2.0, 1.0], 0.0, np.inf),
+        ([1.0], 0.0, np.inf),
+    ],
+)
+def test_a_sequence_is_bounded_by_what_its_last_values_show(sequence, low, high):
+    assert Limit.of(np.array(sequence)) == Limit(pytest.approx(low), pytest.approx(high))
+
+
+def test_a_limit_is_a_number_where_its_bounds_are_close():
+    assert Limit(1.9, 2.0).value == pytest.approx(1.95)
+    assert np.isnan(Limit(1.0, 2.0).value)
+    assert np.isnan(Limit(1.0, np.inf).value)
+    assert Limit(0.0, 0.0).value == 0.0
 
 
 def test_linear_hardening_cannot_go_on_ratchetting():
