@@ -107,19 +107,20 @@ def compare(options: argparse.Namespace) -> int:
     from studies.comparison_plot import comparison_figure
     from studies.comparison_table import comparison_table, write_comparisons
     from studies.profiles import read_profiles
-    from studies.reference import read_reference, reference_of
+    from studies.reference import published_cases, read_reference, reference_of
 
     computed = read_profiles(options.paths, dict(map(_assignment, options.select)))
     published = read_reference(options.reference or reference_of(computed.scene))
+    cases = {} if options.reference else published_cases(computed.scene)
     compared, absent = compared_with(computed, published)
-    print(comparison_table(computed, compared, absent))
-    if options.out:
-        _save(comparison_figure(computed, published), options.out)
-        print(f"wrote {options.out}")
     if options.csv:
         with _written("--csv", options.csv) as part:
             write_comparisons(part, computed, compared)
-        print(f"wrote {options.csv}")
+    if options.out:
+        _save(comparison_figure(computed, published), options.out)
+    print(comparison_table(computed, compared, absent, cases))
+    for written in filter(None, (options.out, options.csv)):
+        print(f"wrote {written}")
     return OK
 
 

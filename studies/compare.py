@@ -21,10 +21,11 @@ class Comparison:
     published : where the number comes from
     is_depth : whether it is the depth of the feature, or its value
     ours : level -> computed number, from coarse to fine; NaN where there is no such feature
-    difference : of the finest computed number from the published one, or from its nearer bound
-    changes : for each refinement, the change between its two finest levels
-    orders : for each refinement, the order at which its three finest levels settle; NaN where
-        there are fewer, or where they do not settle
+    difference : of the finest computed number from the published one, or from its nearer bound.
+        The finest is that on the finest mesh, and of several on it that with the finest increment
+    changes : for each refinement, the change between its two finest levels, all else equal
+    orders : for each refinement, the order at which its three finest levels settle, all else
+        equal; NaN where there are fewer, or where they do not settle
     """
 
     published: Published
@@ -94,12 +95,12 @@ def _comparison(published: Published, is_depth: bool, ours: Mapping[Level, float
 def _line(ours: Mapping[Level, float], axis: int) -> list[tuple[float, float]]:
     """Return size and number, from fine to coarse, of levels that differ along one axis only.
 
-    Of several such lines, that with most levels, then the finest.
+    Of several such lines, that which begins with the finest sizes: it holds the finest of all.
     """
     lines: dict[Level, list[tuple[float, float]]] = defaultdict(list)
     for level, value in sorted(ours.items()):
         lines[level[:axis] + level[axis + 1 :]].append((level[axis], value))
-    return min(lines.values(), key=lambda line: (-len(line), [size for size, _ in line]))
+    return min(lines.values(), key=lambda line: [*(size for size, _ in line), np.inf])
 
 
 def _change(line: Sequence[tuple[float, float]]) -> float:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from studies.columns import in_blocks, stacked
 from studies.compare import Comparison
+from studies.problem import Parameters, other_problem, told
 from studies.profiles import REFINEMENTS, Computed, Level
 from studies.reference import STRAIN, Published
 
@@ -37,13 +38,17 @@ _FEATURES = {
 
 
 def comparison_table(
-    computed: Computed, compared: Sequence[Comparison], absent: Sequence[Published]
+    computed: Computed,
+    compared: Sequence[Comparison],
+    absent: Sequence[Published],
+    cases: Mapping[str, Parameters],
 ) -> str:
     """Return a line for each published number, what was not computed, and a summary.
 
     The difference is that of the finest computed number from the published one. Beside it stand
     the changes of the computed number between the two finest meshes and increments, which tell
-    how much of the difference is the computation's own error.
+    how much of the difference is the computation's own error. A line says in which parameters
+    what was computed departs from the published `cases`, as far as those are known.
     """
     parts = []
     if compared:
@@ -52,6 +57,8 @@ def comparison_table(
         missing = Counter(f"{case}/{number}" for case, number in (each.key for each in absent))
         told = ", ".join(f"{count} of {key}" for key, count in missing.items())
         parts.append(f"published, but not computed here: {told}")
+    if departures := _departures(computed, cases):
+        parts.append(f"not the published case: {departures}")
     return "\n\n".join([*parts, _summary(compared, absent)])
 
 
@@ -83,9 +90,9 @@ def _lines(computed: Computed, compared: Sequence[Comparison]) -> str:
     if not computed.axes:
         return table
     refined = f"computed at {' / '.join(computed.axes)}, from coarse to fine"
-    meaning = "the difference is that of the finest, a change that between the two finest"
-    orders = "in brackets the order at which the three finest settle"
-    return f"{refined};\n{meaning}, {orders}\n\n{table}"
+    meaning = "the difference is that of the finest mesh, of several there of the finest increment;"
+    beside = "a change is that between the two finest, all else equal; in brackets the order"
+    return f"{refined};\n{meaning}\n{beside} at which the three finest settle\n\n{table}"
 
 
 def _row(each: Comparison, levels: Sequence[Level]) -> list[str]:
@@ -139,6 +146,17 @@ def _number(value: float, unit: str, sign: str = "") -> str:
 
 def _level(level: Level) -> str:
     return " / ".join(f"{value:g}" for value in level) or "computed"
+
+
+def _departures(computed: Computed, cases: Mapping[str, Parameters]) -> str:
+    """Return in which parameters which computed cases are not the published ones."""
+    found: dict[str, dict[str, None]] = defaultdict(dict)
+    for (case, number), levels in computed.profiles.items():
+        ours = next(iter(levels.values())).parameters  # all levels solve one problem
+        differing = other_problem(ours, cases[case], number) if case in cases else {}
+        for name, (value, published) in differing.items():
+            found[f"{name} {told(value)} (published {told(published)})"][case] = None
+    return "; ".join(f"{', '.join(where)} {what}" for what, where in found.items())
 
 
 def _summary(compared: Sequence[Comparison], absent: Sequence[Published]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,17 +15,25 @@ from scipy.signal import find_peaks
 from studies.dataset import OK, STATUSES
 from studies.errors import StudyError
 from studies.parameters import parameters_of, scene_named
-from studies.reading import find_datasets, one_run, open_netcdf, select, sweep_axes
+from studies.problem import SAME, Parameters, differences, other_problem, run_parameters, told
+from studies.reading import (
+    find_datasets,
+    one_run,
+    open_netcdf,
+    select,
+    sweep_axes,
+    sweep_coordinates,
+)
 from studies.reference import STRAIN, Published
 
 CASE = "case"
 """Dimension whose labels are those of the published cases."""
 
-REFINEMENTS: Mapping[str, str] = {"element_size": "mesh", "advance_step": "increment"}
-"""Parameters that a computation converges with, and what their refinement is called."""
+REFINEMENTS: Mapping[str, str] = {"element_size": "mesh", "advance": "increment"}
+"""Sizes that a computation converges with, and what their refinement is called."""
 
-SAME = 1e-6
-"""Relative difference below which two runs gave the same profile."""
+NOMINAL: Mapping[str, str] = {"advance": "advance_step"}
+"""Sizes that a run chooses itself, and the parameters they follow from."""
 
 Key = tuple[str, int]
 """Case and number of the pass."""
@@ -43,10 +50,12 @@ class Profile:
     ----------
     depth : ``(n,)`` [mm]
     values : component -> ``(n,)``, residual stress [MPa] or plastic strain
+    parameters : those of the run
     """
 
     depth: np.ndarray
     values: Mapping[str, np.ndarray]
+    parameters: Parameters
 
     def agrees_with(self, other: Profile) -> bool:
         """Tell whether both are the same but for rounding."""
@@ -116,7 +125,8 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
     Raises
     ------
     StudyError
-        when a path holds no cases, scenes differ, or runs of one case at one level differ
+        when a path holds no cases, scenes differ, or runs of one case differ in more than
+        refinement
     """
     profiles: dict[Key, dict[Level, Profile]] = defaultdict(dict)
     scenes: set[str] = set()
@@ -129,9 +139,10 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
                 found = True
                 scenes.add(dataset.attrs["scene"])
                 for key, level, profile in _profiles(select(dataset, selection)):
-                    known = profiles[key].setdefault(level, profile)
-                    if not known.agrees_with(profile):
-                        raise _ambiguous(path, key, level, dataset)
+                    known = profiles[key]
+                    if conflict := _conflict(known, key, level, profile):
+                        raise StudyError("path", str(path), _advised(dataset, *conflict))
+                    known.setdefault(level, profile)
         if not found:
             allowed = f"must hold residual profiles of cases: a study with an axis `{CASE}`"
             raise StudyError("path", str(path), allowed)
@@ -147,7 +158,8 @@ def _profiles(dataset: xr.Dataset) -> Iterator[tuple[Key, Level, Profile]]:
     axes = sweep_axes(dataset)
     for at in np.argwhere(dataset["status"].to_numpy() == STATUSES.index(OK)):
         run = one_run(dataset.isel({axis: [i] for axis, i in zip(axes, at, strict=True)}))
-        level = tuple(_parameter(run, name) for name in _refinements(run.attrs["scene"]))
+        parameters = run_parameters(run)
+        level = tuple(_size(run, name, parameters) for name in _refinements(run.attrs["scene"]))
         middle = run.sel(station=0.0, method="nearest")
         if "pass" not in run.dims:
             middle = middle.expand_dims({"pass": [1]})
@@ -160,28 +172,49 @@ def _profiles(dataset: xr.Dataset) -> Iterator[tuple[Key, Level, Profile]]:
             if "plastic_strain_profile" in run:
                 values[STRAIN] = after["plastic_strain_profile"].to_numpy()
             if any(np.isfinite(each).any() for each in values.values()):  # else not rolled so often
-                profile = Profile(depth=run["depth"].to_numpy(), values=values)
+                profile = Profile(
+                    depth=run["depth"].to_numpy(), values=values, parameters=parameters
+                )
                 yield (str(run[CASE].item()), int(number)), level, profile
 
 
 def _refinements(scene: str) -> tuple[str, ...]:
     known = parameters_of(scene_named(scene))
-    return tuple(name for name in REFINEMENTS if name in known)
+    return tuple(name for name in REFINEMENTS if NOMINAL.get(name, name) in known)
 
 
-def _parameter(run: xr.Dataset, name: str) -> float:
-    """Return a parameter of a run: swept, fixed for the study, or the scene's default."""
-    fixed: Mapping[str, Any] = json.loads(run.attrs["parameters"])
-    default = parameters_of(scene_named(run.attrs["scene"]))[name].default
-    return float(run[name]) if name in run.coords else float(fixed.get(name, default))
+def _size(run: xr.Dataset, name: str, parameters: Parameters) -> float:
+    """Return a size as the run took it; as it was asked for where the run does not say."""
+    return float(run[name] if name in run.data_vars else parameters[NOMINAL.get(name, name)])
 
 
-def _ambiguous(path: Path, key: Key, level: Level, dataset: xr.Dataset) -> StudyError:
-    axes = [name for name in sweep_axes(dataset) if name not in {CASE, *REFINEMENTS}]
-    choices = " or ".join(f"{name}=VALUE" for name in axes if dataset.sizes[name] > 1)
-    refined = zip(_refinements(dataset.attrs["scene"]), level, strict=True)
-    at = "".join(f", {name} {value:g}" for name, value in refined)
-    advice = f"--select {choices}" if choices else "compare data sets one by one"
-    return StudyError(
-        "path", str(path), f"holds another result for case {key[0]}, pass {key[1]}{at}: {advice}"
+def _conflict(
+    known: Mapping[Level, Profile], key: Key, level: Level, profile: Profile
+) -> tuple[str, list[str]] | None:
+    """Return why a profile cannot stand beside those of its case and pass, and what differs."""
+    where = "case {}, pass {}".format(*key)
+    for other in known.values():
+        if found := other_problem(profile.parameters, other.parameters, key[1]):
+            return f"{where} is another problem there: {_told(found)}", list(found)
+    if level not in known or known[level].agrees_with(profile):
+        return None
+    found = differences(profile.parameters, known[level].parameters)
+    reason = _told(found) or "made by another state of the solver"
+    return f"{where} has another result at the same refinement there: {reason}", list(found)
+
+
+def _told(found: Mapping[str, tuple[Any, Any]]) -> str:
+    return ", ".join(
+        f"{name} {told(one)}, not {told(other)}" for name, (one, other) in found.items()
     )
+
+
+def _advised(dataset: xr.Dataset, reason: str, differing: Sequence[str]) -> str:
+    """Return the reason of a conflict with what to do: choose, where an axis differs."""
+    axes = sweep_coordinates(dataset)
+    choices = " ".join(
+        f"{name}=VALUE"
+        for name in differing
+        if name in axes and axes[name] != CASE and dataset.sizes[axes[name]] > 1
+    )
+    return f"{reason}; " + (f"--select {choices}" if choices else "compare data sets one by one")

@@ -5,17 +5,21 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from studies.errors import StudyError
+from studies.parameters import nearest
+from studies.study import Study
 
 STRAIN = "plastic_strain"
 
-REFERENCES = Path(__file__).parents[1] / "data" / "reference"
-"""Where the published numbers of the scenes are kept, in one table a scene."""
+DATA = Path(__file__).parents[1] / "data"
+"""Where ``reference/SCENE.csv`` keeps the published numbers of a scene, and
+``studies/SCENE-table.toml`` the cases they belong to."""
 
 
 class Published(BaseModel):
@@ -95,11 +99,17 @@ def reference_of(scene: str) -> Path:
     StudyError
         when there is none
     """
-    path = REFERENCES / f"{scene}.csv"
+    path = DATA / "reference" / f"{scene}.csv"
     if not path.is_file():
         allowed = f"must be given: no published numbers of scene {scene} are at hand"
         raise StudyError("--reference", None, allowed)
     return path
+
+
+def published_cases(scene: str) -> dict[str, Mapping[str, Any]]:
+    """Return the parameters of the cases that `reference_of` has numbers of, by label."""
+    study = Study.from_toml(DATA / "studies" / f"{scene}-table.toml")
+    return {study.place(case)["case"]: case.values for case in study.cases()}
 
 
 def read_reference(path: Path) -> tuple[Published, ...]:
@@ -118,12 +128,29 @@ def read_reference(path: Path) -> tuple[Published, ...]:
         raise StudyError("reference", str(path), "must be a table in UTF-8") from None
     reader = csv.DictReader(io.StringIO(text), restkey="beyond the last column", strict=True)
     try:
+        if reader.fieldnames is not None:
+            _check_heading(reader.fieldnames, f"{path.name}:1")
         rows = tuple(_published(row, f"{path.name}:{reader.line_num}") for row in reader)
     except csv.Error as error:
         raise StudyError("reference", str(path), f"must be comma-separated: {error}") from None
     if not rows:
         raise StudyError("reference", str(path), "must hold a heading and published numbers")
     return rows
+
+
+def _check_heading(columns: Sequence[str], line: str) -> None:
+    """Refuse a heading that names a column nobody knows, or none that every row needs."""
+    fields = {field.alias or name: field for name, field in Published.model_fields.items()}
+    for position, column in enumerate(columns):
+        if column not in fields:
+            allowed = f"must be one of {', '.join(fields)}{nearest(column, fields)}"
+            raise StudyError(f"{line}: column", column, allowed)
+        if column in columns[:position]:
+            raise StudyError(f"{line}: column", column, "occurs twice: keep one")
+    needed = [name for name, field in fields.items() if field.is_required()]
+    if missing := [name for name in needed if name not in columns]:
+        allowed = f"must name {', '.join(missing)} too"
+        raise StudyError(f"{line}: heading", ",".join(columns), allowed)
 
 
 def _published(row: dict[str, Any], line: str) -> Published:

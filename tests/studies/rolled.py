@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -32,7 +33,7 @@ def data_set(
     cases: Mapping[str, int],
     sizes: Sequence[float] = (1.0,),
     steps: Sequence[float] = (1.0,),
-    fixed: Mapping[str, float] | None = None,
+    fixed: Mapping[str, Any] | None = None,
     frictions: Sequence[float] = (0.3,),
 ) -> xr.Dataset:
     """A study of rolling whose error is -10 MPa a mm of element and +4 MPa a mm of increment.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,9 @@ from studies.comparison_table import comparison_table
 from studies.dataset import STATUSES, run_dataset
 from studies.errors import StudyError
 from studies.parameters import parameters_of
-from studies.profiles import Computed, read_profiles
-from studies.reference import Published
+from studies.problem import REFINING
+from studies.profiles import Computed, Profile, read_profiles
+from studies.reference import Published, published_cases, read_reference, reference_of
 from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
 
 
@@ -66,7 +68,8 @@ def test_a_local_maximum_is_sought_between_the_given_depths_and_may_not_exist(
 ) -> None:
     beyond = published(quantity="local_maximum", **{"from": 4.0, "to": 12.0})
     assert np.isnan(refined.profiles["A", 1][0.5, 1.0].feature(beyond)).all()
-    told = comparison_table(refined, *compare(refined, [beyond.model_copy(update={"value": 1.0})]))
+    one = beyond.model_copy(update={"value": 1.0})
+    told = comparison_table(refined, *compare(refined, [one]), cases={})
     assert told.count("none") == 6
     assert told.endswith("compared 1 of 1 published numbers: 0 of 1 within 50 MPa")
 
@@ -104,6 +107,36 @@ def test_changes_are_found_where_mesh_and_increment_are_refined_apart(tmp_path: 
     assert one.difference == pytest.approx(-1.0)
     assert one.changes == pytest.approx((+5.0, -2.0))
     assert one.orders == pytest.approx((1.0, 1.0))
+
+
+MESHES = [(2.0, 1.0), (1.0, 1.0), (0.5, 1.0)]
+STEPS = [(1.0, 2.0), (1.0, 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("levels", "finest", "meshes", "increments"),
+    [
+        ([*MESHES, *STEPS, (0.25, 1.0)], (0.25, 1.0), (0.25, 0.5), (0.5, 1.0)),
+        ([*MESHES, *STEPS, (0.25, 0.5)], (0.25, 0.5), (0.25, 1.0), (0.5, 1.0)),
+        ([*MESHES, *STEPS, (0.25, 1.0), (0.25, 0.5)], (0.25, 0.5), (0.25, 0.5), (0.5, 1.0)),
+        ([*MESHES, *STEPS, (0.25, 0.3)], (0.25, 0.3), None, None),
+    ],
+)
+def test_a_change_lies_on_the_line_that_holds_the_finest(
+    tmp_path: Path,
+    levels: list[tuple[float, float]],
+    finest: tuple[float, float],
+    meshes: tuple[float, float] | None,
+    increments: tuple[float, float] | None,
+) -> None:
+    paths = [written(data_set({"A": 1}, (h,), (s,)), tmp_path / f"{h}-{s}.nc") for h, s in levels]
+    one = only(read_profiles(paths, {}), published(value=-200.0))
+    assert one.difference == pytest.approx(-10.0 * finest[0] + 4.0 * finest[1])
+    changes = [
+        slope * (pair[0] - pair[1]) if pair else np.nan
+        for slope, pair in ((-10.0, meshes), (4.0, increments))
+    ]
+    assert one.changes == pytest.approx(changes, nan_ok=True)
 
 
 def test_a_level_that_is_neither_swept_nor_fixed_is_the_default_of_the_scene(
@@ -197,14 +230,73 @@ def test_failed_runs_are_not_compared(tmp_path: Path) -> None:
     assert set(read_profiles([written(dataset, tmp_path / "a.nc")], {}).profiles) == {("A", 1)}
 
 
-def test_two_results_for_one_level_are_refused_unless_one_is_chosen(tmp_path: Path) -> None:
+def refused(*paths: Path) -> str:
+    with pytest.raises(StudyError) as caught:
+        read_profiles(paths, {})
+    return str(caught.value)
+
+
+def test_two_problems_in_one_data_set_are_refused_unless_one_is_chosen(tmp_path: Path) -> None:
     path = written(data_set({"A": 1}, frictions=(0.1, 0.3)), tmp_path / "a.nc")
-    with pytest.raises(
-        StudyError, match=r"another result for case A, pass 1, .*: --select friction=VALUE$"
-    ):
-        read_profiles([path], {})
+    assert refused(path).endswith(
+        "case A, pass 1 is another problem there: friction 0.3, not 0.1; --select friction=VALUE"
+    )
     one = only(read_profiles([path], {"friction": "0.3"}), published(value=-206.0))
     assert one.difference == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("fixed", "told"),
+    [
+        ({"track": 24.0}, "track 24, not 50"),
+        ({"periodic": True}, "periodic True, not False"),
+        ({"traction": 0.5, "growth": 1.5}, "traction 0.5, not 0;"),
+    ],
+)
+def test_data_sets_of_different_problems_are_not_meshes_of_one(
+    tmp_path: Path, fixed: dict[str, Any], told: str
+) -> None:
+    usual = written(data_set({"A": 1}, (1.0,)), tmp_path / "a.nc")
+    other = written(data_set({"A": 1, "B": 1}, (2.0,), fixed=fixed), tmp_path / "b.nc")
+    assert f"b.nc': case A, pass 1 is another problem there: {told}" in refused(usual, other)
+
+
+def test_the_way_of_later_passes_makes_no_other_problem_of_the_first(tmp_path: Path) -> None:
+    there = {"direction": "back_and_forth"}
+    paths = [
+        written(data_set({"A": passes}, (size,), fixed=fixed), tmp_path / f"{size}.nc")
+        for size, passes, fixed in ((2.0, 1, {}), (1.0, 2, there), (0.5, 2, {}))
+    ]
+    assert read_profiles(paths[:2], {}).levels == [(2.0, 1.0), (1.0, 1.0)]
+    told = "case A, pass 2 is another problem there: direction same, not back_and_forth"
+    assert told in refused(*paths[1:])
+
+
+def test_two_results_at_one_refinement_are_refused_with_what_refines_too(tmp_path: Path) -> None:
+    usual = written(data_set({"A": 1}), tmp_path / "a.nc")
+    coarse = data_set({"A": 1}, fixed={"growth": 1.5})
+    there = "case A, pass 1 has another result at the same refinement there:"
+    changed = coarse.assign(residual_profile=coarse["residual_profile"] + 1.0)
+    told = refused(usual, written(changed, tmp_path / "b.nc"))
+    assert f"{there} growth 1.5, not 1.15; compare data sets one by one" in told
+    again = changed.assign_attrs(parameters="{}")
+    told = refused(usual, written(again, tmp_path / "c.nc"))
+    assert f"{there} made by another state of the solver" in told
+    assert read_profiles([usual, written(coarse, tmp_path / "d.nc")], {}).levels == [(1.0, 1.0)]
+
+
+def test_what_refines_is_a_parameter_of_a_scene() -> None:
+    known = {name for scene in SCENES.values() for name in parameters_of(scene)}
+    assert known >= REFINING
+
+
+def test_an_advance_that_was_chosen_by_the_run_is_its_increment(tmp_path: Path) -> None:
+    dataset = data_set({"A": 1}, fixed={"advance_tolerance": 0.01})
+    dataset["advance"] = xr.full_like(dataset["status"], 0.25, dtype=float)
+    usual = written(data_set({"A": 1}), tmp_path / "a.nc")
+    computed = read_profiles([usual, written(dataset, tmp_path / "b.nc")], {})
+    assert computed.axes == ("element_size", "advance")
+    assert computed.levels == [(1.0, 1.0), (1.0, 0.25)]
 
 
 def test_the_same_result_given_twice_is_one_result(tmp_path: Path) -> None:
@@ -231,11 +323,16 @@ def test_compare_prints_writes_and_draws(
         "about", "-220", "-216", "-206", "-201", "+19", "+5", "(1.0)", "-",
     ]  # fmt: skip
     assert "published, but not computed here: 2 of T8/1" in lines
+    (departures,) = [line for line in lines if line.startswith("not the published case: ")]
+    assert "T1, T3, T6, T7 load_ratio 2.7 (published 2.709163)" in departures
+    assert "; T1 direction same (published back_and_forth)" in departures
+    assert "; T3 traction 0 (published 0.75)" in departures
+    assert "passes" not in departures and "advance_step" not in departures
     assert lines[-3].startswith("compared 32 of 34 published numbers: ")
     assert picture.read_bytes().startswith(b"\x89PNG")
     with rows.open() as file:
         (first, *_) = csv.DictReader(file)
-    assert float(first["element_size=0.5 advance_step=1"]) == pytest.approx(-201.0)
+    assert float(first["element_size=0.5 advance=1"]) == pytest.approx(-201.0)
 
 
 def test_compare_takes_published_numbers_of_the_user(
@@ -245,8 +342,29 @@ def test_compare_takes_published_numbers_of_the_user(
     mine = tmp_path / "r.csv"
     mine.write_text("case,quantity,component,value,unit,source\nmine,surface,zz,-100,MPa,my rig")
     assert main(["compare", data, "--reference", str(mine)]) == 0
-    assert "1 of 1 within 50 MPa" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "1 of 1 within 50 MPa" in told and "not the published case" not in told
     assert main(["compare", data, "--reference", str(tmp_path / "none.csv")]) == 2
     assert "cannot be read: No such file" in capsys.readouterr().err
     assert main(["compare", str(tmp_path)]) == 2
     assert "must be a data set, a study or an output directory" in capsys.readouterr().err
+
+
+def test_the_published_cases_of_rolling_depart_from_themselves_in_nothing() -> None:
+    cases = published_cases("rolling")
+    rows = read_reference(reference_of("rolling"))
+    assert {row.case for row in rows} <= set(cases)
+    profile = Profile(depth=DEPTH, values={}, parameters=cases["T3"] | {"element_size": 0.1})
+    same = Computed(scene="rolling", axes=(), profiles={("T3", 2): {(): profile}})
+    assert "not the published" not in comparison_table(same, [], [], cases)
+
+
+@pytest.mark.parametrize("option", ["--out", "--csv"])
+def test_a_file_that_cannot_be_written_is_told_instead_of_a_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    data = written(data_set({"T1": 1}), tmp_path / "a.nc")
+    assert main(["compare", str(data), option, str(tmp_path / "nowhere" / "a.png")]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert f"{option} = " in printed.err and "cannot be written" in printed.err

@@ -48,6 +48,9 @@ def test_a_wrong_row_is_told_by_line_column_and_value(tmp_path: Path, row: str, 
     assert told in str(caught.value)
 
 
+HEADING = b"case,quantity,component,value,unit,source\n"
+
+
 def test_a_scene_without_published_numbers_asks_for_a_table() -> None:
     with pytest.raises(StudyError, match="--reference = None: must be given"):
         reference_of("punch")
@@ -57,9 +60,13 @@ def test_a_scene_without_published_numbers_asks_for_a_table() -> None:
     ("content", "told"),
     [
         (b"", "must hold a heading and published numbers"),
-        (b"case\n", "must hold a heading and published numbers"),
-        (b"case\n\xff", "must be a table in UTF-8"),
-        (b'case\n"A', "must be comma-separated"),
+        (HEADING, "must hold a heading and published numbers"),
+        (HEADING + b"\xff", "must be a table in UTF-8"),
+        (HEADING + b'"A', "must be comma-separated"),
+        (b"case,valu\nA,1", r"^r.csv:1: column = 'valu': must be one of .*did you mean value\?$"),
+        (b"case,case\nA,1", "^r.csv:1: column = 'case': occurs twice: keep one$"),
+        (b"case,value\nA,1", "^r.csv:1: heading = 'case,value': must name quantity, component, "),
+        (b"\ncase,value\nA,1", "^r.csv:1: heading = '': must name case, quantity, "),
     ],
 )
 def test_a_file_that_is_no_table_is_refused(tmp_path: Path, content: bytes, told: str) -> None:
