@@ -25,7 +25,7 @@ def run(options: argparse.Namespace) -> int:
     from studies.reading import open_study
     from studies.run import run_study
     from studies.store import Store
-    from studies.tables import runs_table
+    from studies.tables import messages, runs_table
 
     study = Study.from_toml(options.study)
     progress = Progress(study)
@@ -43,10 +43,9 @@ def run(options: argparse.Namespace) -> int:
     with open_study(outcome.dataset) as dataset:
         if study.size <= SHOWN:
             print(runs_table(dataset))
+        print(messages(dataset), end="")
         warned = _warned(dataset)
         picture = _picture(dataset, outcome.dataset.with_name("residual_stress_xx.png"))
-    for run_id, status, message in outcome.failed:
-        print(f"{status}  runs/{run_id}.nc  {message}", file=sys.stderr)
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
     print(f"\n{study.name}: {study.size} runs ({counts}{warned}), {computed}")
@@ -67,14 +66,19 @@ def scenes(options: argparse.Namespace) -> int:
 
 def show(options: argparse.Namespace) -> int:
     """Print what is known of a run, a study or all studies of a directory."""
-    from studies.reading import find_datasets, open_netcdf
-    from studies.tables import run_details, runs_table
+    from studies.reading import begun_studies, find_datasets, open_netcdf, present_datasets
+    from studies.tables import messages, run_details, runs_table
 
-    for path in find_datasets(options.path):
+    begun = begun_studies(options.path)
+    for path in (present_datasets if begun else find_datasets)(options.path):
         with open_netcdf(path) as dataset:
-            single = dataset["status"].size == 1
             print(f"{dataset.attrs['title']}  ({path})\n")
-            print(run_details(dataset) if single else runs_table(dataset), end="\n\n")
+            if dataset["status"].size == 1:
+                print(run_details(dataset), end="\n\n")
+            else:
+                print(runs_table(dataset), messages(dataset), sep="\n")
+    for line in begun:
+        print(line)
     return OK
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import xarray as xr
 
 from studies.dataset import OK, STATUSES
 from studies.errors import StudyError
-from studies.store import ENGINE
+from studies.store import ENGINE, Store
+from studies.study import Study
 
 
 def open_study(path: Path | str) -> xr.Dataset:
@@ -42,15 +44,46 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
 
 def find_datasets(path: Path | str) -> list[Path]:
     """Return the data sets `path` stands for: itself, a study's, or those of all studies in it."""
+    found = present_datasets(path)
+    if not found:
+        begun = "; ".join(begun_studies(path))
+        allowed = begun or "must be a data set, a study or an output directory"
+        raise StudyError("path", str(path), allowed)
+    return found
+
+
+def present_datasets(path: Path | str) -> list[Path]:
+    """Return what `find_datasets` does, or nothing."""
     path = Path(path)
     if path.is_file():
         return [path]
-    if (path / "dataset.nc").is_file():
-        return [path / "dataset.nc"]
-    found = sorted(path.glob("studies/*/dataset.nc"))
-    if not found:
-        raise StudyError("path", str(path), "must be a data set, a study or an output directory")
-    return found
+    own = path / "dataset.nc"
+    return [own] if own.is_file() else sorted(path.glob("studies/*/dataset.nc"))
+
+
+def begun_studies(path: Path | str) -> list[str]:
+    """Return how far each study is that has no data set yet: of those in `path`, or `path` itself.
+
+    A study has a data set when the work on it has ended, were it by Ctrl-C.
+    """
+    path = Path(path).resolve()
+    files = [*path.glob("study.json"), *sorted(path.glob("studies/*/study.json"))]
+    begun = [file for file in files if not file.with_name("dataset.nc").is_file()]
+    return [f"{_progress(file)}; no data set yet ({file.parent})" for file in begun]
+
+
+def _progress(file: Path) -> str:
+    """Return the name of a study, and how many of its runs are finished."""
+    content = json.loads(file.read_text(encoding="utf-8"))
+    try:
+        study = Study.from_dict(content)
+    except StudyError:  # it knows parameters that the scene has no more
+        study = None
+    if study is None or study.id != file.parent.name:
+        return f"{content['name']}: begun by another state of the solver"
+    store = Store(file.parents[2])
+    finished = sum(store.run_path(case.id).is_file() for case in study.cases())
+    return f"{study.name}: {finished} of {study.size} runs finished"
 
 
 def sweep_axes(dataset: xr.Dataset) -> list[str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import xarray as xr
 
 from solver.scenes import SCENES
 from studies.columns import aligned, in_blocks, stacked
-from studies.dataset import STATUSES
+from studies.dataset import OK, STATUSES
 from studies.parameters import parameters_of, scene_named
 from studies.reading import sweep_axes, sweep_coordinates
 
@@ -37,6 +38,10 @@ FIGURES: Mapping[str, str] = {
 """Variables a table of runs shows, where the scene gives them, and their headings."""
 
 
+NAMED = 4
+"""Most runs that are named for a message; the rest are counted."""
+
+
 def runs_table(dataset: xr.Dataset) -> str:
     """Return a line for each run: where it lies in the sweep, its status, its main figures.
 
@@ -60,17 +65,44 @@ def runs_table(dataset: xr.Dataset) -> str:
     return in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
 
 
+def messages(dataset: xr.Dataset) -> str:
+    """Return each message of the runs once: outcome, text, how many runs have it, and which."""
+    axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
+    status, text = (dataset[name].to_numpy() for name in ("status", "message"))
+    found: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for at in np.ndindex(status.shape):
+        place = dict(zip(sweep_axes(dataset), at, strict=True))
+        where = (f"{axis} = {_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
+        if text[at]:
+            outcome = STATUSES[status[at]]
+            kind = "warning" if outcome == OK else outcome
+            found[kind, str(text[at])].append(", ".join(where))
+    return "".join(
+        f"\n{kind}: {message}\n    {_listed(places)}\n"
+        for (kind, message), places in sorted(found.items())
+    )
+
+
+def _listed(places: Sequence[str]) -> str:
+    """Return how many runs there are, and the first of them."""
+    if not places[0]:
+        return "the only run"
+    more = f"; and {len(places) - NAMED} more" if len(places) > NAMED else ""
+    runs = "1 run" if len(places) == 1 else f"{len(places)} runs"
+    return f"{runs}: {'; '.join(places[:NAMED])}{more}"
+
+
 def run_details(dataset: xr.Dataset) -> str:
     """Return the parameters, outcome and figures of a single run."""
     lines = [["scene", dataset.attrs["scene"]]]
     swept = {name: dataset[name].item() for name in sweep_coordinates(dataset)}
     lines += [[name, _text(value)] for name, value in (_parameters(dataset) | swept).items()]
-    lines.append(["status", STATUSES[int(dataset["status"].item())]])
+    lines.append(["status", _figure(dataset["status"])])
     if message := str(dataset["message"].item()):
         lines.append(["message", message])
     rank = dataset["status"].ndim
     lines += [
-        [str(name), f"{_text(each.item())} {_unit(each)}".rstrip()]
+        [str(name), f"{_figure(each)} {_unit(each)}".rstrip()]
         for name, each in dataset.data_vars.items()
         if each.ndim == rank and name not in {"status", "message"}
     ]
@@ -95,11 +127,18 @@ def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
     return json.loads(dataset.attrs["parameters"])
 
 
+def _figure(variable: xr.DataArray) -> str:
+    """Return the single value of a variable; what a flag means instead of its number."""
+    meanings = str(variable.attrs.get("flag_meanings", "")).split()
+    flags = dict(zip(np.atleast_1d(variable.attrs.get("flag_values", [])), meanings, strict=True))
+    return flags.get(variable.item()) or _text(variable.item())
+
+
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float | np.floating):
-        return "-" if np.isnan(value) else f"{value:.4g}"
+        return "-" if np.isnan(value) else f"{value:z.4g}"
     return "-" if value is None else str(value)
 
 

@@ -12,9 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import xarray as xr
 
-from studies import Store, Study, StudyEvent
+from solver.shakedown import State as Shakedown
+from studies import Store, Study, StudyEvent, open_netcdf
 from studies.cli import main
+from studies.dataset import attributes_of
 from studies.progress import Progress
 from tests.studies.conftest import compute_here, fake_study
 
@@ -42,30 +45,100 @@ def test_run_prints_a_table_and_writes_data_and_picture(
     assert len(printed.err.splitlines()) == 4
 
 
-def test_run_with_failed_runs_lists_them_and_returns_1(
+def test_run_with_failed_runs_tells_which_and_why_and_returns_1(
     study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["run", str(study_file(trouble="limit")), "--out", str(tmp_path / "out")]
     assert main([*arguments, "--workers", "1"]) == 1
     printed = capsys.readouterr()
-    assert printed.err.count("flows at 0.75") == 4, "as it happens, and in the list at the end"
+    assert printed.err.count("flows at 0.75") == 2, "as it happens"
+    which = "2 runs: load_ratio = 0.9, friction = 0; load_ratio = 0.9, friction = 0.4"
+    assert f"\n\nlimit_load: flows at 0.75\n    {which}\n\nfake: 4 runs" in printed.out
     assert "2 ok, 2 limit_load" in printed.out
     assert main([*arguments, "--resume"]) == 1
     assert "0 computed" in capsys.readouterr().out
 
 
-def test_warnings_are_counted_and_told_with_the_run(
+def test_warnings_are_counted_and_told_once_with_their_runs(
     study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
     arguments = ["run", str(study_file(trouble="warn")), "--out", str(out), "--workers", "1"]
     assert main(arguments) == 0
     printed = capsys.readouterr()
-    assert "strains are large" not in printed.err + printed.out
+    assert "strains are large" not in printed.err
+    assert printed.out.count("\nwarning: strains are large\n    2 runs: load_ratio = 0.9, ") == 1
     assert "4 runs (4 ok; 2 with a warning)" in printed.out
+    assert main(["show", str(out)]) == 0
+    assert capsys.readouterr().out.count("\nwarning: strains are large\n    2 runs: ") == 1
     for run in (out / "runs").iterdir():
         main(["show", str(run)])
     assert capsys.readouterr().out.count("strains are large") == 2
+
+
+def test_of_many_runs_with_one_message_some_are_named(
+    store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
+    loads = [0.8, 0.81, 0.82, 0.83, 0.84, 0.85]
+    compute_here(fake_study(sweep={"load_ratio": loads}, trouble="limit"), store)
+    assert main(["show", str(store.directory)]) == 0
+    told = capsys.readouterr().out
+    assert "    6 runs: load_ratio = 0.8; " in told and "load_ratio = 0.83; and 2 more\n" in told
+
+
+def test_show_tells_how_far_a_study_without_a_data_set_is(
+    store: Store, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, later = fake_study("first"), fake_study("later", sweep={"friction": [0.9]})
+    compute_here(study, store)
+    store.dataset_path(study.id).unlink()
+    store.discard([next(study.cases()).id])
+    store.save_study(later)
+    for path in (store.directory, store.study_directory(study.id)):
+        assert main(["show", str(path)]) == 0
+        told = capsys.readouterr().out
+        assert "first: 3 of 4 runs finished; no data set yet" in told
+        assert ("later: 0 of 1 runs finished" in told) is (path == store.directory)
+    assert main(["plot", str(store.directory), "--out", str(tmp_path / "a.png")]) == 2
+    assert "first: 3 of 4 runs finished; no data set yet" in capsys.readouterr().err
+    compute_here(later, store)
+    assert main(["show", str(store.directory)]) == 0
+    told = capsys.readouterr().out
+    assert "later: 0" not in told and "max_plastic_strain" not in told and "0.9" in told
+
+
+def test_a_study_of_another_solver_is_told_as_such(
+    store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = fake_study("first")
+    store.save_study(study)
+    other = store.study_directory(study.id).with_name("0" * 32)
+    store.study_directory(study.id).rename(other)
+    assert main(["show", str(store.directory)]) == 0
+    told = "first: begun by another state of the solver; no data set yet"
+    assert told in capsys.readouterr().out
+    stored = json.loads((other / "study.json").read_text())
+    stored["parameters"]["gone"] = 1
+    (other / "study.json").write_text(json.dumps(stored))
+    assert main(["show", str(store.directory)]) == 0
+    assert told in capsys.readouterr().out
+
+
+def test_show_of_a_run_tells_flags_in_words_and_no_negative_zero(
+    computed: tuple[Study, Store], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, store = computed
+    with open_netcdf(store.run_path(next(study.cases()).id)) as run:
+        changed = run.load()
+    for name, value in (("shakedown_state", Shakedown.UNDECIDED), ("creepage", -0.0)):
+        changed[name] = xr.full_like(changed["peak_residual_tension"], float(value))
+        changed[name].attrs = attributes_of(name)
+    changed.to_netcdf(tmp_path / "run.nc")
+    assert main(["show", str(tmp_path / "run.nc")]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["shakedown_state", "undecided"] in lines
+    assert ["creepage", "0"] in lines
+    assert ["status", "ok"] in lines
 
 
 @pytest.mark.parametrize(
