@@ -146,6 +146,8 @@ def on_plain_error(request: Request, exc: NotFound | Conflict) -> Problem:
 
 def on_http_error(request: Request, exc: HTTPException) -> Problem:
     """Answer what the framework refuses itself: unknown paths, methods, large bodies."""
+    if isinstance(exc.__cause__, StudyError):  # from within the framework's reading of the body
+        return on_field_error(request, exc.__cause__)
     headers = dict(exc.headers) if exc.headers else None
     status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
     if status is HTTPStatus.BAD_REQUEST:  # a body that Python's JSON reader gave up

@@ -31,7 +31,9 @@ class StudyFilter(Window):
 
 
 class RunFilter(Window):
-    """Which runs are asked for; a number must be the very number of the run."""
+    """Which runs are asked for, by any parameter; a number must be the very number of the run."""
+
+    model_config = ConfigDict(extra="allow")
 
     scene: str | None = Field(default=None, description="name of the scene")
     status: str | None = Field(default=None, description="outcome, such as ``ok``")

@@ -16,7 +16,8 @@ from studies.errors import GridLost, StoreBusy, StudyError
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status.
 
-    0: all went well. 1: some runs failed, or the machinery did. 2: bad input. 130: interrupted.
+    0: all went well. 1: not all runs are ok: some failed, or something kept them from being
+    computed, such as another process in the directory. 2: bad input. 130: interrupted.
     """
     options = _parser().parse_args(arguments)
     try:

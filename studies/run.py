@@ -114,6 +114,8 @@ def run_study(
         asked = asked or (should_stop is not None and should_stop())
         return asked
 
+    if scheduler and not store.directory.exists():
+        _answering(scheduler)
     with store.writing():
         store.save_study(study)
         cases = list(study.cases())
@@ -143,6 +145,14 @@ def run_study(
         wall_seconds=time.monotonic() - started,
         stopped=asked and bool(wanted - work.computed),
     )
+
+
+def _answering(scheduler: str) -> None:
+    """Refuse a scheduler that does not answer, before a directory is made for its results."""
+    from studies.grid import Grid  # dask takes a second to import
+
+    with Grid(0, scheduler):
+        pass
 
 
 @dataclass(slots=True)

@@ -11,14 +11,18 @@ from service import maps
 from service.dependencies import TheRun, TheStore
 from service.files import NETCDF, netcdf
 from service.schemas import MapQuery, Run, RunFilter, RunPage
+from service.search import conditions
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
 
 @router.get("")
 def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
-    """List the runs that match, in order of creation, whichever study asked for them."""
-    rows, total = store.catalogue.runs(**which.model_dump(exclude_none=True))
+    """List the runs that match, in order of creation, whichever study asked for them.
+
+    Beside the queries named below, every parameter of the scenes is one: `?traction=0.75`.
+    """
+    rows, total = store.catalogue.runs(**conditions(which))
     return RunPage(total=total, items=[Run(**row) for row in rows])
 
 

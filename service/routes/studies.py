@@ -17,9 +17,10 @@ from service.dependencies import TheJob, TheJobs, TheRunner, TheSettings, TheSto
 from service.errors import NotFound
 from service.files import NETCDF, netcdf
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
+from service.strict import StrictRoute
 from studies import Study
 
-router = APIRouter(prefix="/studies", tags=["studies"])
+router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
 
 EXAMPLE = {
     "name": "two-frictions",

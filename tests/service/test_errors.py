@@ -205,13 +205,56 @@ def test_a_method_that_is_not_offered_is_named(service: Server) -> None:
         ("/runs?offset=99999999999999999999999", "offset"),
         ("/runs?friction=nan", "friction"),
         ("/runs?friction=rough", "friction"),
+        ("/runs?friction=-1", "friction"),
         ("/runs?frictoin=0.1", "frictoin"),
+        ("/runs?scene=punch&traction=0.1", "traction"),
+        ("/runs?traction=much", "traction"),
+        ("/runs?traction=0.1&traction=0.2", "traction"),
+        ("/runs?traction=" + "[" * 5000, "traction"),
+        ("/runs?periodic=1", "periodic"),
+        ("/runs?seconds=NaN", "seconds"),
+        ("/runs?scene=bogus", "scene"),
+        ("/runs?status=bogus", "status"),
+        ("/runs?status=missing", "status"),
+        ("/runs?hardening=bogus", "hardening"),
+        ("/runs?scene=fake&hardening=kinematic", "hardening"),
         ("/studies?status=happy", "status"),
     ],
 )
 def test_a_bad_query_is_refused_by_field(service: Server, path: str, field: str) -> None:
     (error,) = problem(service.client.get(path), 422)["errors"]
     assert error["field"] == field
+
+
+@pytest.mark.parametrize(
+    ("query", "allowed"),
+    [
+        ("frictoin=0.1", ["scene, status, limit, offset, ", "did you mean friction?"]),
+        ("scene=fake&traction=0.1", ["load_ratio, friction, hardening, seconds"]),
+        ("scene=pinch", ["fake", "did you mean punch?"]),
+        ("status=limit", ["must be one of ok, ", "limit_load", "error"]),
+        ("hardening=soft", ["none, isotropic"]),
+    ],
+)
+def test_a_bad_query_is_told_what_is_allowed(
+    service: Server, query: str, allowed: list[str]
+) -> None:
+    (error,) = problem(service.client.get(f"/runs?{query}"), 422)["errors"]
+    assert all(words in error["allowed"] for words in allowed), error
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [
+        ('"sweep": {"case": {"A": {"friction": 0.1}, "A": {"friction": 0.2}}}', "A"),
+        ('"sweep": {"friction": [0.1], "friction": [0.2]}', "friction"),
+        ('"sweep": {}, "sweep": {}', "sweep"),
+    ],
+)
+def test_a_name_that_occurs_twice_is_refused(service: Server, part: str, name: str) -> None:
+    body = f'{{"name": "twice", "scene": "fake", {part}}}'.encode()
+    (error,) = problem(service.client.post("/studies", content=body, headers=JSON), 422)["errors"]
+    assert error["field"] == name and "occurs twice" in error["allowed"]
 
 
 def ask(app: FastAPI, path: str) -> httpx.Response:

@@ -30,6 +30,10 @@ def runs(service: Server) -> list[dict[str, Any]]:
         ({"friction": 0.125, "status": "ok", "scene": "fake"}, 2),
         ({"friction": 0.125, "scene": "punch"}, 0),
         ({"friction": 0.125, "limit": 1}, 2),
+        ({"friction": 0.125, "seconds": 0, "behaviour": "good"}, 2),
+        ({"friction": 0.125, "scene": "fake", "seconds": "0.0"}, 2),
+        ({"friction": 0.125, "seconds": 0.25}, 0),
+        ({"friction": 0.125, "traction": 0.5}, 0),
     ],
 )
 def test_runs_are_found_by_their_parameters(

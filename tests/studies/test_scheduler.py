@@ -77,9 +77,10 @@ def test_a_lost_scheduler_is_told_apart_from_failed_runs(
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "odd://127.0.0.1:1"])
-def test_no_scheduler_at_the_address_is_one_clear_error(
+def test_no_scheduler_at_the_address_is_one_clear_error_and_leaves_nothing(
     store: Store, monkeypatch: pytest.MonkeyPatch, address: str
 ) -> None:
     monkeypatch.setattr("studies.grid._CONNECT", 1.0)
     with pytest.raises(GridLost, match=f"no scheduler answers at {address}: "):
         run_study(fake_study(), store, scheduler=address)
+    assert not store.directory.exists()
