@@ -125,8 +125,8 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
     Raises
     ------
     StudyError
-        when a path holds no cases, scenes differ, or runs of one case differ in more than
-        refinement
+        when a path holds no cases, no run succeeded, scenes differ, or runs of one case differ
+        in more than refinement
     """
     profiles: dict[Key, dict[Level, Profile]] = defaultdict(dict)
     scenes: set[str] = set()
@@ -148,6 +148,8 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
             raise StudyError("path", str(path), allowed)
     if len(scenes) > 1:
         raise StudyError("path", ", ".join(map(str, paths)), f"must be of one scene, not {scenes}")
+    if not profiles:
+        raise StudyError("path", ", ".join(map(str, paths)), "must hold a run that succeeded")
     scene = scenes.pop()
     ordered = {key: dict(sorted(each.items(), reverse=True)) for key, each in profiles.items()}
     return Computed(scene=scene, axes=_refinements(scene), profiles=ordered)

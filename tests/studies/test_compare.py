@@ -228,6 +228,8 @@ def test_failed_runs_are_not_compared(tmp_path: Path) -> None:
     dataset = data_set({"A": 1, "B": 1})
     dataset["status"][{"case": 1}] = STATUSES.index("limit_load")
     assert set(read_profiles([written(dataset, tmp_path / "a.nc")], {}).profiles) == {("A", 1)}
+    dataset["status"][:] = STATUSES.index("limit_load")
+    assert "must hold a run that succeeded" in refused(written(dataset, tmp_path / "b.nc"))
 
 
 def refused(*paths: Path) -> str:
