@@ -76,6 +76,12 @@ class TravellingPressure:
     position: NDArray[np.float64]
     shear_ratio: NDArray[np.float64]
 
+    def now(self, time: float) -> tuple[float, float, float]:
+        """Return the share of the pressure, its centre [mm] and the ratio of shear to it."""
+        knots = (self.amplitude, self.position, self.shear_ratio)
+        amplitude, centre, ratio = (float(np.interp(time, self.time, each)) for each in knots)
+        return amplitude, centre, ratio
+
     def at(
         self, time: float, x: NDArray[np.float64], period: float = 0.0
     ) -> tuple[NDArray[np.float64], float]:
@@ -83,10 +89,7 @@ class TravellingPressure:
 
         On a periodic body the pressure comes back after each ``period`` [mm].
         """
-        amplitude, centre, ratio = (
-            float(np.interp(time, self.time, knots))
-            for knots in (self.amplitude, self.position, self.shear_ratio)
-        )
+        amplitude, centre, ratio = self.now(time)
         away = x - centre
         if period:
             away -= period * np.round(away / period)

@@ -36,6 +36,11 @@ CLOSED = 0.05
 STEADY = 0.02
 """Relative change from cycle to cycle, with twice that over the second half of a sequence, up to
 which it has come to its limit."""
+AT_REST = 2e-3
+"""Relative change from cycle to cycle below which what came before does not matter."""
+KEPT = 0.8
+"""Part of its value half-way that a sequence must keep to tend to anything but zero. A decay as
+1 / n^p keeps 1 / 2^p of it, however long it has lasted."""
 SLOWEST = 0.95
 """Ratio of successive changes above which a sequence tends nowhere yet."""
 KNOWN = 0.1
@@ -76,16 +81,19 @@ class Limit:
 
         A steady sequence has come to its limit, one that changes geometrically is extrapolated
         (Aitken's process), one that goes up and down keeps within what it showed, any other one
-        goes on as it does. Two triples of values have each their say.
+        goes on as it does. Two triples of values have each their say. What has fallen too far
+        since half-way may go on to zero.
         """
-        last = sequence[-1]
-        drift = last - sequence[len(sequence) // 2 - 1] if len(sequence) > 2 else np.inf
-        near = STEADY * abs(last)
-        if abs(drift) <= 2 * near and abs(last - sequence[-2]) <= near:
-            return cls(float(last), float(last))
+        if len(sequence) < 3:
+            return cls(0.0, np.inf)
+        last, halfway = float(sequence[-1]), float(sequence[len(sequence) // 2 - 1])
+        change = max(abs(last - sequence[-2]), abs(last - halfway) / 2)
+        if change <= STEADY * abs(last):
+            return cls(last, last)
         triples = [sequence[i - 3 : i] for i in (len(sequence) - 1, len(sequence)) if i > 2]
-        bounds = np.array([_tends(*triple) for triple in triples] or [(0.0, np.inf)])
-        return cls(float(bounds[:, 0].min()), float(bounds[:, 1].max()))
+        low, high = np.transpose([_tends(*triple) for triple in triples])
+        kept = last >= KEPT * halfway
+        return cls(float(low.min()) if kept else 0.0, float(high.max()))
 
     @property
     def value(self) -> float:
@@ -97,6 +105,8 @@ class Limit:
 def _tends(first: float, second: float, third: float) -> tuple[float, float]:
     """Return the bounds of the limit that three successive values show."""
     before, last = second - first, third - second
+    if abs(last) <= AT_REST * abs(third):
+        return third, third
     if last * before < 0:
         return min(first, second, third), max(first, second, third)
     if abs(last) < SLOWEST * abs(before):
@@ -106,16 +116,14 @@ def _tends(first: float, second: float, third: float) -> tuple[float, float]:
 
 
 def classify(
-    accumulated: Array, net: Array, turnover: Array, yield_strain: float, *, hardens: bool = False
+    accumulated: Array, net: Array, yield_strain: float, *, hardens: bool = False
 ) -> Shakedown:
     """Return the shakedown state from what each cycle did.
 
     Parameters
     ----------
-    accumulated : (n_cycles,) largest equivalent plastic strain accumulated at a depth in a cycle
-    net : (n_cycles,) equivalent of the signed plastic strain a cycle leaves at the depth where the
-        last one leaves most
-    turnover : (n_cycles,) equivalent plastic strain accumulated in a cycle at that depth
+    accumulated : (n_cycles, n_depths) equivalent plastic strain accumulated in a cycle
+    net : (n_cycles, n_depths) equivalent of the signed plastic strain a cycle leaves
     yield_strain : yield stress / Young's modulus
     hardens : whether linear hardening bounds plastic strain, so that no cycle can go on leaving
         some: ratchetting then has not come to its end, however slow it is
@@ -123,9 +131,12 @@ def classify(
     if not accumulated.any():
         return Shakedown(State.ELASTIC, 0.0, 0.0)
     quiet = QUIET * yield_strain
-    flow, left = Limit.of(accumulated), Limit.of(net)
-    if accumulated[-1] <= quiet or flow.high <= quiet:
+    flow = Limit.of(accumulated.max(axis=1))
+    if accumulated[-1].max() <= quiet or flow.high <= quiet:
         return Shakedown(State.ELASTIC_SHAKEDOWN, 0.0, 0.0)
+    depth = (net[-1] - CLOSED * accumulated[-1]).argmax()
+    net, turnover = net[:, depth], accumulated[:, depth]
+    left = Limit.of(net)
     opening = Limit.of(np.divide(net, turnover, out=np.zeros_like(net), where=turnover > 0))
     state = State.UNDECIDED
     if flow.low > quiet and opening.high <= CLOSED:

@@ -75,7 +75,7 @@ class Wheel(Substructure):
 
     def expand(self, u: NDArray[np.float64], load: float) -> NDArray[np.float64]:
         """Return the elastic displacements of the whole wheel in the hub's frame [mm]."""
-        return super().expand(u[: self.rim], 0.0 * load)
+        return super().expand(u[: self.rim], 0.0)
 
     # -- kinematics ----------------------------------------------------------------------------
 

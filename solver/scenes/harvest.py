@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.audit import audit, contact_pressure
+from solver.audit import audit
 from solver.errors import LimitLoad
 from solver.fields import Sampler, recovery, von_mises
 from solver.kinematics import COMPONENTS, to_tensor
 from solver.record import Record, Status
+from solver.scenes.touch import touch_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -89,6 +90,7 @@ class Harvest:
     def __init__(self, system: System, layout: Layout) -> None:
         self.system = system
         self.layout = layout
+        self.touch = touch_of(system)
         X, Y = np.meshgrid(layout.x, layout.y)
         S, D = np.meshgrid(layout.station, -layout.depth, indexing="ij")
         grid, lines = np.stack([X.ravel(), Y.ravel()]), np.stack([S.ravel(), D.ravel()])
@@ -177,7 +179,7 @@ class Harvest:
         under_load = self._on_map(lambda body: self.stress(body, loaded))
         strain = self._on_map(lambda body: self.plastic(body, unloaded))
         stress_profile, strain_profile = self.profile(unloaded)
-        contact = [self._contact(c, centre) for c, centre in end.stages]
+        contact = [self.touch.along(c, self.layout.s + centre) for c, centre in end.stages]
         surface = np.stack([self.on_surface(body, unloaded) for body in self.layout.surfaces])
         return {
             "residual_stress": (("component", "y", "x"), to_tensor(residual)),
@@ -196,29 +198,6 @@ class Harvest:
                 np.stack([self._surface_mises(c, x) for c, x in end.stages]),
             ),
         }
-
-    def _contact(self, converged: Converged, centre: float) -> tuple[Array, Array, Array]:
-        """Return pressure, shear and gap along s, NaN where there is no slave surface.
-
-        The shear is the traction on the lower body along +x: in every scene the opposite of
-        the slave's along its own tangent. Bodies taken apart have no gap to speak of.
-        """
-        if not self.system.interfaces:
-            nothing = np.full_like(self.layout.s, np.nan)
-            return nothing, nothing, nothing
-        interface, state = self.system.interfaces[0], converged.state
-        pressure, shear = contact_pressure(self.system, state, 0)
-        gap = interface.pairing(state.u).gap
-        chain = interface.slave_surface
-        x = chain.X[0, chain.vertices] - centre
-        order = np.argsort(x)
-
-        def along(values: Array) -> Array:
-            found = np.interp(self.layout.s, x[order], values[order], left=np.nan, right=np.nan)
-            return np.asarray(found)
-
-        apart = not state.contacts[0].normal.any()
-        return along(pressure), along(-shear), along(np.full_like(gap, np.nan) if apart else gap)
 
     def _surface_mises(self, converged: Converged, centre: float) -> Array:
         """Return von Mises stress along s at the surface whose profiles are taken.
@@ -242,14 +221,7 @@ class Harvest:
         points = self.system.full(most).points.reshape(2, -1)
         where = points[1, strains[most].argmax()]
         residual = [self.stress(name, unloaded)[:3] for name in names]
-        width, peak = np.nan, np.nan
-        if self.system.interfaces:
-            pressure, _ = contact_pressure(self.system, loaded.state, 0)
-            chain = self.system.interfaces[0].slave_surface
-            x = chain.X[0, chain.vertices][loaded.state.contacts[0].normal > 0]
-            peak = float(pressure.max())
-            symmetric = chain.X[0].min() == 0
-            width = float(x.max() if symmetric else np.ptp(x) / 2) if len(x) else 0.0
+        width, peak = self.touch.extent(loaded)
         return {
             "contact_half_width": width,
             "peak_contact_pressure": peak,

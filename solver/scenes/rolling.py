@@ -67,13 +67,12 @@ def _figures(harvest: Harvest, trace: Trace, result: PassResult) -> dict[str, fl
     out["depth_of_highest_plastic_strain"] = float(depth[strain[middle].argmax()])
     spread = np.ptp(stress[:, [0, 2]], axis=0).max()
     out["unsteadiness"] = float(spread / max(np.abs(stress[:, [0, 2]]).max(), 1e-30))
+    out["longitudinal_force"] = harvest.touch.force(result.mid_track)
     part = harvest.system.parts[0]
     if isinstance(part, Wheel):
         wheel = result.mid_track.state.u[0]
         out["axle_height"] = float(wheel[-2])
         out["axle_rotation"] = float(wheel[-1]) / part.radius
-        contact = result.mid_track.state.contacts[0]
-        out["longitudinal_force"] = -float(contact.tangential.sum())
     return out
 
 

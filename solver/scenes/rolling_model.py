@@ -46,6 +46,13 @@ class RollingParameters(MaterialParameters):
         "longitudinal force / full slip force: positive brakes, negative accelerates, 1 is a "
         "locked wheel",
     )
+    control: Literal["moment", "creepage"] = described(
+        "moment", "whether the wheel turns as the moment of `traction` makes it, or as prescribed"
+    )
+    given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
+        0.0,
+        "1 + R d(rotation) / d(advance) of a wheel that turns as prescribed: positive brakes",
+    )
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "passes over the track")
     direction: Literal["same", "back_and_forth"] = described(
         "same", "whether every pass goes the same way, or the wheel rolls back"
@@ -63,7 +70,9 @@ class RollingParameters(MaterialParameters):
     )
     track: Length = described(50.0, "length rolled in a pass, centred on x = 0")
     periodic: bool = described(
-        False, "whether the half-space repeats itself after each track length: a track without ends"
+        False,
+        "whether the half-space, as deep as the track is long, repeats itself after each track "
+        "length with all that is on it: a track without ends",
     )
     element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
         1.0, "element side along the track and at the surface"
@@ -77,7 +86,7 @@ class RollingParameters(MaterialParameters):
     advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
         0.0,
         "largest change / yield stress that halving the advance may make to residual stress: it is "
-        "halved until then; 0 takes advance_step as it is",
+        f"halved until then, {HALVINGS} times at most; 0 takes advance_step as it is",
     )
     press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
         8, "increments of setting down, and of driving"
@@ -87,32 +96,40 @@ class RollingParameters(MaterialParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         MaterialParameters.__post_init__(self)
-        if self.traction == 1.0 and self.load == "contact" and self.friction == 0.0:
-            raise ModelError("traction", self.traction, "a locked wheel needs friction")
         if self.traction and not self.friction:
             raise ModelError("traction", self.traction, "must be 0 without friction")
+        prescribed = self.control == "creepage"
+        if prescribed and self.load == "hertz":
+            raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
+        if prescribed and self.traction:
+            raise ModelError("traction", self.traction, "must be 0 where creepage is given")
+        if self.given_creepage and not prescribed:
+            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
         if self.element_size > self.half_width / 2:
             raise ModelError(
                 "element_size", self.element_size,
-                f"must be at most half the Hertz half-width, {self.half_width / 2:.3g} mm",
+                f"must be at most {self.half_width / 2:.3g} mm, half the Hertz half-width of "
+                f"radius {self.radius:g} and load_ratio {self.load_ratio:.4g}",
             )  # fmt: skip
         if self.advance_step > self.track / 2:
             raise ModelError(
-                "advance_step", self.advance_step, f"must be at most {self.track / 2:g} mm"
-            )
-
+                "advance_step", self.advance_step,
+                f"must be at most {self.track / 2:g} mm, half the track",
+            )  # fmt: skip
         columns = (self.track + 2 * _MARGIN * self.half_width) / self.element_size
         if columns > _MOST_COLUMNS:
             raise ModelError(
                 "element_size", self.element_size,
-                f"makes {columns:.0f} elements along the track; at most {_MOST_COLUMNS}",
+                f"makes {columns:.0f} elements along a track of {self.track:g} mm and half-widths "
+                f"of {self.half_width:.4g} mm; at most {_MOST_COLUMNS}",
             )  # fmt: skip
-        increments = self.passes * self.track / self.advance_step
-        increments *= 2**HALVINGS if self.advance_tolerance else 1
+        rolling = self.track / self.advance_step * 2 ** (HALVINGS if self.advance_tolerance else 0)
+        increments = self.passes * (2 * self.press_steps + rolling + self.unload_steps)
         if increments > _MOST_INCREMENTS:
             raise ModelError(
-                "advance_step", self.advance_step,
-                f"makes {increments:.0f} increments; at most {_MOST_INCREMENTS}",
+                "passes", self.passes,
+                f"make {increments:.0f} increments of press_steps, advance_step and unload_steps; "
+                f"at most {_MOST_INCREMENTS}",
             )  # fmt: skip
         if self.periodic and self.track < _PERIOD * self.half_width:
             raise ModelError(
@@ -120,13 +137,19 @@ class RollingParameters(MaterialParameters):
                 f"must be at least {_PERIOD:g} Hertz half-widths when it repeats itself, "
                 f"{_PERIOD * self.half_width:.4g} mm",
             )  # fmt: skip
-        if self.load == "contact" and self.reach > _LONGEST_REACH * math.pi * self.radius:
-            raise ModelError("track", self.track, "must be shorter than the wheel's rim")
+        longest = _LONGEST_REACH * math.pi * self.radius
+        if self.load == "contact" and self.reach > longest:
+            room = 2 * (longest - _RIM * self.half_width)
+            raise ModelError(
+                *(("track", self.track) if room > 0 else ("load_ratio", self.load_ratio)),
+                f"the rim of a wheel of radius {self.radius:g} has room for a track of at most "
+                f"{max(room, 0.0):.4g} mm beside half-widths of {self.half_width:.4g} mm",
+            )  # fmt: skip
 
     @property
     def reach(self) -> float:
         """Half the length of the rim that may come into contact [mm]."""
-        return self.track / 2 + _RIM * self.half_width
+        return self.track / 2 * (1 + max(0.0, -self.given_creepage)) + _RIM * self.half_width
 
     @property
     def peak_pressure(self) -> float:
@@ -224,8 +247,9 @@ def _wheel(parameters: RollingParameters) -> Body:
     rotation = None
     if parameters.traction == 1.0:  # locked
         rotation = np.full_like(knots["time"], -turned)
-    elif parameters.friction == 0.0:  # nothing turns the wheel: it is turned to roll
-        rotation = -turned - knots["position"] / R
+    elif parameters.control == "creepage" or parameters.friction == 0.0:
+        # without friction nothing turns the wheel: it is turned to roll
+        rotation = -turned - (1 - parameters.given_creepage) * knots["position"] / R
     program = AxleProgram(
         time=knots["time"],
         force=parameters.force * knots["load"],

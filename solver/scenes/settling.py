@@ -57,9 +57,12 @@ class Settling:
         coarse, tally = None, Tally()
         for halved in range(halvings + 1):
             schedule = self._schedule.refined(2**halved)
-            passes = self._passes(schedule, tally)
-            first = next(passes)
-            self.advance = schedule.advance
+            trial = self._passes(schedule, tally)
+            result = next(trial)
+            failed = result.unloaded is None and not isinstance(result.error, LimitLoad)
+            if failed and coarse is not None:
+                break  # what the larger advance gave stands
+            first, passes, self.advance = result, trial, schedule.advance
             if first.unloaded is not None:
                 fine = self._profile(first)
                 if coarse is not None:
@@ -67,7 +70,7 @@ class Settling:
                 if self.error <= self._tolerance:
                     break
                 coarse = fine
-            elif isinstance(first.error, LimitLoad):
+            elif not failed:
                 break
             # what trying has cost stays in the tally
             tally = Tally(seconds=first.tally.seconds)
@@ -78,6 +81,8 @@ class Settling:
         """Return what there is to say of the error."""
         if not self._tolerance or self.error <= self._tolerance:
             return ()
+        if np.isnan(self.error):
+            return (f"no advance but {self.advance:.3g} mm converged: its error is not known",)
         return (
             f"an advance of {self.advance:.3g} mm still leaves an error of {self.error:.3g} MPa, "
             f"above the tolerance of {self._tolerance:.3g} MPa",

@@ -89,12 +89,7 @@ def shakedown(
     """
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)
-    net = _equivalent(left)
-    most = net[-1].argmax()
-    found = classify(
-        accumulated.max(axis=1)[last], net[last, most], accumulated[last, most], yield_strain,
-        hardens=hardens,
-    )  # fmt: skip
+    found = classify(accumulated[last], _equivalent(left)[last], yield_strain, hardens=hardens)
     if periodic or found.state is State.ELASTIC:
         return found
     return Shakedown(State.UNDECIDED, found.accumulated, found.net)

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from solver import SCENES, ModelError, Status
+from solver.errors import NotConverged
+from solver.passes import PassResult
 from solver.scenes.rolling_model import RollingParameters
+from solver.scenes.settling import Settling
 
 COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
 
@@ -67,8 +70,8 @@ def test_first_of_two_passes_is_the_only_pass_of_one():
 def test_locked_wheel_slides_everywhere():
     record = roll(**COARSE, traction=1.0, friction=0.1)
     pressure, shear = (mid_track(record, f"contact_{kind}") for kind in ("pressure", "shear"))
-    # but where the leading edge has come down unforeseen: it starts without tangential force
-    closed = (pressure > 1.0) & (record.coordinates["s"] < 5.0)
+    closed = pressure > 1.0
+    assert closed.sum() > 10
     assert shear[closed] == pytest.approx(0.1 * pressure[closed], rel=1e-6)
     assert shear.min() > -1e-6
 
@@ -97,6 +100,23 @@ def test_translated_hertz_pressure_first_yields_at_the_known_load(ratio, yields)
         assert first == pytest.approx(3.107, rel=0.005)
 
 
+@pytest.mark.parametrize("heading", ["forward", "backward"])
+def test_what_is_prescribed_is_told_as_contact_is(heading):
+    record = roll(**COARSE, load="hertz", traction=0.5, heading=heading)
+    p = record.parameters
+    way = 1 if heading == "forward" else -1
+    x = record.coordinates["s"] / p.half_width
+    pressure, shear = (mid_track(record, f"contact_{kind}") for kind in ("pressure", "shear"))
+    assert pressure == pytest.approx(p.peak_pressure * np.sqrt(np.maximum(1 - x**2, 0.0)))
+    assert shear == pytest.approx(way * 0.5 * p.friction * pressure)
+    assert record.scalars["peak_contact_pressure"] == pytest.approx(p.peak_pressure)
+    assert record.scalars["contact_half_width"] == pytest.approx(p.half_width)
+    force = record.scalars["longitudinal_force"]
+    assert force == pytest.approx(way * 0.5 * p.friction * p.force)
+    unloaded = list(record.coordinates["stage"]).index("unloaded")
+    assert not record.fields["contact_pressure"][1][unloaded].any()
+
+
 # -- bad input ---------------------------------------------------------------------------------
 
 
@@ -109,8 +129,13 @@ def test_translated_hertz_pressure_first_yields_at_the_known_load(ratio, yields)
         ({"advance_step": 40.0}, "advance_step"),
         ({"passes": 0}, "passes"),
         ({"element_size": 1e-6}, "element_size"),
-        ({"advance_step": 1e-9}, "advance_step"),
+        ({"advance_step": 1e-9}, "passes"),
+        ({"press_steps": 1000, "passes": 1000}, "passes"),
         ({"track": 2000.0}, "track"),
+        ({"yield_stress": 3e4}, "load_ratio"),
+        ({"control": "creepage", "traction": 0.5}, "traction"),
+        ({"control": "creepage", "load": "hertz"}, "control"),
+        ({"given_creepage": 0.01}, "given_creepage"),
     ],
 )
 def test_bad_parameters_are_named(fields, name):
@@ -161,3 +186,22 @@ def test_advance_is_taken_as_given_without_a_tolerance():
     record = roll(**SLIDING, advance_step=2.0)
     assert record.scalars["advance"] == 2.0
     assert np.isnan(record.scalars["advance_error"])
+
+
+def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch):
+    fields = SLIDING | {"element_size": 4.0, "advance_step": 6.0}
+    rolls = Settling._passes
+
+    def fails_below_3_mm(self, schedule, tally):
+        if schedule.advance < 3.0:
+            return iter([PassResult(number=0, tally=tally, travel=0.0, error=stuck)])
+        return rolls(self, schedule, tally)
+
+    stuck = NotConverged("stuck", 0.0, 1.0)
+    monkeypatch.setattr(Settling, "_passes", fails_below_3_mm)
+    record = roll.__wrapped__(**fields, advance_tolerance=1e-6)
+    assert record.scalars["advance"] == 3.0
+    assert np.array_equal(
+        profile(record, "xx"), profile(roll(**fields | {"advance_step": 3.0}), "xx")
+    )
+    assert "above the tolerance" in record.message

@@ -165,12 +165,23 @@ def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction
     assert trailing_end == pytest.approx(1 - 2 * sqrt(1 - abs(traction)), abs=0.25)
 
 
-@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
-def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(share):
-    free, braking, accelerating = (rolled(8, traction=t) for t in (0.0, share, -share))
+@pytest.mark.parametrize(("share", "steps"), [(0.25, 8), (0.5, 8), (0.75, 8), (0.5, 4)])
+def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(share, steps):
+    free, braking, accelerating = (rolled(steps, traction=t) for t in (0.0, share, -share))
     exact = carter_creepage(free.parameters, share)
     assert braking.creepage - free.creepage == pytest.approx(exact, rel=0.02)
     assert accelerating.creepage - free.creepage == pytest.approx(-exact, rel=0.02)
+
+
+def test_given_creepage_makes_carters_force():
+    free = rolled(4)
+    wanted = float(free.creepage + carter_creepage(free.parameters, 0.5))
+    # force grows as the track that was rolled, over about 6 a, until creepage takes no more of it
+    run = rolled(4, widths=32, control="creepage", given_creepage=wanted)
+    assert run.creepage == pytest.approx(wanted, rel=1e-9)
+    p = run.parameters
+    force = np.trapezoid(run.shear, run.x * p.half_width)
+    assert force == pytest.approx(0.5 * p.friction * p.force, rel=0.03)
 
 
 # -- dissimilar materials ----------------------------------------------------------------------
