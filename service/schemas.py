@@ -53,7 +53,8 @@ class MapQuery(BaseModel):
         default=None,
         gt=0,
         allow_inf_nan=False,
-        description="only what lies within this distance of the edge of the contact [mm]",
+        description="only what lies within this distance of the contact's centre, or of its edge "
+        "where half of the bodies was computed [mm]",
     )
 
 

@@ -72,16 +72,23 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add("plot", commands.plot)
     one.add_argument("path", type=Path, metavar="RUN|DIR")
-    one.add_argument("--select", nargs="+", default=[], metavar="AXIS=VALUE")
+    one.add_argument(
+        "--select", nargs="+", default=[], metavar="NAME=VALUE",
+        help="of the sweep, or of the field's own dimensions, such as pass=2",
+    )  # fmt: skip
     one.add_argument("--field", default="residual_stress")
     one.add_argument("--component")
-    one.add_argument("--zoom", type=float, metavar="MM", help="only this close to the edge")
+    one.add_argument(
+        "--zoom", type=float, metavar="MM",
+        help="only this close to the contact's centre, or to its edge where half of the bodies "
+        "was computed",
+    )  # fmt: skip
     one.add_argument("--out", type=Path, required=True, metavar="PNG")
 
     one = add("compare", commands.compare)
     one.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="data set, study or DIR")
     one.add_argument("--reference", type=Path, metavar="CSV", help="published numbers of your own")
-    one.add_argument("--select", nargs="+", default=[], metavar="AXIS=VALUE")
+    one.add_argument("--select", nargs="+", default=[], metavar="NAME=VALUE")
     one.add_argument("--out", type=Path, metavar="PNG", help="draw profiles and published numbers")
     one.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
 

@@ -6,7 +6,7 @@ import argparse
 import importlib
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -84,22 +84,12 @@ def show(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Draw a field of one run, or one value a run over the sweep."""
-    from studies.plots import figure
-    from studies.reading import one_run, open_study, select
-    from studies.sweep_plot import sweep_fields, sweep_figure
+    from studies.picture import picture
+    from studies.reading import open_study
 
-    selection = dict(_assignment(text) for text in options.select)
+    selection = _selection(options.select)
     with open_study(options.path) as dataset:
-        if options.field in sweep_fields(dataset):
-            for name in ("component", "zoom"):
-                if (given := getattr(options, name)) is not None:
-                    raise StudyError(
-                        name, given, f"{options.field} is one value a run: leave it out"
-                    )
-            drawn = sweep_figure(select(dataset, selection), options.field)
-        else:
-            run = one_run(dataset, selection)
-            drawn = figure(run, options.field, options.component, options.zoom)
+        drawn = picture(dataset, options.field, options.component, options.zoom, selection)
         _save(drawn, options.out)
     print(f"wrote {options.out}")
     return OK
@@ -113,7 +103,7 @@ def compare(options: argparse.Namespace) -> int:
     from studies.profiles import read_profiles
     from studies.reference import published_cases, read_reference, reference_of
 
-    computed = read_profiles(options.paths, dict(map(_assignment, options.select)))
+    computed = read_profiles(options.paths, _selection(options.select))
     published = read_reference(options.reference or reference_of(computed.scene))
     cases = {} if options.reference else published_cases(computed.scene)
     compared, absent = compared_with(computed, published)
@@ -237,11 +227,17 @@ def _written(option: str, path: Path) -> Iterator[Path]:
         raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
 
 
-def _assignment(text: str) -> tuple[str, str]:
-    name, sign, value = text.partition("=")
-    if not sign:
-        raise StudyError("--select", text, "must be AXIS=VALUE")
-    return name.strip(), value.strip()
+def _selection(texts: Sequence[str]) -> dict[str, str]:
+    """Return what ``--select`` asks for, each name once."""
+    chosen: dict[str, str] = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign:
+            raise StudyError("--select", text, "must be NAME=VALUE")
+        if name in chosen:
+            raise StudyError("--select", text, f"{name} is selected already, as {chosen[name]}")
+        chosen[name] = value
+    return chosen
 
 
 def complain(reason: object, status: int) -> int:

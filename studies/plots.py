@@ -1,16 +1,14 @@
-"""Figures of one run: maps of the bodies, profiles, and what acts on the contact surface."""
+"""Maps of the bodies of one run."""
 
 from __future__ import annotations
-
-from collections.abc import Hashable, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.captions import capitalised, label, setting, value_text, words, wrapped
-from studies.errors import StudyError
+from studies.captions import capitalised, label, setting, wrapped
+from studies.fields import check_field, component_of, focus, map_fields, too_close
 from studies.reading import one_run
 
 SIGNED = "RdBu_r"
@@ -19,25 +17,11 @@ _OUTSIDE = "0.86"
 _PERCENT, _WORTHWHILE = 99.8, 1.5
 """Next to a sharp corner stress grows without bound: colours end at this percentile of the map,
 where its largest value is that many times larger."""
-_DECAYED = 0.02
-"""Depth is shown to where nothing larger than this part of the peak is left."""
 
 _AREA, _LONGEST = 26.0, 8.0
 """Area of a map and its longest side [in]."""
 _TEXT = 3.2
 """Least length of the lines around a map [in]."""
-
-
-def figure(
-    run: xr.Dataset,
-    field: str = "residual_stress",
-    component: str | None = None,
-    zoom: float | None = None,
-) -> Figure:
-    """Return the figure that suits `field`: a map, or lines along the surface or along depth."""
-    known = _field(run, field, ("y", "x"), ("s",), ("depth",))
-    make = map_figure if "y" in known.dims else line_figure
-    return make(run, field, component, zoom)
 
 
 def map_figure(
@@ -53,7 +37,8 @@ def map_figure(
     run : data set of one run
     field : variable over ``y`` and ``x``
     component : of a stress tensor; the first one by default
-    zoom : show only what lies within this distance of the edge of the contact [mm]
+    zoom : show only what lies within this distance of the contact's centre, or of its edge where
+        half of the bodies was computed [mm]
 
     Raises
     ------
@@ -61,15 +46,16 @@ def map_figure(
         when the data set has no such field or component, or the zoom holds no points
     """
     run = one_run(run)
-    values = _component(run, _field(run, field, ("y", "x")), component).transpose("y", "x")
+    check_field(field, map_fields(run))
+    values = component_of(run[field], component).transpose("y", "x")
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
-    values = whole(values) if zoom is None else _near(values, edge, zoom)
+    values = whole(values) if zoom is None else _near(values, focus(run, values["x"], zoom), zoom)
     signed = "component" in values.coords
     high, note = _limit(values, signed)
     width, height = _size(values)
     sheet = Figure(figsize=(width, height), dpi=150)
     axes = sheet.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=_OUTSIDE)
-    _entitle(axes, run, values, max(width + 0.8, _TEXT))
+    entitle(axes, run, values, max(width + 0.8, _TEXT))
     mesh = axes.pcolormesh(
         values["x"], values["y"], values, shading="nearest", rasterized=True,
         cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
@@ -99,49 +85,6 @@ def map_figure(
     return sheet
 
 
-def line_figure(
-    run: xr.Dataset,
-    field: str,
-    component: str | None = None,
-    zoom: float | None = None,
-) -> Figure:
-    """Return `field` along the surface or along depth, a line for each stage, body or station.
-
-    `zoom` shows only that length on either side of the edge of the contact, or below the surface
-    [mm]. Without it, depth ends where the values have decayed.
-    """
-    run = one_run(run)
-    values = _component(run, _field(run, field, ("s",), ("depth",)), component)
-    along = "s" if "s" in values.dims else "depth"
-    others = [name for name in values.dims if name != along]
-    values = values.dropna(along, how="all")
-    if zoom is not None:
-        middle = float(run["contact_half_width"]) if along == "s" else 0.0
-        values = values.where(abs(values[along] - middle) <= zoom, drop=True)
-    elif along == "depth":
-        values = values.isel(depth=slice(_depth_shown(values, others)))
-    if values.sizes[along] < 2:
-        raise _too_close(zoom) if zoom is not None else StudyError("field", field, "has no values")
-    sheet = Figure(figsize=(8.0, 4.6), dpi=150, layout="constrained")
-    axes = sheet.add_subplot()
-    _entitle(axes, run, values, 5.6 if others else 8.0)  # the legend takes the rest
-    for at in np.ndindex(*(values.sizes[name] for name in others)):
-        line = values.isel(dict(zip(others, at, strict=True))).dropna(along)
-        if line.size:
-            name = ", ".join(value_text(line[each]) for each in others)
-            axes.plot(line[along], line, label=name, linewidth=1.6)
-    axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
-    axes.grid(color="0.92")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.margins(x=0.0)
-    axes.set(xlabel=label(run[along]), ylabel=label(values))
-    if others:
-        title = ", ".join(words(str(name)) for name in others)
-        sheet.legend(loc="outside right upper", frameon=False, title=title)
-    return sheet
-
-
 def whole(values: xr.DataArray) -> xr.DataArray:
     """Return a map of both halves of the bodies, where one half was computed.
 
@@ -157,46 +100,11 @@ def whole(values: xr.DataArray) -> xr.DataArray:
     return xr.concat([other.assign_coords(x=-other["x"]), values], "x").assign_attrs(values.attrs)
 
 
-def _field(run: xr.Dataset, field: str, *dimensions: tuple[str, ...]) -> xr.DataArray:
-    """Return the variable `field`, which must lie over one of the sets of `dimensions`."""
-    suitable = [
-        str(name)
-        for name, variable in run.data_vars.items()
-        if any(set(wanted) <= set(variable.dims) for wanted in dimensions)
-    ]
-    if field not in suitable:
-        raise StudyError("field", field, f"must be one of {', '.join(suitable)}")
-    return run[field]
-
-
-def _component(run: xr.Dataset, values: xr.DataArray, component: str | None) -> xr.DataArray:
-    """Return one component of a tensor; a scalar field as it is."""
-    if "component" not in values.dims:
-        if component is not None:
-            raise StudyError("component", component, f"{values.name} is a scalar: leave it out")
-        return values
-    known = [str(name) for name in run["component"].to_numpy()]
-    if component is not None and component not in known:
-        raise StudyError("component", component, f"must be one of {', '.join(known)}")
-    return values.sel(component=component or known[0])
-
-
-def _near(values: xr.DataArray, edge: float, zoom: float) -> xr.DataArray:
-    near = values.where((abs(values["x"] - edge) <= zoom) & (abs(values["y"]) <= zoom), drop=True)
+def _near(values: xr.DataArray, middle: float, zoom: float) -> xr.DataArray:
+    near = values.where((abs(values["x"] - middle) <= zoom) & (abs(values["y"]) <= zoom), drop=True)
     if min(near.shape) < 2:
-        raise _too_close(zoom)
+        raise too_close(zoom)
     return near
-
-
-def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
-    """Return the number of points down to where nothing worth showing is left."""
-    largest = abs(values).max(others).to_numpy()
-    shown = np.flatnonzero(largest > _DECAYED * largest.max())
-    return int(shown[-1]) + 2 if shown.size else values.sizes["depth"]
-
-
-def _too_close(zoom: float) -> StudyError:
-    return StudyError("zoom", zoom, "must be a length [mm] that holds two points or more")
 
 
 def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
@@ -235,11 +143,12 @@ def _fit(sheet: Figure, axes: Axes) -> None:
     )
 
 
-def _entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
-    """Set the title, and below it the run's place in the sweep, in lines of `width` inches."""
+def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
+    """Set the title, and below it what tells the run from others, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
     of = f", {values['component'].item()}" if "component" in values.coords else ""
-    below = wrapped(setting(run), width, 9)
+    shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
+    below = wrapped(setting(shown.assign_attrs(run.attrs)), width, 9)
     axes.set_title(below, loc="left", fontsize=9, color="0.3", pad=5.0)
     axes.annotate(
         f"{capitalised(quantity)}{of}", (0.0, 1.0), xycoords="axes fraction",

@@ -122,7 +122,7 @@ def select(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> xr.Data
     for name, value in selection.items():
         if name not in coordinates:
             raise StudyError(name, value, f"must be one of {', '.join(coordinates)}")
-        dataset = dataset.isel({coordinates[name]: _positions(dataset[name], value)})
+        dataset = dataset.isel({coordinates[name]: positions(dataset[name], value)})
     return dataset
 
 
@@ -155,7 +155,8 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
 
 
-def _positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
+def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
+    """Return where a coordinate has the wanted value, or raise a `StudyError` that lists it."""
     values = axis.to_numpy()
     try:
         same = (

@@ -13,8 +13,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
-from studies.captions import capitalised, label, setting, value_text, words, wrapped
+from studies.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.dataset import OK, STATUSES
 from studies.design import USUAL_AXES
 from studies.errors import StudyError
@@ -38,6 +39,8 @@ _CATEGORIES = (
 _POINTS = 8.0
 _PANEL = (3.4, 3.1)
 """Width and height of a panel [in]."""
+_LEGEND = 3.2
+"""Width of the legend, with the axis beside it [in]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,16 +78,6 @@ _ABSENT = {
 """Runs without a value by status; others are `_FAILED`."""
 
 
-def sweep_fields(dataset: xr.Dataset) -> list[str]:
-    """Return the numbers and flags that have one value a run."""
-    sweep = dataset["status"].dims
-    return [
-        str(name)
-        for name, each in dataset.data_vars.items()
-        if each.dims == sweep and each.dtype.kind in "fiu"
-    ]
-
-
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     """Return `field` over two swept numbers, in a panel for each combination of the other axes.
 
@@ -96,19 +89,23 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     Parameters
     ----------
     dataset : of a study
-    field : one of its `sweep_fields`
+    field : one of its variables with one value a run
 
     Raises
     ------
     StudyError
-        when fewer than two numbers are swept, or more than `MOST_PANELS` panels would be drawn
+        when fewer than two numbers are swept, more than `MOST_PANELS` panels would be drawn, or no
+        run has a value
     """
     up, across, *others = _arrangement(dataset, field)
     columns = others[-1].size if others else 1
     rows = math.prod(each.size for each in others) // columns
-    size = _PANEL[0] * columns + 2.3, _PANEL[1] * rows + 1.0
+    size = _PANEL[0] * columns + _LEGEND, _PANEL[1] * rows + 1.2
     sheet = Figure(figsize=size, dpi=130, layout="constrained")
     grid = sheet.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for number, axis in ((across, grid[0, 0].xaxis), (up, grid[0, 0].yaxis)):
+        if number.dtype.kind in "iu":
+            axis.set_major_locator(MaxNLocator(integer=True))
     look = _look(dataset, field)
     overlay = OVERLAYS.get((field, str(up.name), str(across.name)))
     legend: dict[object, Line2D] = {}
@@ -118,19 +115,24 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
         if overlay:
             drawn += overlay(axes, panel, axes in grid[:, -1])
         legend |= {each.get_label(): each for each in drawn}
-        title = (f"{words(str(each.name))} {value_text(panel[each.name])}" for each in others)
+        title = (
+            named(str(each.name), panel[each.name].item(), each.attrs.get("units", ""))
+            for each in others
+        )
         axes.set_title(", ".join(title), fontsize=10)
         axes.grid(color="0.92")
         axes.set_axisbelow(True)
     if not look.flags:
         colours = ScalarMappable(look.norm, look.colours)
-        sheet.colorbar(colours, ax=grid, label=label(dataset[field]), shrink=0.8)
+        sheet.colorbar(colours, ax=grid, label=short_label(dataset[field]), shrink=0.8)
     if legend:
-        sheet.legend(handles=list(legend.values()), loc="outside right upper", frameon=False)
-    sheet.supxlabel(capitalised(label(across)), fontsize=10)
-    sheet.supylabel(capitalised(label(up)), fontsize=10)
+        sheet.legend(handles=list(legend.values()), loc="outside right center", frameon=False)
+    for axes in grid[-1]:
+        axes.set_xlabel(capitalised(short_label(across)))
+    for axes in grid[:, 0]:
+        axes.set_ylabel(capitalised(short_label(up)))
     single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
-    below = wrapped(setting(dataset.squeeze(single)), size[0], 9)
+    below = wrapped(setting(dataset.squeeze(single)), size[0], 10)
     name = capitalised(dataset[field].attrs.get("long_name", words(field)))
     sheet.suptitle(f"{name}\n{below}", fontsize=10)
     return sheet
@@ -142,7 +144,9 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
     standing = [_standing(dataset, axis) for axis in several]
     numbers = sorted((each for each in standing if each.dtype.kind in "fiu"), key=_rank)[:2]
     if len(numbers) < 2:
-        raise StudyError("field", field, "is one value a run: select two swept numbers or more")
+        free = f"only {numbers[0].name} varies" if numbers else "no number varies"
+        allowed = f"is one value a run, drawn over two swept numbers, but {free} here"
+        raise StudyError("field", field, allowed)
     used = {each.dims for each in numbers}
     others = [dataset[axis] for axis in several if (axis,) not in used]
     panels = math.prod(each.size for each in others)
@@ -182,7 +186,9 @@ def _look(dataset: xr.Dataset, field: str) -> _Look:
     """Return how a field is drawn; numbers that change sign have zero in the middle."""
     known = _known(dataset, field).to_numpy()
     known = known[np.isfinite(known)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    if not known.size:
+        raise StudyError("field", field, "has no values here")
+    low, high = float(known.min()), float(known.max())
     flags: dict[int, _Kind] = {}
     if "flag_values" in dataset[field].attrs:
         numbers = np.atleast_1d(dataset[field].attrs["flag_values"])

@@ -1,6 +1,8 @@
-"""What the figures show."""
+"""What maps show, and which figure suits a field."""
 
 from __future__ import annotations
+
+import json
 
 import numpy as np
 import pytest
@@ -10,7 +12,8 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from studies import Store, Study, StudyError, open_netcdf, open_study
-from studies.plots import figure, line_figure, map_figure, whole
+from studies.picture import picture
+from studies.plots import map_figure, whole
 from tests.studies.conftest import compute_here, fake_study
 
 ComputedStudy = tuple[Study, Store]
@@ -137,24 +140,49 @@ def test_zoom_shows_the_neighbourhood_of_the_edge(computed: ComputedStudy) -> No
     assert 50.0 - 30.0 - half_cell <= low < 50.0 < high <= 50.0 + 30.0 + half_cell
 
 
-def test_a_pressure_figure_has_a_line_for_each_stage(computed: ComputedStudy) -> None:
-    _, store = computed
-    with open_study(store.directory) as together:
-        sheet = line_figure(together, "contact_pressure")
-    (axes,) = sheet.axes
-    (legend,) = sheet.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["loaded", "unloaded"]
-    assert axes.get_ylabel() == "contact pressure [MPa]"
+def test_zoom_is_about_the_centre_of_a_contact_computed_whole() -> None:
+    run = grid_map(np.arange(-20.0, 21.0), np.arange(-20.0, 0.0))
+    for half_width in (6.0, np.nan):
+        run["contact_half_width"] = half_width
+        axes, _ = mesh_of(map_figure(run, "quantity", zoom=4.0))
+        assert axes.get_xlim() == (-4.5, 4.5)
 
 
-def test_figure_chooses_what_suits_the_field(computed: ComputedStudy) -> None:
+def test_zoom_to_an_edge_that_is_not_known_says_what_is_missing() -> None:
+    run = grid_map(np.arange(20.0), np.arange(-20.0, 0.0))
+    run["contact_half_width"] = np.nan
+    for given in (run, run.drop_vars("contact_half_width")):
+        with pytest.raises(StudyError, match="this run has no contact_half_width: leave it out"):
+            map_figure(given, "quantity", zoom=4.0)
+        assert mesh_of(map_figure(given, "quantity"))[1].get_clim()[1] == 400.0
+
+
+def test_a_figure_tells_every_parameter_that_is_not_the_default() -> None:
+    run = grid_map(np.arange(-20.0, 21.0), np.arange(-20.0, 0.0))
+    given = {"track": 64.0, "passes": 1, "periodic": True, "load": "hertz", "friction": 0.1}
+    run = run.assign_attrs(scene="rolling", parameters=json.dumps(given))
+    run = run.assign_coords(friction=0.3)
+    words = texts_of(map_figure(run, "quantity"))
+    assert "rolling · friction 0.3 · track 64 mm · periodic · load hertz" in words
+    assert "passes" not in words, "one pass is the default"
+
+
+def test_the_figure_suits_the_field(computed: ComputedStudy) -> None:
     _, store = computed
     with open_study(store.directory) as together:
-        assert figure(together, "residual_stress").axes[0].child_axes
-        assert figure(together, "contact_pressure").axes[0].lines
-        with pytest.raises(StudyError) as caught:
-            figure(together, "increments")
-        assert "contact_pressure" in caught.value.allowed
+        assert picture(together, "residual_stress").axes[0].child_axes
+        assert picture(together, "contact_pressure").axes[0].lines
+        assert picture(together, "increments").axes[0].collections
+
+
+def test_an_unknown_field_is_told_all_that_can_be_drawn(computed: ComputedStudy) -> None:
+    _, store = computed
+    with open_study(store.directory) as together, pytest.raises(StudyError) as caught:
+        picture(together, "incremets")
+    names = caught.value.allowed.removeprefix("must be one of ").split(";")[0].split(", ")
+    assert {"residual_stress", "contact_pressure", "increments", "status"} < set(names)
+    assert not {"message", "pass_creepage"} & set(names)
+    assert "did you mean increments?" in caught.value.allowed
 
 
 def test_a_field_that_is_zero_everywhere_is_drawn(store: Store) -> None:
@@ -166,16 +194,3 @@ def test_a_field_that_is_zero_everywhere_is_drawn(store: Store) -> None:
         for field in ("residual_stress", "plastic_strain"):
             low, high = mesh_of(map_figure(together, field))[1].get_clim()
             assert low < high
-
-
-def test_depth_ends_where_nothing_is_left() -> None:
-    depth = np.arange(0.0, 100.0)
-    run = grid_map(np.arange(1.0, 4.0), np.arange(-3.0, 0.0))
-    run = run.assign_coords(depth=("depth", depth, {"units": "mm"}), station=[0.0, 1.0])
-    profile = np.stack([np.exp(-depth), 5.0 * np.exp(-depth / 2.0)])
-    run["profile"] = (("station", "depth"), profile)
-    end = line_figure(run, "profile").axes[0].get_xlim()[1]
-    assert np.exp(-end / 2.0) < 0.02 < np.exp(-(end - 1.0) / 2.0)
-    assert line_figure(run, "profile", zoom=50.0).axes[0].get_xlim()[1] == 50.0
-    run["profile"] = 0.0 * run["profile"]
-    assert line_figure(run, "profile").axes[0].get_xlim()[1] == 99.0

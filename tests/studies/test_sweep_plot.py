@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from math import sqrt
 from pathlib import Path
 
@@ -16,7 +17,8 @@ from solver.shakedown import johnson_limit, melan_limit
 from studies import Store, Study, StudyError, open_study
 from studies.cli import main
 from studies.dataset import STATUSES, attributes_of
-from studies.sweep_plot import sweep_fields, sweep_figure
+from studies.fields import sweep_fields
+from studies.sweep_plot import sweep_figure
 from tests.studies.conftest import compute_here, fake_study
 
 ROOT = Path(__file__).parents[2]
@@ -153,14 +155,62 @@ def test_an_axis_whose_numbers_repeat_is_told_by_its_labels(store: Store) -> Non
         assert {tuple(at) for at in cloud.get_offsets()} == {
             (width, friction) for width in (20.0, 50.0) for friction in (0.0, 0.2, 0.4)
         }
-        with pytest.raises(StudyError, match="select two swept numbers"):
+        allowed = "over two swept numbers, but only friction varies here"
+        with pytest.raises(StudyError, match=allowed):
             sweep_figure(together.isel(half_width=[0]), "increments")
+        with pytest.raises(StudyError, match="but no number varies here"):
+            sweep_figure(together.isel(half_width=[0], friction=[0]), "increments")
 
 
 def test_panels_of_a_linked_axis_are_headed_by_its_labels() -> None:
     dataset = swept().rename(hardening="material").assign_coords(passes=("material", [10, 40]))
     sheet = sweep_figure(dataset, "shakedown_state")
     assert [axes.get_title() for axes in sheet.axes[:2]] == ["material none", "material kinematic"]
+
+
+def test_a_field_without_values_is_refused() -> None:
+    dataset = swept()
+    for field in ("creepage", "shakedown_state"):
+        dataset[field] = dataset[field].where(dataset["status"] != 0)
+        with pytest.raises(StudyError, match=f"field = '{field}': has no values here"):
+            sweep_figure(dataset, field)
+
+
+@pytest.mark.parametrize("hardening", [("none",), ("none", "kinematic")])
+@pytest.mark.parametrize("field", ["shakedown_state", "creepage"])
+def test_nothing_is_cut_and_the_legend_lies_beside_panels_of_a_good_size(
+    hardening: tuple[str, ...], field: str
+) -> None:
+    dataset = swept(hardening=hardening)
+    dataset["status"][0, 0, 0] = STATUSES.index("limit_load")
+    dataset["load_ratio"].attrs["long_name"] = "a very long description " * 8
+    given = {"poisson_ratio": 0.3, "passes": 10, "track": 64.0, "periodic": True, "growth": 1.2}
+    dataset.attrs["parameters"] = json.dumps(given | {"element_size": 2.0, "advance_step": 4.0})
+    sheet = sweep_figure(dataset, field)
+    sheet.draw_without_rendering()
+    inked = sheet.get_tightbbox()
+    assert (inked.x0 >= 0.0, inked.y0 >= 0.0) == (True, True)
+    assert inked.x1 <= sheet.get_figwidth()
+    assert inked.y1 <= sheet.get_figheight()
+    (legend,) = sheet.legends
+    box, title = legend.get_window_extent(), sheet._suptitle.get_window_extent()
+    assert not box.overlaps(title)
+    panels = sheet.axes[: len(hardening)]
+    for axes in panels:
+        assert not axes.get_tightbbox().overlaps(box)
+        assert axes.bbox.width > 0.75 * axes.bbox.height
+    assert panels[0].get_ylabel() == "Load ratio"
+    assert panels[0].get_xlabel() == "Friction"
+
+
+def test_whole_numbers_have_whole_ticks() -> None:
+    dataset = swept().drop_vars("friction").assign_coords(passes=("slip", [1, 2, 3, 4]))
+    (axes, *_) = sweep_figure(dataset, "creepage").axes
+    assert axes.get_xlabel() == "Passes"
+    ticks = axes.get_xticks()
+    assert len(ticks) > 3
+    np.testing.assert_array_equal(ticks, np.round(ticks))
+    assert not np.array_equal(axes.get_yticks(), np.round(axes.get_yticks()))
 
 
 def test_too_many_panels_are_refused() -> None:
