@@ -55,7 +55,7 @@ def map_figure(
     width, height = _size(values)
     sheet = Figure(figsize=(width, height), dpi=150)
     axes = sheet.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=_OUTSIDE)
-    entitle(axes, run, values, max(width + 0.8, _TEXT))
+    entitle(axes, run, values, max(width, _TEXT))
     mesh = axes.pcolormesh(
         values["x"], values["y"], values, shading="nearest", rasterized=True,
         cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
@@ -148,12 +148,13 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
     quantity = values.attrs.get("long_name", str(values.name))
     of = f", {values['component'].item()}" if "component" in values.coords else ""
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
-    below = wrapped(setting(shown.assign_attrs(run.attrs)), width, 9)
-    axes.set_title(below, loc="left", fontsize=9, color="0.3", pad=5.0)
+    below = axes.set_title(
+        wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
+        loc="left", fontsize=8, color="0.3", pad=5.0,
+    )  # fmt: skip
     axes.annotate(
-        f"{capitalised(quantity)}{of}", (0.0, 1.0), xycoords="axes fraction",
-        xytext=(0.0, 10.0 + 12.0 * len(below.splitlines())), textcoords="offset points",
-        weight="bold", fontsize=11,
+        f"{capitalised(quantity)}{of}", (0.0, 1.0), xycoords=below,
+        xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
     )  # fmt: skip
 
 
