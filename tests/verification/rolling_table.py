@@ -105,7 +105,7 @@ class Contact:
     """The loaded contact of a first pass at mid-track, along s [mm], ahead of the wheel positive.
 
     ``place`` runs from 0 at its trailing edge to 1 at its leading edge; ``mises`` is the von Mises
-    stress in the half-space 0.2 mm below it [MPa].
+    stress at the surface of the half-space [MPa].
     """
 
     s: np.ndarray
@@ -135,13 +135,12 @@ class Contact:
 def mid_track(case):
     record = after(case)
     at = list(record.coordinates["stage"]).index("mid_track")
-    pressure, shear = (
-        np.nan_to_num(record.fields[f"contact_{kind}"][1][at]) for kind in ("pressure", "shear")
+    pressure, shear, mises = (
+        np.nan_to_num(record.fields[name][1][at])
+        for name in ("contact_pressure", "contact_shear", "surface_mises")
     )
     closed = pressure > 0.01 * pressure.max()
     s = record.coordinates["s"]
-    # from the map: extrapolated to the surface itself, values pass the yield stress by a quarter
-    mises = np.interp(s, record.coordinates["x"], record.fields["mises_loaded"][1][0])
     ends = s[closed][[0, -1]]
     return Contact(
         s[closed], np.interp(s[closed], ends, [0.0, 1.0]), pressure[closed], shear[closed],

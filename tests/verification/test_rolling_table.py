@@ -201,7 +201,7 @@ def test_accelerating_brings_almost_the_whole_contact_surface_to_yield():
 # -- how it was found ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", ["T1", "T3", "T6", "T7", "T8"])
+@pytest.mark.parametrize("case", sorted(set(CASES) - {"T4"}))
 def test_no_increment_is_cut_and_newton_takes_few_iterations(case):
     scalars = after(case, CASES[case].get("passes", 1)).scalars
     assert scalars["cut_increments"] == 0
