@@ -27,11 +27,11 @@ class Quantity:
 
 
 QUANTITIES: Mapping[str, Quantity] = {
-    "x": Quantity("distance along the surface from the centre of the contact", "mm"),
+    "x": Quantity("position along the surface from its middle", "mm"),
     "y": Quantity("height above the surface", "mm"),
     "depth": Quantity("depth below the surface", "mm", "depth"),
     "station": Quantity("position of a depth profile along the surface", "mm"),
-    "s": Quantity("distance along the contact surface from its centre", "mm"),
+    "s": Quantity("distance along the surface from the middle, of the contact if loaded", "mm"),
     "residual_stress": Quantity("residual stress", "MPa"),
     "residual_mises": Quantity("von Mises stress of the residual stress", "MPa"),
     "plastic_strain": Quantity("equivalent plastic strain"),
@@ -100,7 +100,9 @@ QUANTITIES: Mapping[str, Quantity] = {
         "largest difference of residual stress between stations / largest residual stress"
     ),
     "axle_height": Quantity("displacement of the axle at mid-track", "mm"),
-    "axle_rotation": Quantity("rotation of the wheel at mid-track, counter-clockwise", "rad"),
+    "axle_rotation": Quantity(
+        "rotation of the wheel at mid-track, counter-clockwise, from how it is meshed there", "rad"
+    ),
     "longitudinal_force": Quantity("longitudinal force on the track along x, mid-track", "N"),
     "increments": Quantity("load increments", count=True),
     "cut_increments": Quantity("load increments that were cut", count=True),

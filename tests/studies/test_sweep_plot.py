@@ -242,7 +242,7 @@ def test_the_command_draws_one_value_a_run_over_the_sweep(
         assert named in capsys.readouterr().err
 
 
-def test_the_shakedown_map_keeps_its_mesh_and_brackets_the_limit_at_every_friction() -> None:
+def test_the_shakedown_map_asks_for_loads_on_both_sides_of_the_limit_on_one_mesh() -> None:
     study = Study.from_toml(ROOT / "data" / "studies" / "shakedown-map.toml")
     runs = [case.parameters for case in study.cases()]
     assert all(run.half_width == pytest.approx(8.0, rel=1e-3) for run in runs)
