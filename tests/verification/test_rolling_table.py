@@ -193,7 +193,7 @@ def test_braking_and_accelerating_shears_look_alike_with_opposite_sign():
 
 
 def test_accelerating_brings_almost_the_whole_contact_surface_to_yield():
-    """Braking yields as much here; published, it yields the trailing part alone."""
+    """Braking does so too; published, it yields the trailing part alone, as on elements of 2 mm."""
     assert mid_track("T6").yielding > 0.75
     assert mid_track("T1").yielding < 0.6
 
