@@ -84,7 +84,7 @@ def show(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Draw a field of one run, or one value a run over the sweep."""
-    from studies.picture import picture
+    from studies.plots.picture import picture
     from studies.reading import open_study
 
     selection = _selection(options.select)
@@ -97,11 +97,11 @@ def plot(options: argparse.Namespace) -> int:
 
 def compare(options: argparse.Namespace) -> int:
     """Set computed residual stress beside published numbers."""
-    from studies.compare import compare as compared_with
-    from studies.comparison_plot import comparison_figure
-    from studies.comparison_table import comparison_table, write_comparisons
-    from studies.profiles import read_profiles
-    from studies.reference import published_cases, read_reference, reference_of
+    from studies.comparison.compare import compare as compared_with
+    from studies.comparison.plot import comparison_figure
+    from studies.comparison.profiles import read_profiles
+    from studies.comparison.reference import published_cases, read_reference, reference_of
+    from studies.comparison.table import comparison_table, write_comparisons
 
     computed = read_profiles(options.paths, _selection(options.select))
     published = read_reference(options.reference or reference_of(computed.scene))
@@ -194,7 +194,7 @@ def _warned(dataset: Any) -> str:
 
 def _picture(dataset: Any, path: Path) -> list[Path]:
     """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
-    from studies.plots import map_figure
+    from studies.plots.maps import map_figure
     from studies.reading import one_run
 
     try:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tests.architecture.sources import PACKAGES, ROOT, imported, modules
@@ -31,6 +33,11 @@ def test_no_module_imports_against_the_direction(package: str) -> None:
 def test_one_module_of_studies_imports_dask() -> None:
     users = [m for m, names in imports("studies").items() if names & {"dask", "distributed"}]
     assert len(users) == 1, users
+
+
+def test_what_draws_is_in_its_folders() -> None:
+    users = {Path(m).parent for m, names in imports("studies").items() if "matplotlib" in names}
+    assert users == {Path("studies/plots"), Path("studies/comparison")}
 
 
 @pytest.mark.parametrize(

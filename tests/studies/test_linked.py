@@ -14,14 +14,14 @@ import xarray as xr
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.cli import main
 from studies.dataset import LABEL_ATTRIBUTES, STATUSES
-from studies.line_plot import line_figure
-from studies.plots import map_figure
+from studies.plots.lines import line_figure
+from studies.plots.maps import map_figure
 from studies.quantities import QUANTITIES
 from studies.reading import one_run
 from studies.tables import runs_table
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import record
-from tests.studies.test_plots import texts_of
+from tests.studies.plots.test_maps import texts_of
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from studies.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.dataset import OK, STATUSES
 from studies.design import USUAL_AXES
 from studies.errors import StudyError
-from studies.limits_plot import draw_shakedown_limits
-from studies.plots import SIGNED
+from studies.plots.captions import capitalised, named, setting, short_label, words, wrapped
+from studies.plots.limits import draw_shakedown_limits
+from studies.plots.maps import SIGNED
 from studies.reading import sweep_axes, sweep_coordinates
 
 MOST_PANELS = 6

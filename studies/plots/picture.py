@@ -8,12 +8,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError
-from studies.fields import ALONG, MAP, check_field, line_fields, map_fields, sweep_fields
-from studies.line_plot import line_figure
 from studies.parameters import nearest
-from studies.plots import map_figure
+from studies.plots.fields import ALONG, MAP, check_field, line_fields, map_fields, sweep_fields
+from studies.plots.lines import line_figure
+from studies.plots.maps import map_figure
+from studies.plots.sweep import sweep_figure
 from studies.reading import one_run, positions, select, sweep_coordinates
-from studies.sweep_plot import sweep_figure
 
 
 def picture(

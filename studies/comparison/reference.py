@@ -17,7 +17,7 @@ from studies.study import Study
 
 STRAIN = "plastic_strain"
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 """Where ``reference/SCENE.csv`` keeps the published numbers of a scene, and
 ``studies/SCENE-table.toml`` the cases they belong to."""
 

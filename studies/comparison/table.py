@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from studies.columns import in_blocks, stacked
-from studies.compare import Comparison
-from studies.problem import Parameters, other_problem, told
-from studies.profiles import REFINEMENTS, Computed, Level
-from studies.reference import STRAIN, Published
+from studies.comparison.compare import Comparison
+from studies.comparison.problem import Parameters, other_problem, told
+from studies.comparison.profiles import REFINEMENTS, Computed, Level
+from studies.comparison.reference import STRAIN, Published
 
 NEAR: Mapping[str, float] = {"MPa": 50.0, "mm": 1.0, "1": 0.01, "%": 10.0}
 """Difference from a published number up to which the two are counted as near, by unit."""

@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.captions import capitalised, label, setting, wrapped
-from studies.fields import check_field, component_of, focus, map_fields, too_close
+from studies.plots.captions import capitalised, label, setting, wrapped
+from studies.plots.fields import check_field, component_of, focus, map_fields, too_close
 from studies.reading import one_run
 
 SIGNED = "RdBu_r"

@@ -17,11 +17,11 @@ from solver.shakedown import johnson_limit, melan_limit
 from studies import Store, Study, StudyError, open_study
 from studies.cli import main
 from studies.dataset import STATUSES, attributes_of
-from studies.fields import sweep_fields
-from studies.sweep_plot import sweep_figure
+from studies.plots.fields import sweep_fields
+from studies.plots.sweep import sweep_figure
 from tests.studies.conftest import compute_here, fake_study
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 RATIOS, FRICTIONS = np.array([1.8, 1.2, 2.4]), np.array([0.0, 0.2, 0.5, 0.3])
 MARGINS = ("limit without hardening\n(Johnson)", "the same (Melan, von Mises)")
 

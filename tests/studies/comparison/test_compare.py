@@ -15,14 +15,14 @@ from solver.scenes import SCENES
 from studies import Store, Study
 from studies.cli import main
 from studies.combine import combine
-from studies.compare import Comparison, compare
-from studies.comparison_table import comparison_table
+from studies.comparison.compare import Comparison, compare
+from studies.comparison.problem import REFINING
+from studies.comparison.profiles import Computed, Profile, read_profiles
+from studies.comparison.reference import Published, published_cases, read_reference, reference_of
+from studies.comparison.table import comparison_table
 from studies.dataset import STATUSES, run_dataset
 from studies.errors import StudyError
 from studies.parameters import parameters_of
-from studies.problem import REFINING
-from studies.profiles import Computed, Profile, read_profiles
-from studies.reference import Published, published_cases, read_reference, reference_of
 from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
 
 

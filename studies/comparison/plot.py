@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.comparison_table import PROFILES
-from studies.profiles import Computed
-from studies.reference import STRAIN, Published
+from studies.comparison.profiles import Computed
+from studies.comparison.reference import STRAIN, Published
+from studies.comparison.table import PROFILES
 
 SHOWN = ("xx", "zz", STRAIN)
 """Profiles drawn, a column each."""

@@ -12,10 +12,18 @@ import numpy as np
 import xarray as xr
 from scipy.signal import find_peaks
 
+from studies.comparison.problem import (
+    SAME,
+    Parameters,
+    differences,
+    other_problem,
+    run_parameters,
+    told,
+)
+from studies.comparison.reference import STRAIN, Published
 from studies.dataset import OK, STATUSES
 from studies.errors import StudyError
 from studies.parameters import parameters_of, scene_named
-from studies.problem import SAME, Parameters, differences, other_problem, run_parameters, told
 from studies.reading import (
     find_datasets,
     one_run,
@@ -24,7 +32,6 @@ from studies.reading import (
     sweep_axes,
     sweep_coordinates,
 )
-from studies.reference import STRAIN, Published
 
 CASE = "case"
 """Dimension whose labels are those of the published cases."""

@@ -12,10 +12,10 @@ from matplotlib.lines import Line2D
 
 from studies import Store, Study, StudyError, open_study
 from studies.cli import main
-from studies.line_plot import line_figure
-from studies.picture import picture
+from studies.plots.lines import line_figure
+from studies.plots.picture import picture
+from tests.studies.plots.test_maps import grid_map, texts_of
 from tests.studies.rolled import data_set, written
-from tests.studies.test_plots import grid_map, texts_of
 
 
 def lines_of(sheet: Figure) -> list[Line2D]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.profiles import Computed, Level
-from studies.reference import Published
+from studies.comparison.profiles import Computed, Level
+from studies.comparison.reference import Published
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,10 +11,10 @@ import xarray as xr
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from studies.captions import label, value_text, words, wrapped
 from studies.errors import StudyError
-from studies.fields import check_field, component_of, focus, line_fields, too_close
-from studies.plots import entitle
+from studies.plots.captions import label, value_text, words, wrapped
+from studies.plots.fields import check_field, component_of, focus, line_fields, too_close
+from studies.plots.maps import entitle
 from studies.reading import one_run
 
 _DECAYED = 0.02

@@ -1,0 +1,1 @@
+"""Figures: maps and lines of one run, numbers of all runs over the sweep."""
