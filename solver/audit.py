@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.outcome import Converged
-    from solver.system import State, System
+    from solver.state import State
+    from solver.system import System
 
 _EQUILIBRIUM = 1e-6
 _CONTACT = 1e-6

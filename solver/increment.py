@@ -28,7 +28,7 @@ from solver.contact.complementarity import ContactProblem, solve_contact
 from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
-from solver.system import State
+from solver.state import State
 from solver.threads import one_thread
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
     from solver.constitutive import Response
     from solver.operators import Operator
-    from solver.system import ContactState, System
+    from solver.state import ContactState
+    from solver.system import System
 
     Vectors = tuple[NDArray[np.float64], ...]
 

@@ -9,7 +9,7 @@ from solver.errors import SolverError
 
 if TYPE_CHECKING:
     from solver.constitutive import Response
-    from solver.system import State
+    from solver.state import State
 
 _FLOWING = 0.02
 

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.state import ContactState, State
 from solver.stepper import PathControl, Stepper, Stopped, Tally
-from solver.system import ContactState, State
 from solver.wheel import Wheel
 
 if TYPE_CHECKING:

@@ -11,12 +11,13 @@ import numpy as np
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.increment import Increment
 from solver.outcome import Converged, IncrementFailed, Tolerances
-from solver.system import State
+from solver.state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from solver.system import ContactState, System
+    from solver.state import ContactState
+    from solver.system import System
 
     Report = Callable[[float, str], None]
     Predict = Callable[[State | None, State, float], State | None]

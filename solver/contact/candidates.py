@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from solver.contact.geometry import Pairing
     from solver.operators import Operator
-    from solver.system import ContactState, State, System
+    from solver.state import ContactState, State
+    from solver.system import System
 
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
