@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 QUIET = 1e-3
 """Accumulated plastic strain of a cycle, over the yield strain, below which nothing flows."""
 CLOSED = 0.05
-"""Plastic strain left by a cycle over that accumulated in it, below which the cycle is closed."""
+"""Plastic strain left by a cycle over that accumulated in it, up to which the cycle is closed; also
+the part of the largest accumulation up to which that of a depth is not told from interpolation."""
 STEADY = 0.02
 """Relative change from cycle to cycle, with twice that over the second half of a sequence, up to
 which it has come to its limit."""
@@ -134,7 +135,8 @@ def classify(
     flow = Limit.of(accumulated.max(axis=1))
     if accumulated[-1].max() <= quiet or flow.high <= quiet:
         return Shakedown(State.ELASTIC_SHAKEDOWN, 0.0, 0.0)
-    depth = (net[-1] - CLOSED * accumulated[-1]).argmax()
+    flows = accumulated[-1] > CLOSED * accumulated[-1].max()
+    depth = np.where(flows, net[-1] - CLOSED * accumulated[-1], -np.inf).argmax()
     net, turnover = net[:, depth], accumulated[:, depth]
     left = Limit.of(net)
     opening = Limit.of(np.divide(net, turnover, out=np.zeros_like(net), where=turnover > 0))

@@ -131,3 +131,8 @@ def _describe(schema: Mapping[str, Any]) -> str:
     return " ".join(
         [words.get(kind, f"of type {kind}"), *([" and ".join(limits)] if limits else [])]
     )
+
+
+def plain(value: Any, usual: Any) -> Any:
+    """Return a value of an axis, which holds numbers and text, in the type of the usual value."""
+    return value if isinstance(usual, str) or not isinstance(value, str) else json.loads(value)

@@ -74,13 +74,17 @@ def begun_studies(path: Path | str) -> list[str]:
 
 def _progress(file: Path) -> str:
     """Return the name of a study, and how many of its runs are finished."""
-    content = json.loads(file.read_text(encoding="utf-8"))
+    study = None
     try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        name = content["name"]
         study = Study.from_dict(content)
     except StudyError:  # it knows parameters that the scene has no more
-        study = None
+        pass
+    except (OSError, ValueError, TypeError, KeyError):
+        return f"{file.parent.name}: its {file.name} cannot be read"
     if study is None or study.id != file.parent.name:
-        return f"{content['name']}: begun by another state of the solver"
+        return f"{name}: begun by another state of the solver"
     store = Store(file.parents[2])
     finished = sum(store.run_path(case.id).is_file() for case in study.cases())
     return f"{study.name}: {finished} of {study.size} runs finished"

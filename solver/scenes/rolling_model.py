@@ -139,17 +139,22 @@ class RollingParameters(MaterialParameters):
             )  # fmt: skip
         longest = _LONGEST_REACH * math.pi * self.radius
         if self.load == "contact" and self.reach > longest:
-            room = 2 * (longest - _RIM * self.half_width)
+            room = 2 * (longest - _RIM * self.half_width) / self._turning
             raise ModelError(
                 *(("track", self.track) if room > 0 else ("load_ratio", self.load_ratio)),
                 f"the rim of a wheel of radius {self.radius:g} has room for a track of at most "
-                f"{max(room, 0.0):.4g} mm beside half-widths of {self.half_width:.4g} mm",
+                f"{math.floor(max(room, 0.0))} mm beside half-widths of {self.half_width:.4g} mm",
             )  # fmt: skip
 
     @property
     def reach(self) -> float:
         """Half the length of the rim that may come into contact [mm]."""
-        return self.track / 2 * (1 + max(0.0, -self.given_creepage)) + _RIM * self.half_width
+        return self.track / 2 * self._turning + _RIM * self.half_width
+
+    @property
+    def _turning(self) -> float:
+        """Largest length of rim that passes over a length of track."""
+        return 1 + max(0.0, -self.given_creepage)
 
     @property
     def peak_pressure(self) -> float:

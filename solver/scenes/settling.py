@@ -50,6 +50,7 @@ class Settling:
         self._report = report
         self.advance = schedule.advance
         self.error = np.nan
+        self._failed = np.nan
 
     def results(self) -> Iterator[PassResult]:
         """Yield what `Passes.results` yields."""
@@ -60,8 +61,9 @@ class Settling:
             trial = self._passes(schedule, tally)
             result = next(trial)
             failed = result.unloaded is None and not isinstance(result.error, LimitLoad)
-            if failed and coarse is not None:
-                break  # what the larger advance gave stands
+            if failed and coarse is not None:  # what the larger advance gave stands
+                self._failed = schedule.advance
+                break
             first, passes, self.advance = result, trial, schedule.advance
             if first.unloaded is not None:
                 fine = self._profile(first)
@@ -72,7 +74,7 @@ class Settling:
                 coarse = fine
             elif not failed:
                 break
-            # what trying has cost stays in the tally
+            # what larger advances have cost stays in the tally
             tally = Tally(seconds=first.tally.seconds)
         yield from chain([first], passes)
 
@@ -81,11 +83,11 @@ class Settling:
         """Return what there is to say of the error."""
         if not self._tolerance or self.error <= self._tolerance:
             return ()
-        if np.isnan(self.error):
-            return (f"no advance but {self.advance:.3g} mm converged: its error is not known",)
+        error = "an unknown error" if np.isnan(self.error) else f"an error of {self.error:.3g} MPa"
+        failed = "" if np.isnan(self._failed) else f"; one of {self._failed:.3g} mm failed"
         return (
-            f"an advance of {self.advance:.3g} mm still leaves an error of {self.error:.3g} MPa, "
-            f"above the tolerance of {self._tolerance:.3g} MPa",
+            f"an advance of {self.advance:.3g} mm still leaves {error}, "
+            f"above the tolerance of {self._tolerance:.3g} MPa{failed}",
         )
 
     def _passes(self, schedule: Schedule, tally: Tally) -> Iterator[PassResult]:

@@ -95,12 +95,13 @@ def _comparison(published: Published, is_depth: bool, ours: Mapping[Level, float
 def _line(ours: Mapping[Level, float], axis: int) -> list[tuple[float, float]]:
     """Return size and number, from fine to coarse, of levels that differ along one axis only.
 
-    Of several such lines, that which begins with the finest sizes: it holds the finest of all.
+    Of several such lines, that whose two finest sizes, which make the change, are the finest; of
+    several of these, the one that is finest otherwise.
     """
     lines: dict[Level, list[tuple[float, float]]] = defaultdict(list)
     for level, value in sorted(ours.items()):
         lines[level[:axis] + level[axis + 1 :]].append((level[axis], value))
-    return min(lines.values(), key=lambda line: [*(size for size, _ in line), np.inf])
+    return min(lines.values(), key=lambda line: [*(size for size, _ in line[:2]), np.inf])
 
 
 def _change(line: Sequence[tuple[float, float]]) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from studies.parameters import parameters_of, scene_named
+from studies.parameters import parameters_of, plain, scene_named
 
 REFINING = frozenset(
     {
@@ -30,7 +30,8 @@ def run_parameters(run: xr.Dataset) -> dict[str, Any]:
     fixed = json.loads(run.attrs["parameters"])
     known = parameters_of(scene_named(run.attrs["scene"]))
     given = {name: fixed.get(name, parameter.default) for name, parameter in known.items()}
-    return given | {name: _plain(run[name], given[name]) for name in known if name in run.coords}
+    swept = {name: plain(run[name].item(), given[name]) for name in known if name in run.coords}
+    return given | swept
 
 
 def other_problem(one: Parameters, other: Parameters, number: int) -> dict[str, tuple[Any, Any]]:
@@ -58,9 +59,3 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         return math.isclose(one, other, rel_tol=SAME)
     return bool(one == other)
-
-
-def _plain(coordinate: xr.DataArray, usual: Any) -> Any:
-    """Return a value of an axis in the type of the parameter; axes hold numbers and text."""
-    value = coordinate.item()
-    return value if isinstance(usual, str) or not isinstance(value, str) else json.loads(value)

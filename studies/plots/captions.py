@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from studies.parameters import parameters_of, scene_named
+from studies.parameters import parameters_of, plain, scene_named
 
 _STAY = "\N{NO-BREAK SPACE}"
 
@@ -57,7 +57,11 @@ def setting(run: xr.Dataset) -> str:
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
     state = [words(given["state"])] if "state" in given and "state" not in run.coords else []
     place = [
-        named(str(name), each.item(), each.attrs.get("units", ""))
+        named(
+            str(name),
+            plain(each.item(), known[name].default) if name in known else each.item(),
+            each.attrs.get("units", ""),
+        )
         for name, each in run.coords.items()
         if each.ndim == 0
     ]

@@ -107,6 +107,20 @@ def test_show_tells_how_far_a_study_without_a_data_set_is(
     assert "later: 0" not in told and "max_plastic_strain" not in told and "0.9" in told
 
 
+@pytest.mark.parametrize("content", ["nonsense", "{}", "[]"])
+def test_a_broken_study_hides_no_other(
+    content: str, store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = fake_study("first")
+    store.save_study(study)
+    (store.study_directory(study.id) / "study.json").write_text(content)
+    store.save_study(fake_study("second"))
+    assert main(["show", str(store.directory)]) == 0
+    told = capsys.readouterr().out
+    assert f"{study.id}: its study.json cannot be read" in told
+    assert "second: 0 of" in told
+
+
 def test_a_study_of_another_solver_is_told_as_such(
     store: Store, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -205,3 +205,4 @@ def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch
         profile(record, "xx"), profile(roll(**fields | {"advance_step": 3.0}), "xx")
     )
     assert "above the tolerance" in record.message
+    assert "one of 1.5 mm failed" in record.message

@@ -157,10 +157,24 @@ def test_linear_hardening_cannot_go_on_ratchetting():
 
 
 def test_a_closed_cycle_does_not_hide_another_depth_that_ratchets():
-    flow = np.tile([1e-2, 4e-4], (4, 1))  # the first leaves more, but little of what it turns over
-    left = np.tile([4.5e-4, 4e-4], (4, 1))
+    flow = np.tile([1e-2, 7e-4], (4, 1))
+    left = np.tile([4.5e-4, 7e-4], (4, 1))
     assert classify(flow[:, :1], left[:, :1], YIELD_STRAIN).state is State.PLASTIC_SHAKEDOWN
     assert classify(flow, left, YIELD_STRAIN).state is State.RATCHETTING
+
+
+@pytest.mark.parametrize("still", [0.0, 1e-6, -1e-4])
+@pytest.mark.parametrize("left", [[1e-4, 2e-4, 3e-4, 4e-4], [3e-4] * 4, [1e-3] * 4])
+def test_a_depth_where_nothing_flows_has_no_say(left, still):
+    flow, left = one_depth([1e-2] * 4), one_depth(left)
+    alone = classify(flow, left, YIELD_STRAIN)
+    beside = classify(
+        np.hstack([flow, np.full_like(flow, still)]),
+        np.hstack([left, np.full_like(left, abs(still))]),
+        YIELD_STRAIN,
+    )
+    assert beside.state is alone.state
+    assert beside.net == pytest.approx(alone.net, nan_ok=True)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from solver.scenes import SCENES
 from studies import Store, Study
 from studies.cli import main
 from studies.combine import combine
-from studies.comparison.compare import Comparison, compare
+from studies.comparison.compare import Comparison, _line, compare
 from studies.comparison.problem import REFINING
 from studies.comparison.profiles import Computed, Profile, read_profiles
 from studies.comparison.reference import Published, published_cases, read_reference, reference_of
@@ -111,6 +111,13 @@ def test_changes_are_found_where_mesh_and_increment_are_refined_apart(tmp_path: 
 
 MESHES = [(2.0, 1.0), (1.0, 1.0), (0.5, 1.0)]
 STEPS = [(1.0, 2.0), (1.0, 0.5)]
+
+
+def test_a_longer_line_of_coarser_increments_does_not_take_the_change() -> None:
+    levels = [*MESHES, (0.5, 0.5), (1.0, 0.5)]
+    values = {level: 10.0 * level[0] * level[1] for level in levels}
+    assert [value for _, value in _line(values, 0)] == [2.5, 5.0]
+    assert [value for _, value in _line(values, 1)] == [2.5, 5.0]
 
 
 @pytest.mark.parametrize(

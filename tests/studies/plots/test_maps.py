@@ -12,6 +12,7 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from studies import Store, Study, StudyError, open_netcdf, open_study
+from studies.plots.captions import setting
 from studies.plots.maps import map_figure, whole
 from studies.plots.picture import picture
 from tests.studies.conftest import compute_here, fake_study
@@ -194,3 +195,9 @@ def test_a_field_that_is_zero_everywhere_is_drawn(store: Store) -> None:
         for field in ("residual_stress", "plastic_strain"):
             low, high = mesh_of(map_figure(together, field))[1].get_clim()
             assert low < high
+
+
+@pytest.mark.parametrize(("held", "told"), [("true", "periodic"), ("false", "not periodic")])
+def test_a_swept_truth_value_is_told_by_its_name(held: str, told: str) -> None:
+    run = xr.Dataset(coords={"periodic": held}, attrs={"scene": "rolling", "parameters": "{}"})
+    assert setting(run).replace("\u00a0", " ").endswith(f"· {told}")
