@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ from service.schemas import RunFilter, Window
 from solver.scenes import SCENES
 from studies import StudyError
 from studies.dataset import MISSING, STATUSES
-from studies.parameters import Parameter, nearest, parameters_of, scene_named
+from studies.parameters import Parameter, one_of, parameters_of, plain, scene_named
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""
@@ -28,8 +27,7 @@ def conditions(which: RunFilter) -> dict[str, Any]:
         for a scene, a status, a parameter or a value that no run can have
     """
     if which.status not in (None, *OUTCOMES):
-        allowed = f"must be one of {', '.join(OUTCOMES)}{nearest(which.status, OUTCOMES)}"
-        raise StudyError("status", which.status, allowed)
+        raise StudyError("status", which.status, one_of(which.status, OUTCOMES))
     scenes = list(SCENES.values()) if which.scene is None else [scene_named(which.scene)]
     known: dict[str, list[Parameter]] = {}
     for scene in scenes:
@@ -38,9 +36,7 @@ def conditions(which: RunFilter) -> dict[str, Any]:
     asked = which.model_dump(exclude_none=True)
     for name in asked.keys() - {*PLAIN}:
         if name not in known:
-            names = (*PLAIN, *known)
-            allowed = f"must be one of {', '.join(names)}{nearest(name, names)}"
-            raise StudyError(name, asked[name], allowed)
+            raise StudyError(name, asked[name], one_of(name, (*PLAIN, *known)))
         asked[name] = _value(name, asked[name], known[name])
     return asked
 
@@ -48,17 +44,8 @@ def conditions(which: RunFilter) -> dict[str, Any]:
 def _value(name: str, given: Any, parameters: Sequence[Parameter]) -> Any:
     """Return a value as the first of the parameters of this name that accepts it has it."""
     for parameter in parameters:
-        value = given if isinstance(parameter.default, str) else _parsed(given)
         try:
-            return parameter.normalise(value, name)
+            return parameter.normalise(plain(given, parameter.default), name)
         except StudyError as error:
             refusal = error
     raise refusal
-
-
-def _parsed(given: Any) -> Any:
-    """Return the number or truth value that a text stands for; anything else as it is."""
-    try:
-        return json.loads(given) if isinstance(given, str) else given
-    except (ValueError, RecursionError):
-        return given

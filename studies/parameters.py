@@ -65,7 +65,13 @@ def scene_named(name: Any) -> Scene:
     """Return the scene called `name`, or raise a `StudyError` that says which exist."""
     if isinstance(name, str) and name in SCENES:
         return SCENES[name]
-    raise StudyError("scene", name, f"must be one of {', '.join(SCENES)}{nearest(name, SCENES)}")
+    raise StudyError("scene", name, one_of(name, SCENES))
+
+
+def one_of(name: Any, names: Iterable[str]) -> str:
+    """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
+    known = list(names)
+    return f"must be one of {', '.join(known)}{nearest(name, known)}"
 
 
 def nearest(name: Any, names: Iterable[str]) -> str:
@@ -134,5 +140,13 @@ def _describe(schema: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any, usual: Any) -> Any:
-    """Return a value of an axis, which holds numbers and text, in the type of the usual value."""
-    return value if isinstance(usual, str) or not isinstance(value, str) else json.loads(value)
+    """Return a value that may have become text, such as one of an axis, as the usual value is.
+
+    Text that stands for no number and no truth value stays as it is.
+    """
+    if isinstance(usual, str) or not isinstance(value, str):
+        return value
+    try:
+        return json.loads(value)
+    except (ValueError, RecursionError):
+        return value

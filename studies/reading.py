@@ -90,6 +90,13 @@ def _progress(file: Path) -> str:
     return f"{study.name}: {finished} of {study.size} runs finished"
 
 
+def flags(variable: xr.DataArray) -> dict[int, str]:
+    """Return what the values of a variable mean, nothing for one that is no flag."""
+    meanings = str(variable.attrs.get("flag_meanings", "")).split()
+    values = np.atleast_1d(variable.attrs.get("flag_values", [])).tolist()
+    return dict(zip(values, meanings, strict=True))
+
+
 def sweep_axes(dataset: xr.Dataset) -> list[str]:
     """Return the sweep dimensions of a data set, those of size one included."""
     return [str(name) for name in dataset["status"].dims]

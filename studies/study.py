@@ -15,7 +15,7 @@ from solver.scenes import SCENES
 from studies import design
 from studies.errors import StudyError
 from studies.identity import content_id
-from studies.parameters import nearest, parameters_of, scene_named
+from studies.parameters import one_of, parameters_of, scene_named
 from studies.sweep import (
     Axes,
     checked_axes,
@@ -80,12 +80,7 @@ class Study(BaseModel):
     def _check(cls, content: dict[str, Any]) -> dict[str, Any]:
         for key in content:
             if key not in cls.model_fields:
-                fields = ", ".join(cls.model_fields)
-                raise StudyError(
-                    str(key),
-                    content[key],
-                    f"must be one of {fields}{nearest(key, cls.model_fields)}",
-                )
+                raise StudyError(str(key), content[key], one_of(key, cls.model_fields))
         scene = scene_named(content.get("scene"))
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)

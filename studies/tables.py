@@ -14,7 +14,7 @@ from solver.scenes import SCENES
 from studies.columns import aligned, in_blocks, stacked
 from studies.dataset import OK, STATUSES
 from studies.parameters import parameters_of, scene_named
-from studies.reading import sweep_axes, sweep_coordinates
+from studies.reading import flags, sweep_axes, sweep_coordinates
 
 FIGURES: Mapping[str, str] = {
     "residual_x_half_plane": "residual x half plane",
@@ -129,9 +129,7 @@ def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
 
 def _figure(variable: xr.DataArray) -> str:
     """Return the single value of a variable; what a flag means instead of its number."""
-    meanings = str(variable.attrs.get("flag_meanings", "")).split()
-    flags = dict(zip(np.atleast_1d(variable.attrs.get("flag_values", [])), meanings, strict=True))
-    return flags.get(variable.item()) or _text(variable.item())
+    return flags(variable).get(variable.item()) or _text(variable.item())
 
 
 def _text(value: Any) -> str:

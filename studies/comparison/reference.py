@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from studies.errors import StudyError
-from studies.parameters import nearest
+from studies.parameters import one_of
 from studies.study import Study
 
 STRAIN = "plastic_strain"
@@ -143,8 +143,7 @@ def _check_heading(columns: Sequence[str], line: str) -> None:
     fields = {field.alias or name: field for name, field in Published.model_fields.items()}
     for position, column in enumerate(columns):
         if column not in fields:
-            allowed = f"must be one of {', '.join(fields)}{nearest(column, fields)}"
-            raise StudyError(f"{line}: column", column, allowed)
+            raise StudyError(f"{line}: column", column, one_of(column, fields))
         if column in columns[:position]:
             raise StudyError(f"{line}: column", column, "occurs twice: keep one")
     needed = [name for name, field in fields.items() if field.is_required()]

@@ -7,7 +7,7 @@ import math
 import xarray as xr
 
 from studies.errors import StudyError
-from studies.parameters import nearest
+from studies.parameters import one_of
 
 MAP = ("y", "x")
 ALONG = ("s", "depth")
@@ -37,8 +37,7 @@ def line_fields(dataset: xr.Dataset) -> list[str]:
 def check_field(field: str, known: list[str]) -> None:
     """Raise a `StudyError` unless `field` is one of the `known`."""
     if field not in known:
-        allowed = f"must be one of {', '.join(known)}{nearest(field, known)}"
-        raise StudyError("field", field, allowed)
+        raise StudyError("field", field, one_of(field, known))
 
 
 def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:

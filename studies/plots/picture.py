@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError
-from studies.parameters import nearest
+from studies.parameters import one_of
 from studies.plots.fields import ALONG, MAP, check_field, line_fields, map_fields, sweep_fields
 from studies.plots.lines import line_figure
 from studies.plots.maps import map_figure
@@ -60,9 +60,7 @@ def _part(dataset: xr.Dataset, field: str, selection: Mapping[str, str | float])
     known = [*swept, *own]
     for name, value in selection.items():
         if name not in known:
-            raise StudyError(
-                name, value, f"must be one of {', '.join(known)}{nearest(name, known)}"
-            )
+            raise StudyError(name, value, one_of(name, known))
     run = one_run(dataset, {name: selection[name] for name in swept if name in selection})
     return run.isel(
         {name: positions(run[name], selection[name]) for name in own if name in selection}

@@ -21,7 +21,7 @@ from studies.errors import StudyError
 from studies.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.plots.limits import draw_shakedown_limits
 from studies.plots.maps import SIGNED
-from studies.reading import sweep_axes, sweep_coordinates
+from studies.reading import flags, sweep_axes, sweep_coordinates
 
 MOST_PANELS = 6
 
@@ -151,11 +151,11 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
     others = [dataset[axis] for axis in several if (axis,) not in used]
     panels = math.prod(each.size for each in others)
     if panels > MOST_PANELS:
-        named = ", ".join(str(each.dims[0]) for each in others)
+        axes = ", ".join(str(each.dims[0]) for each in others)
         raise StudyError(
             "field",
             field,
-            f"takes {panels} panels, at most {MOST_PANELS}: select of {named}",
+            f"takes {panels} panels, at most {MOST_PANELS}: select of {axes}",
         )
     return [*numbers, *others]
 
@@ -189,16 +189,16 @@ def _look(dataset: xr.Dataset, field: str) -> _Look:
     if not known.size:
         raise StudyError("field", field, "has no values here")
     low, high = float(known.min()), float(known.max())
-    flags: dict[int, _Kind] = {}
-    if "flag_values" in dataset[field].attrs:
-        numbers = np.atleast_1d(dataset[field].attrs["flag_values"])
-        names = str(dataset[field].attrs["flag_meanings"]).split()
-        for number, name, (marker, colour) in zip(numbers, names, _CATEGORIES, strict=False):
-            flags[int(number)] = _Kind(name=words(name), marker=marker, colour=colour)
+    kinds = {
+        value: _Kind(name=words(name), marker=marker, colour=colour)
+        for (value, name), (marker, colour) in zip(
+            flags(dataset[field]).items(), _CATEGORIES, strict=False
+        )
+    }
     if low < 0.0 < high:
         low, high = min(low, -high), max(high, -low)
-        return _Look(flags=flags, norm=Normalize(low, high), colours=SIGNED)
-    return _Look(flags=flags, norm=Normalize(low, high), colours="viridis")
+        return _Look(flags=kinds, norm=Normalize(low, high), colours=SIGNED)
+    return _Look(flags=kinds, norm=Normalize(low, high), colours="viridis")
 
 
 def _draw(
