@@ -9,6 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.body import Body
     from solver.surface import Surface
 
 
@@ -19,6 +20,7 @@ class Part:
     """
 
     n: int
+    body: Body
     load: NDArray[np.float64]
 
     def start(self) -> NDArray[np.float64]:
@@ -28,6 +30,15 @@ class Part:
     def external(self, load: float) -> NDArray[np.float64]:
         """Return the external nodal forces (n,) at a load factor [N]."""
         return load * self.load
+
+    def grows(self, before: float, after: float) -> bool:
+        """Whether the external load grows from one load factor to another."""
+        return abs(after) > abs(before) and bool(self.load.any())
+
+    def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
+        """Return where a step (n,) strains this part most [mm]; nowhere in one without points."""
+        del step
+        return np.nan, np.nan
 
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""

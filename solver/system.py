@@ -11,6 +11,7 @@ from scipy.linalg import null_space
 
 from solver import surface
 from solver.contact.geometry import Pairing, pair
+from solver.contact.overlap import check_overlap, largest_overlap
 from solver.discretisation import Discretisation
 from solver.errors import ModelError
 from solver.state import ContactState, State
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
     from solver.surface import Surface
 
 
+_TOUCHING = 1e-9
+"""Over the length of the longest contact surface."""
+
+
 @dataclass(frozen=True, slots=True)
 class Interface:
     """A contact pair on its two parts."""
@@ -37,6 +42,7 @@ class Interface:
     master_surface: Surface
     friction: float
     parts: tuple[Part, Part]
+    reach: float
     reference: Pairing | None
 
     @property
@@ -47,6 +53,11 @@ class Interface:
             (self.master, self.parts[1], self.master_surface),
         )
 
+    @property
+    def floating(self) -> bool:
+        """Whether contact has to hold a rigid motion of either part."""
+        return any(part.rigid.shape[1] for part in self.parts)
+
     def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
         """Return gap, area and derivative rows at displacements ``u``."""
         motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
@@ -56,7 +67,7 @@ class Interface:
                 for block, motion in zip(self.reference.normal, motions, strict=True)
             )
             return replace(self.reference, gap=self.reference.gap + change)
-        return pair(self.slave_surface, motions[0], self.master_surface, motions[1])
+        return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
 
 
 Part = Discretisation | Substructure
@@ -91,13 +102,21 @@ def _interface(
         part = parts[number]
         sides.append((number, part.surface(chain) if isinstance(part, Substructure) else chain))
     (slave, slave_surface), (master, master_surface) = sides
-    reference = None
+    both = (parts[slave], parts[master])
+    check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
+    reference, reach = None, float(np.ptp(both[0].body.mesh.p, axis=1).max())
     if contact.sliding == "small":
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
-        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1])
-    both = (parts[slave], parts[master])
+        reach = largest_overlap(both[0].body, both[1].body)
+        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
+        if not reference.area.any():
+            raise ModelError(
+                "contacts", (contact.slave, contact.master),
+                "these surfaces do not face each other: at rest no normal of the first meets the "
+                "second from outside",
+            )  # fmt: skip
     return Interface(
-        slave, master, slave_surface, master_surface, contact.friction, both, reference
+        slave, master, slave_surface, master_surface, contact.friction, both, reach, reference
     )
 
 
@@ -154,18 +173,30 @@ class System:
         return sum(len(part.free) for part in self.parts)
 
     @cached_property
+    def touching(self) -> float:
+        """Distance up to which surfaces at rest touch, and neither part nor overlap [mm]."""
+        lengths = [np.ptp(i.slave_surface.X, axis=1).max() for i in self.interfaces]
+        return _TOUCHING * float(max(lengths, default=0.0))
+
+    @cached_property
+    def overlapping(self) -> bool:
+        """Whether bodies overlap before loading."""
+        start = self.initial().u
+        return any((i.pairing(start).gap < -self.touching).any() for i in self.interfaces)
+
+    @cached_property
     def proportional(self) -> bool:
         """Whether elastic states do not depend on how the load was brought on.
 
         True without friction, and where all facing vertices touch before loading, so that
         every status stays as it is while the load grows.
         """
-        conforming = all(
-            (np.isinf(gap) | (np.abs(gap) < 1e-9 * np.ptp(i.slave_surface.X))).all()
-            for i in self.interfaces
-            for gap in [i.pairing(self.initial().u).gap]
-        )
-        return conforming or all(i.friction == 0 for i in self.interfaces)
+        if self.overlapping:
+            return False
+        start = self.initial().u
+        gaps = np.concatenate([np.zeros(0), *(i.pairing(start).gap for i in self.interfaces)])
+        conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()
+        return bool(conforming) or all(i.friction == 0 for i in self.interfaces)
 
     def part(self, name: str) -> int:
         """Return the number of the part called ``name``."""
@@ -195,7 +226,5 @@ class System:
         contacts = []
         for interface in self.interfaces:
             gap = interface.pairing(u).gap
-            length = np.ptp(interface.slave_surface.X, axis=1).max()
-            touching = gap <= 1e-9 * length
-            contacts.append(ContactState.at_rest(gap, touching))
+            contacts.append(ContactState.at_rest(gap, gap <= self.touching))
         return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))

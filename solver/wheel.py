@@ -58,6 +58,13 @@ class Wheel(Substructure):
             force[self.rim + 2] = self.program.at(load, "moment") / self.radius
         return force
 
+    def grows(self, before: float, after: float) -> bool:
+        """Whether force or moment on the axle grow from one time to another."""
+        return any(
+            abs(self.program.at(after, name)) > abs(self.program.at(before, name))
+            for name in ("force", "moment")
+        )
+
     def residual(
         self, load: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:

@@ -45,6 +45,7 @@ class Candidates:
     forces : the contact forces of the current iterate in the same order [N]
     status : (n,) of the current iterate
     rows : one a part, None for a part without contact surface
+    covered : for each interface, the share of the hats of its candidates that faces the master
     beyond : smallest gap of the vertices that are not candidates [mm]
     """
 
@@ -55,6 +56,7 @@ class Candidates:
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
     rows: tuple[Rows | None, ...]
+    covered: tuple[NDArray[np.float64], ...]
     beyond: float
 
     @property
@@ -125,15 +127,16 @@ class Candidates:
     def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of load."""
         out, at = [], 0
+        rate = 1 / span if span else np.nan
         after = self.states(before, self.forces, self.status)
         for old, new, vertices in zip(before, after, self.vertices, strict=True):
             here = slice(at, at + len(vertices))
             at += len(vertices)
             approach = np.full_like(old.approach, np.nan)
             approach[0, vertices] = self.motion[: self.n][here]
-            approach[1] = (approach[0] - old.approach[0]) / span
+            approach[1] = (approach[0] - old.approach[0]) * rate
             if len(self.motion) > self.n:
-                approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] / span
+                approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] * rate
             out.append(replace(new, touching=new.status != OPEN, approach=approach))
         return tuple(out)
 
@@ -143,7 +146,8 @@ def no_candidates(system: System) -> Candidates:
     empty = np.zeros(0)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
-    return Candidates(none, empty, empty, empty, empty, empty.astype(int), rows, np.inf)
+    covered = tuple(empty for _ in system.interfaces)
+    return Candidates(none, empty, empty, empty, empty, empty.astype(int), rows, covered, np.inf)
 
 
 def find_candidates(
@@ -159,7 +163,10 @@ def find_candidates(
     it touched, if the last increment tells how it came near.
     """
     pairings = [interface.pairing(u) for interface in system.interfaces]
-    vertices = [_near(p, c) for p, c in zip(pairings, contacts, strict=True)]
+    vertices = [
+        _near(pairing, contact, interface.floating)
+        for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)
+    ]
     n = sum(len(v) for v in vertices)
     frictional = any(interface.friction > 0 for interface in system.interfaces)
     m = 2 * n if frictional else n
@@ -175,6 +182,10 @@ def find_candidates(
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
+        if interface.floating and len(at) and not before.touching.any():
+            # nothing but its first point holds a body that comes to rest on it
+            first_point = normal.start + pairing.gap[at].argmin()
+            apart[first_point] = np.nan_to_num(apart[first_point])
         friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
         apart[normal] = np.nan_to_num(apart[normal])
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -202,6 +213,7 @@ def find_candidates(
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
         rows=tuple(_join(p) for p in pieces),
+        covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         beyond=float(beyond),
     )
 
@@ -216,8 +228,15 @@ def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
     return np.asarray(np.where(share < 1.0, sliding * np.maximum(share, 0.0), np.nan))
 
 
-def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:
-    near = (pairing.gap < _MARGIN * pairing.length) | (contact.normal > 0)
+def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:
+    """Return the vertices near contact.
+
+    A floating body comes down however far it is: its nearest vertex is near.
+    """
+    margin = _MARGIN * pairing.length
+    if floating:
+        margin = margin + max(pairing.gap.min(initial=np.inf, where=pairing.area > 0), 0.0)
+    near = (pairing.gap < margin) | (contact.normal > 0)
     return np.flatnonzero(near & (pairing.area > 0))
 
 

@@ -125,12 +125,24 @@ def _forces(
     if k and size:
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
-    _, _, solution, info = linalg.lapack.dgesv(S, weight * rhs)
-    miss = np.abs(S @ solution - weight * rhs).max(initial=0.0)
-    if info or not miss <= _ACCURATE * np.abs(weight * rhs).max(initial=0.0):
-        return None
+    rhs *= weight
+    _, _, solution, info = linalg.lapack.dgesv(S, rhs)
+    if info or not _solves(S, solution, rhs):
+        if not size or np.linalg.matrix_rank(problem.A[rows]) == k:
+            return None
+        # a body on one point is free to turn about it, and stays where nothing turns it
+        solution = linalg.lstsq(S, rhs)[0]
+        if not _solves(S, solution, rhs):
+            return None
     solution *= weight
     return P @ solution[:size], solution[size:]
+
+
+def _solves(
+    S: NDArray[np.float64], solution: NDArray[np.float64], rhs: NDArray[np.float64]
+) -> bool:
+    miss = np.abs(S @ solution - rhs).max(initial=0.0)
+    return bool(miss <= _ACCURATE * np.abs(rhs).max(initial=0.0))
 
 
 def _active_sets(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
@@ -230,6 +242,8 @@ def _given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray
         A[: n + m] = problem.A[rows] / shape
         balance = problem.balance / (force * shape) - A[n : n + m].T @ limit
         held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
+        if len(held) < k:  # too few points to hold what floats
+            return None
         eliminated = _eliminate(M, r, A, A.T, balance, held)
         if eliminated is None:
             return None
