@@ -13,6 +13,7 @@ from solver.discretisation import Discretisation
 from solver.elements import element_type
 from solver.errors import ModelError
 from solver.kinematics import STATES, State
+from solver.mesh_check import check_mesh
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -62,12 +63,15 @@ class Body:
             raise ModelError("state", self.state, "must be one of " + ", ".join(STATES))
         if not (np.isfinite(self.thickness) and self.thickness > 0):
             raise ModelError("thickness", self.thickness, "must be positive [mm]")
-        corners = 4 if element_type(self.element).cells == "quad" else 3
+        element = element_type(self.element)
+        corners = 4 if element.cells == "quad" else 3
         if self.mesh.t.shape[0] != corners:
             raise ModelError(
                 "element", self.element, f"needs cells of {corners} corners; the mesh of body "
                 f"{self.name!r} has {self.mesh.t.shape[0]}",
             )  # fmt: skip
+        # a wheel is cut from hub to rim, far from where it rolls
+        check_mesh(self.mesh, self.name, element, touches_itself=self.axle is not None)
         if self.state == "axisymmetric" and self.mesh.p[0].min() < 0:
             raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
         for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
