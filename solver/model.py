@@ -59,7 +59,28 @@ class Model:
             raise ModelError("bodies.state", sorted(states), "must be the same for all bodies")
         for contact in self.contacts:
             for side, (name, boundary) in (("slave", contact.slave), ("master", contact.master)):
-                self.body(name, side).facets(boundary, side)
+                self.body(name, side).facets(boundary, side, outer=True)
+        self._check_pairs()
+
+    def _check_pairs(self) -> None:
+        """Refuse a surface paired with itself, and two surfaces paired twice."""
+        pairs = [(contact.slave, contact.master) for contact in self.contacts]
+        for i, (slave, master) in enumerate(pairs):
+            if self._overlap(slave, master):
+                allowed = f"shares facets with slave {slave}: must be another surface"
+                raise ModelError(f"contacts[{i}].master", master, allowed)
+            for j, (one, other) in enumerate(pairs[:i]):
+                straight = self._overlap(slave, one) and self._overlap(master, other)
+                if straight or (self._overlap(slave, other) and self._overlap(master, one)):
+                    allowed = f"pairs surfaces that contacts[{j}] pairs: give each pair once"
+                    raise ModelError(f"contacts[{i}]", (slave, master), allowed)
+
+    def _overlap(self, one: tuple[str, str], other: tuple[str, str]) -> bool:
+        """Whether two surfaces, given by body and boundary, share facets."""
+        if one[0] != other[0]:
+            return False
+        body = self.body(one[0])
+        return len(np.intersect1d(body.facets(one[1]), body.facets(other[1]))) > 0
 
     def body(self, name: str, field: str = "body") -> Body:
         """Return the body called ``name``."""
