@@ -71,7 +71,7 @@ class Body:
                 f"{self.name!r} has {self.mesh.t.shape[0]}",
             )  # fmt: skip
         # a wheel is cut from hub to rim, far from where it rolls
-        check_mesh(self.mesh, self.name, element, touches_itself=self.axle is not None)
+        check_mesh(self.mesh, self.name, element)
         if self.state == "axisymmetric" and self.mesh.p[0].min() < 0:
             raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
         for kind, names in (("supports", self.supports), ("pressure", self.pressure)):

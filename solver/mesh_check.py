@@ -33,17 +33,15 @@ _CLOSED = 1e-3
 _ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
 
 
-def check_mesh(mesh: Mesh, name: str, kind: ElementType, touches_itself: bool = False) -> None:
+def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
     """Raise `ModelError` unless the mesh of body ``name`` is unfolded and whole.
 
-    Elements and nodes go by their numbers in the mesh. With ``touches_itself``, sides may lie on
-    one another, as those of a ring rolled up from a grid do.
+    Elements and nodes go by their numbers in the mesh.
     """
     where = f'of body "{name}"'
     _check_nodes(mesh, where)
     _check_neighbours(mesh, where, _check_elements(mesh, where, kind))
-    if not touches_itself:
-        _check_cracks(mesh, where)
+    _check_cracks(mesh, where)
     _check_connected(mesh, where)
 
 

@@ -12,7 +12,7 @@ from annotated_types import Interval, Unit
 from solver.body import Body
 from solver.errors import ModelError
 from solver.material import Material
-from solver.mesh import graded, grid, mapped
+from solver.mesh import graded, grid, mapped, merged
 from solver.model import ContactPair, Model
 from solver.motion import Axle, AxleProgram, TravellingPressure
 from solver.passes import Schedule
@@ -272,7 +272,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     )
     return Body(
         name="wheel",
-        mesh=mapped(ring, around),
+        mesh=merged(mapped(ring, around)),
         material=Material(
             youngs_modulus=parameters.youngs_modulus * parameters.wheel_stiffness,
             poisson_ratio=parameters.poisson_ratio,

@@ -7,8 +7,7 @@ import pytest
 from skfem import MeshQuad, MeshQuad2, MeshTet, MeshTri, MeshTri2
 
 from solver import Body, Material, ModelError
-from solver.mesh import grid, mapped
-from solver.motion import Axle, AxleProgram
+from solver.mesh import grid, mapped, merged
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 SQUARE = np.array([[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
@@ -130,14 +129,6 @@ def ring():
         return p[1] * np.stack([np.sin(p[0]), np.cos(p[0])])
 
     return mapped(grid(np.linspace(-np.pi, np.pi, 13), np.array([1.0, 2.0])), around)
-
-
-def test_a_wheel_may_be_rolled_up_from_a_grid_and_other_bodies_not():
-    knots = np.zeros(1)
-    program = AxleProgram(time=knots, force=knots, moment=knots, advance=knots, rotation=knots)
-    axle = Axle(centre=(0.0, 0.0), radius=2.0, program=program, turned=0.0)
-    assert body(ring(), axle=axle, supports={"bottom": "xy"})
-    assert "lie on one another" in refusal(ring())
 
 
 # -- folded ------------------------------------------------------------------------------------
@@ -355,3 +346,20 @@ def test_nodes_that_are_not_there_are_refused():
 
 def test_meshes_in_space_are_refused():
     assert refusal(MeshTet(), element="quad8").startswith("node 0 has 3 coordinates")
+
+
+def test_a_grid_bent_to_a_ring_is_merged_at_its_seam():
+    angles = np.linspace(-np.pi, np.pi, 25)
+
+    def around(p):
+        return p[1] * np.stack([np.sin(p[0]), -np.cos(p[0])])
+
+    slit = mapped(grid(angles, np.linspace(1.0, 2.0, 4)), around)
+    assert "lie on one another" in refusal(slit)
+    ring = merged(slit)
+    whole = Body(name="ring", mesh=ring, material=STEEL)
+    assert set(ring.boundaries["top"]) | set(ring.boundaries["bottom"]) == set(
+        ring.boundary_facets()
+    )
+    assert not len(ring.boundaries["left"])
+    assert whole.discretisation.weights.sum() == pytest.approx(3 * np.pi, rel=1e-4)
