@@ -29,13 +29,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A contact pair on its two parts."""
+    """A contact pair on its two parts.
+
+    ``shear_strength`` is the largest shear it carries whatever the pressure [MPa].
+    """
 
     slave: int
     master: int
     slave_surface: Surface
     master_surface: Surface
     friction: float
+    shear_strength: float
     parts: tuple[Part, Part]
     reference: Pairing | None
 
@@ -96,8 +100,16 @@ def _interface(
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
         reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1])
     both = (parts[slave], parts[master])
+    strength = min(part.body.material.shear_yield_stress for part in both)
     return Interface(
-        slave, master, slave_surface, master_surface, contact.friction, both, reference
+        slave=slave,
+        master=master,
+        slave_surface=slave_surface,
+        master_surface=master_surface,
+        friction=contact.friction,
+        shear_strength=contact.shear_limit * strength,
+        parts=both,
+        reference=reference,
     )
 
 
@@ -158,10 +170,12 @@ class System:
         """Whether elastic states do not depend on how the load was brought on.
 
         True without friction, and where all facing vertices touch before loading, so that
-        every status stays as it is while the load grows.
+        every status stays as it is while the load grows: but for a limit of shear, which does
+        not grow with it.
         """
         conforming = all(
-            (np.isinf(gap) | (np.abs(gap) < 1e-9 * np.ptp(i.slave_surface.X))).all()
+            np.isinf(i.shear_strength)
+            and (np.isinf(gap) | (np.abs(gap) < 1e-9 * np.ptp(i.slave_surface.X))).all()
             for i in self.interfaces
             for gap in [i.pairing(self.initial().u).gap]
         )
