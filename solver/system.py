@@ -143,11 +143,12 @@ class System:
         rows = []
         for interface in self.interfaces:
             pairing = interface.pairing(tuple(part.start() for part in self.parts))
-            for kind in (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]:
+            kinds = (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]
+            for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
                 A = np.zeros((len(pairing.area), ends[-1]))
                 for (number, part, chain), block in zip(interface.sides, kind, strict=True):
                     columns = slice(ends[number] - sizes[number], ends[number])
-                    dofs, rows_of = part.pull_back(chain, part.start(), block)
+                    dofs, rows_of = part.pull_back(chain, part.start(), block, gaps)
                     A[:, columns] += rows_of @ part.rigid[dofs]
                 rows.append(A)
         A = np.vstack([np.zeros((0, ends[-1])), *rows])

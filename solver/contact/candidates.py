@@ -189,7 +189,7 @@ def find_candidates(
                 block[tangent] = pairing.tangent[side][at]
                 moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
                 motion[tangent] += block[tangent] @ moved.T.ravel()
-            pieces[number].append(Rows(*part.pull_back(surface, u[number], block)))
+            pieces[number].append(Rows(*part.pull_back(surface, u[number], block, n)))
 
     if frictional:
         motion[n:] -= apart
