@@ -9,7 +9,13 @@ from typing import Literal
 import numpy as np
 
 from solver.body import Body
+from solver.contact.complementarity import LEAST_FRICTION
 from solver.errors import ModelError
+
+
+def effective_friction(friction: float) -> float:
+    """Return the coefficient that is solved with: zero where friction is lost in rounding."""
+    return friction if friction > LEAST_FRICTION else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +26,8 @@ class ContactPair:
     ----------
     slave, master : ``(body name, boundary name)``. The slave is the body whose surface ends at
         a corner, else the finer or yielding one; pressure lives on its vertices
-    friction : Coulomb coefficient; 0 leaves out the tangential unknowns
+    friction : Coulomb coefficient; 0 leaves out the tangential unknowns, and so does what is no
+        more than rounding (`effective_friction`)
     shear_limit : largest contact shear over the initial shear yield stress of the weaker body,
         whatever the pressure; inf (default) is none. Where friction could carry more, the
         surface layer shears instead of slipping, and without bound as the mesh is refined

@@ -13,6 +13,7 @@ from solver import surface
 from solver.contact.geometry import Pairing, pair
 from solver.discretisation import Discretisation
 from solver.errors import ModelError
+from solver.model import effective_friction
 from solver.state import ContactState, State
 from solver.substructure import Substructure
 from solver.wheel import Wheel
@@ -106,7 +107,7 @@ def _interface(
         master=master,
         slave_surface=slave_surface,
         master_surface=master_surface,
-        friction=contact.friction,
+        friction=effective_friction(contact.friction),
         shear_strength=contact.shear_limit * strength,
         parts=both,
         reference=reference,

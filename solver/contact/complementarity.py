@@ -31,6 +31,10 @@ OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 _MAX_SETS = 40
 _MAX_PASSES = 20
 _TOLERANCE = 1e-10
+_ROUNDING = 1e-14
+LEAST_FRICTION = _TOLERANCE
+"""Friction of this and less is none. All it carries is within the tolerance of normal forces here,
+a hundredth of the imbalance and a thousandth of the contact violation an increment may leave."""
 _ACCURATE = 1e-6
 
 
@@ -162,6 +166,8 @@ def _active_sets(
     n, mu = problem.n, problem.friction
     force, length = problem.scales
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
+    # under little friction a small part of what it carries, but no less than rounding
+    tiny_shear = force * np.clip(_ACCURATE * mu, _ROUNDING, _TOLERANCE)
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
         status[np.argmin(problem.offset[:n])] = STICK
@@ -183,7 +189,7 @@ def _active_sets(
         new[~closed & (gap < -tiny_length)] = STICK
         if problem.frictional:
             T, slip = F[n:], motion[n:]
-            bound = problem.bound(N) + tiny_force
+            bound = problem.bound(N) + tiny_shear
             keep = closed & (new != OPEN) & (mu > 0)
             new[keep & (status == STICK) & (T > bound)] = BACKWARD
             new[keep & (status == STICK) & (T < -bound)] = FORWARD

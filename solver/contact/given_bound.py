@@ -18,10 +18,11 @@ _PIVOTS_PER_UNKNOWN = 20
 def given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return the forces when |T| <= bound is given: a convex problem, by Lemke's method.
 
-    z = (N, tau, back), w = (gap, fore, sigma) with tau = T + bound, sigma = bound - T and
-    slip = fore - back: the matrix is positive semidefinite, so the method ends with a
-    solution where one exists. Rigid motions are eliminated by a principal pivot on as many
-    contact forces as there are motions.
+    z = (N, tau, back), w = (gap, fore, sigma) with tau = T / bound + 1, sigma = 1 - T / bound
+    and slip = fore - back: the matrix is positive semidefinite but for the scale of its
+    columns, so the method ends with a solution where one exists. In units of its bound a
+    tangential force is as exact under the least friction as a normal one. Rigid motions are
+    eliminated by a principal pivot on as many contact forces as there are motions.
     """
     # compiled, and rarely needed: only who comes here pays for importing the compiler
     from solver.contact.lemke import lemke
@@ -33,20 +34,23 @@ def given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray[
     m = len(at)
     rows = np.concatenate([np.arange(n), n + at])
     limit = bound[at] / force
+    unit = np.concatenate([np.ones(n), limit])
     M = np.zeros((n + 2 * m, n + 2 * m))
-    M[: n + m, : n + m] = force / length * problem.W[np.ix_(rows, rows)]
+    M[: n + m, : n + m] = force / length * problem.W[np.ix_(rows, rows)] * unit
     M[n : n + m, n + m :] = np.eye(m)
     M[n + m :, n : n + m] = -np.eye(m)
-    r = np.concatenate([problem.offset[rows] / length, 2 * limit])
-    r[: n + m] -= M[: n + m, n : n + m] @ limit
+    r = np.concatenate([problem.offset[rows] / length, np.full(m, 2.0)])
+    r[: n + m] -= M[: n + m, n : n + m].sum(axis=1)
     held = np.zeros(0, dtype=int)
     if k:
         shape = np.abs(problem.A).max()
         A = np.zeros((n + 2 * m, k))
         A[: n + m] = problem.A[rows] / shape
-        balance = problem.balance / (force * shape) - A[n : n + m].T @ limit
+        columns = np.zeros((k, n + 2 * m))
+        columns[:, : n + m] = A[: n + m].T * unit
+        balance = problem.balance / (force * shape) - columns[:, n : n + m].sum(axis=1)
         held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
-        eliminated = _eliminate(M, r, A, A.T, balance, held)
+        eliminated = _eliminate(M, r, A, columns, balance, held)
         if eliminated is None:
             return None
         M, r = eliminated
@@ -57,7 +61,7 @@ def given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray[
         z[held] = (M @ z + r)[held]
     F = np.zeros(len(problem.offset))
     F[:n] = force * z[:n]
-    F[n + at] = force * (z[n : n + m] - limit)
+    F[n + at] = bound[at] * (z[n : n + m] - 1)
     return F
 
 

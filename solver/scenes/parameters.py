@@ -14,7 +14,7 @@ from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
 
 from solver.errors import ModelError
 from solver.material import Hardening, Material
-from solver.model import ContactPair
+from solver.model import ContactPair, effective_friction
 
 
 def described(default: Any, description: str) -> Any:
@@ -67,6 +67,11 @@ class ContactParameters(MaterialParameters):
     shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
         0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
     )
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether the contact is solved without friction."""
+        return effective_friction(self.friction) == 0.0
 
     def contact(
         self,

@@ -96,7 +96,7 @@ class RollingParameters(ContactParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ContactParameters.__post_init__(self)
-        if self.traction and not self.friction:
+        if self.traction and self.frictionless:
             raise ModelError("traction", self.traction, "must be 0 without friction")
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
@@ -256,7 +256,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     rotation = None
     if parameters.traction == 1.0:  # locked
         rotation = np.full_like(knots["time"], -turned)
-    elif parameters.control == "creepage" or parameters.friction == 0.0:
+    elif parameters.control == "creepage" or parameters.frictionless:
         # without friction nothing turns the wheel: it is turned to roll
         rotation = -turned - (1 - parameters.given_creepage) * knots["position"] / R
     program = AxleProgram(
