@@ -45,8 +45,11 @@ class Part:
         return u[surface.dofs].reshape(-1, 2).T
 
     def pull_back(
-        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64]
+        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return unknowns and rows on them from rows on a surface's displacements."""
-        del u
+        """Return unknowns and rows on them from rows on a surface's displacements.
+
+        The first ``gaps`` rows are those of gaps, the others those of slips.
+        """
+        del u, gaps
         return surface.dofs, block

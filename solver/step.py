@@ -64,6 +64,7 @@ def newton_step(
             W=W,
             offset=motion,
             friction=candidates.friction,
+            limit=candidates.limit,
             A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
             balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
         ),

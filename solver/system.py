@@ -14,6 +14,7 @@ from solver.contact.geometry import Pairing, pair
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.discretisation import Discretisation
 from solver.errors import ModelError
+from solver.model import effective_friction
 from solver.state import ContactState, State
 from solver.substructure import Substructure
 from solver.wheel import Wheel
@@ -34,13 +35,17 @@ _TOUCHING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A contact pair on its two parts."""
+    """A contact pair on its two parts.
+
+    ``shear_strength`` is the largest shear it carries whatever the pressure [MPa].
+    """
 
     slave: int
     master: int
     slave_surface: Surface
     master_surface: Surface
     friction: float
+    shear_strength: float
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
@@ -115,8 +120,17 @@ def _interface(
                 "these surfaces do not face each other: at rest no normal of the first meets the "
                 "second from outside",
             )  # fmt: skip
+    strength = min(part.body.material.shear_yield_stress for part in both)
     return Interface(
-        slave, master, slave_surface, master_surface, contact.friction, both, reach, reference
+        slave=slave,
+        master=master,
+        slave_surface=slave_surface,
+        master_surface=master_surface,
+        friction=effective_friction(contact.friction),
+        shear_strength=contact.shear_limit * strength,
+        parts=both,
+        reach=reach,
+        reference=reference,
     )
 
 
@@ -150,11 +164,12 @@ class System:
         rows = []
         for interface in self.interfaces:
             pairing = interface.pairing(tuple(part.start() for part in self.parts))
-            for kind in (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]:
+            kinds = (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]
+            for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
                 A = np.zeros((len(pairing.area), ends[-1]))
                 for (number, part, chain), block in zip(interface.sides, kind, strict=True):
                     columns = slice(ends[number] - sizes[number], ends[number])
-                    dofs, rows_of = part.pull_back(chain, part.start(), block)
+                    dofs, rows_of = part.pull_back(chain, part.start(), block, gaps)
                     A[:, columns] += rows_of @ part.rigid[dofs]
                 rows.append(A)
         A = np.vstack([np.zeros((0, ends[-1])), *rows])
@@ -189,9 +204,10 @@ class System:
         """Whether elastic states do not depend on how the load was brought on.
 
         True without friction, and where all facing vertices touch before loading, so that
-        every status stays as it is while the load grows.
+        every status stays as it is while the load grows: but for a limit of shear, which does
+        not grow with it.
         """
-        if self.overlapping:
+        if self.overlapping or not all(np.isinf(i.shear_strength) for i in self.interfaces):
             return False
         start = self.initial().u
         gaps = np.concatenate([np.zeros(0), *(i.pairing(start).gap for i in self.interfaces)])

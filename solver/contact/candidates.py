@@ -40,6 +40,7 @@ class Candidates:
     vertices : for each interface, the slave vertices that are candidates
     friction : (n,) coefficient; zero where the vertex had no contact before and nothing is
         known of its approach: it then starts without tangential force
+    limit : (n,) largest tangential force whatever the normal one [N]
     motion : (n or 2n,) gap, and slip when there is friction [mm]
     apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
@@ -51,6 +52,7 @@ class Candidates:
 
     vertices: tuple[NDArray[np.int64], ...]
     friction: NDArray[np.float64]
+    limit: NDArray[np.float64]
     motion: NDArray[np.float64]
     apart: NDArray[np.float64]
     forces: NDArray[np.float64]
@@ -90,8 +92,8 @@ class Candidates:
     def violation(self, stiffness: NDArray[np.float64]) -> float:
         """Return the natural residual of the contact conditions, as a force [N].
 
-        ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -mu N, mu N)|``
-        with the stiffness k of the elastic contact points.
+        ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -s, s)|`` with
+        ``s = min(mu N, limit)`` and the stiffness k of the elastic contact points.
         """
         n, F, k = self.n, self.forces, stiffness
         if n == 0:
@@ -99,7 +101,7 @@ class Candidates:
         N = F[:n]
         worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
         if len(F) > n:
-            bound = self.friction * np.maximum(N, 0)
+            bound = np.minimum(self.friction * np.maximum(N, 0), self.limit)
             wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
             worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
         return worst
@@ -147,7 +149,8 @@ def no_candidates(system: System) -> Candidates:
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
     covered = tuple(empty for _ in system.interfaces)
-    return Candidates(none, empty, empty, empty, empty, empty.astype(int), rows, covered, np.inf)
+    status = empty.astype(int)
+    return Candidates(none, empty, empty, empty, empty, empty, status, rows, covered, np.inf)
 
 
 def find_candidates(
@@ -171,6 +174,7 @@ def find_candidates(
     frictional = any(interface.friction > 0 for interface in system.interfaces)
     m = 2 * n if frictional else n
     motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
+    limit = np.zeros(n)
     pieces: list[list[Rows]] = [[] for _ in system.parts]
     first = 0
     for interface, pairing, at, before in zip(
@@ -188,6 +192,7 @@ def find_candidates(
             apart[first_point] = np.nan_to_num(apart[first_point])
         friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
         apart[normal] = np.nan_to_num(apart[normal])
+        limit[normal] = interface.shear_strength * pairing.area[at]
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
@@ -195,7 +200,7 @@ def find_candidates(
                 block[tangent] = pairing.tangent[side][at]
                 moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
                 motion[tangent] += block[tangent] @ moved.T.ravel()
-            pieces[number].append(Rows(*part.pull_back(surface, u[number], block)))
+            pieces[number].append(Rows(*part.pull_back(surface, u[number], block, n)))
 
     if frictional:
         motion[n:] -= apart
@@ -208,6 +213,7 @@ def find_candidates(
     return Candidates(
         vertices=tuple(vertices),
         friction=friction,
+        limit=limit,
         motion=motion,
         apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,

@@ -13,10 +13,10 @@ from solver.body import Body
 from solver.errors import ModelError
 from solver.material import Material
 from solver.mesh import graded, grid, mapped, merged
-from solver.model import ContactPair, Model
+from solver.model import Model
 from solver.motion import Axle, AxleProgram, TravellingPressure
 from solver.passes import Schedule
-from solver.scenes.parameters import Friction, Length, MaterialParameters, described
+from solver.scenes.parameters import ContactParameters, Friction, Length, described
 from solver.scenes.settling import HALVINGS
 
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
@@ -31,7 +31,7 @@ _MOST_INCREMENTS = 100_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RollingParameters(MaterialParameters):
+class RollingParameters(ContactParameters):
     """Parameters of rolling (N, mm, MPa; forces a mm of width)."""
 
     yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
@@ -95,12 +95,16 @@ class RollingParameters(MaterialParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        MaterialParameters.__post_init__(self)
-        if self.traction and not self.friction:
+        ContactParameters.__post_init__(self)
+        if self.traction and self.frictionless:
             raise ModelError("traction", self.traction, "must be 0 without friction")
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
+        if self.shear_limit and self.load == "hertz":
+            raise ModelError(
+                "shear_limit", self.shear_limit, "must be 0: load = hertz prescribes the shear"
+            )
         if prescribed and self.traction:
             raise ModelError("traction", self.traction, "must be 0 where creepage is given")
         if self.given_creepage and not prescribed:
@@ -260,7 +264,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     rotation = None
     if parameters.traction == 1.0:  # locked
         rotation = np.full_like(knots["time"], -turned)
-    elif parameters.control == "creepage" or parameters.friction == 0.0:
+    elif parameters.control == "creepage" or parameters.frictionless:
         # without friction nothing turns the wheel: it is turned to roll
         rotation = -turned - (1 - parameters.given_creepage) * knots["position"] / R
     program = AxleProgram(
@@ -287,10 +291,7 @@ def model(parameters: RollingParameters) -> Model:
     half_space = _half_space(parameters)
     if parameters.load == "hertz":
         return Model(bodies=(half_space,))
-    contact = ContactPair(
-        slave=("half_space", "track"),
-        master=("wheel", "rim"),
-        friction=parameters.friction,
-        sliding="finite",
+    contact = parameters.contact(
+        slave=("half_space", "track"), master=("wheel", "rim"), sliding="finite"
     )
     return Model(bodies=(_wheel(parameters), half_space), contacts=(contact,))

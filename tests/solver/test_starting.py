@@ -79,7 +79,7 @@ def test_a_body_pulled_away_is_told_how_far_it_stands():
         solve(stack(0.3, direction=-1.0))
 
 
-def arc(gap):
+def arc(gap, sliding):
     """A ring's lower part, free to move in every way, over a block; pushed down from its bore."""
 
     def to_ring(p):
@@ -91,14 +91,15 @@ def arc(gap):
     base = block("base", np.linspace(-6.0, 6.0, 25), np.linspace(-6.0, 0.0, 13),
                  supports={"bottom": "xy"})  # fmt: skip
     pair = ContactPair(
-        slave=("ring", "right"), master=("base", "top"), friction=0.3, sliding="finite"
+        slave=("ring", "right"), master=("base", "top"), friction=0.3, sliding=sliding
     )
     return Model(bodies=(ring, base), contacts=(pair,))
 
 
+@pytest.mark.parametrize("sliding", ["small", "finite"])
 @pytest.mark.parametrize("gap", [0.0, 1e-3, 0.5])
-def test_a_body_on_one_point_is_held_by_its_friction(gap):
-    solution = solve(arc(gap))
+def test_a_body_on_one_point_is_held_by_its_friction(gap, sliding):
+    solution = solve(arc(gap, sliding), control=CONTROL)
     push = 50.0 * 2 * 2.0 * math.sin(1.2)  # pressure times the width of the bore's chord
     assert solution.loaded.state.contacts[0].normal.sum() == pytest.approx(push, rel=1e-3)
     assert solution.audit().passed
