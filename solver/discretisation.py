@@ -133,6 +133,11 @@ class Discretisation(Part):
         contact = [surface.dofs for surface in surfaces]
         return Operators(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
 
+    @property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volume of the points (n_points,) [mm3]."""
+        return self.weights.ravel()
+
     def external(self, load: float) -> NDArray[np.float64]:
         """Return the external nodal forces (n,) at a load factor or time [N]."""
         if self.body.travelling is None:

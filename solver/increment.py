@@ -109,7 +109,7 @@ class Increment:
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
             if balanced and candidates.beyond >= 0:
-                return self._commit(u, responses, candidates, scale, iteration)
+                return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             blends = _BLENDS[-1:] if elastic_first else _BLENDS
             step = self._step(residuals, responses, candidates, blends)
@@ -250,6 +250,7 @@ class Increment:
         self,
         u: Vectors,
         responses: tuple[Response, ...],
+        residuals: Vectors,
         candidates: Candidates,
         scale: float,
         iterations: int,
@@ -261,7 +262,12 @@ class Increment:
                 self.system.parts, self.start.plastic, responses, strict=True
             )
         ]
+        inner = on_parts(self.system, candidates, candidates.forces)
+        held = zip(self.system.parts, residuals, inner, strict=True)
         return Converged(
+            start=self.start,
+            forces=tuple(part.external(self.load) - r - c for part, r, c in held),
+            contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
             state=State(self.load, u, tuple(r.state for r in responses), contacts, scale),

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from solver.energy import Energy
 from solver.errors import SolverError
 from solver.flow import Flow
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from solver.constitutive import Response
     from solver.state import State
 
@@ -31,15 +35,27 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Converged:
-    """A converged increment.
+    """A converged increment, from ``start`` to ``state``.
 
-    ``iterations`` of Newton; ``elastic`` when no point yielded; ``plastic_work`` of the increment
-    [N mm] and the least ``dissipation`` at a point [N mm/mm3]; ``pivoted`` and ``blended`` count
-    the iterations whose inner problem needed the fallback or a blended tangent; ``strayed`` says
-    where contact has come to the end of a surface that goes on, empty where it has not.
+    Attributes
+    ----------
+    forces : on each part, in balance with contact: loads, and what supports and prescribed
+        motions exert [N]
+    responses : of each part at its points
+    iterations : of Newton
+    elastic : whether no point yielded
+    plastic_work : of the increment [N mm]
+    dissipation : least at a point [N mm/mm3]
+    contact_work : work of friction, and against contact, in the increment [N mm]
+    pivoted, blended : iterations whose inner problem needed the fallback or a blended tangent
+    strayed : where contact has come to the end of a surface that goes on; empty where it has not
+    energy : work along the path so far
     """
 
+    start: State
     state: State
+    forces: tuple[NDArray[np.float64], ...]
+    contact_work: tuple[float, float]
     responses: tuple[Response, ...]
     iterations: int
     elastic: bool
@@ -48,6 +64,7 @@ class Converged:
     pivoted: int
     blended: int
     strayed: str = ""
+    energy: Energy = field(default_factory=Energy)
 
 
 class Yielded(SolverError):

@@ -23,6 +23,11 @@ class Part:
     body: Body
     load: NDArray[np.float64]
 
+    @property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volume of the points (n_points,) [mm3]; a part without points has none."""
+        return np.zeros(0)
+
     def start(self) -> NDArray[np.float64]:
         """Return the unknowns (n,) before anything happens."""
         return np.zeros(self.n)

@@ -102,6 +102,7 @@ class Path:
             return None
         if converged.strayed:  # stepping tells at which load
             return None
+        converged = self._stepper.worked(start.now, converged)
         self._stepper.report(load, f"load {load:.4g}: elastic")
         tally = self._stepper.timed(start.tally.plus(converged))
         return Branch(load=load, tally=tally, loaded=converged, unloaded=start.now)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from solver.audit import Audit, audit, contact_pressure
+from solver.audit import Audit, audit
+from solver.contact.pressure import contact_pressure
 from solver.errors import ModelError
 from solver.fields import recovery
 from solver.kinematics import to_tensor

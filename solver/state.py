@@ -23,7 +23,7 @@ class ContactState:
     surface's tangent; ``status`` as in `solver.contact.complementarity`; ``touching`` tells
     whether the vertex had contact, so that its friction has a history. ``approach`` (3, n) is
     the gap [mm], and the rates of gap and slip with the load in the last increment, NaN where
-    not known.
+    not known; ``gap`` (n,) is the gap whether near contact or not, inf where nothing faces.
     """
 
     normal: NDArray[np.float64]
@@ -31,6 +31,7 @@ class ContactState:
     status: NDArray[np.int64]
     touching: NDArray[np.bool_]
     approach: NDArray[np.float64]
+    gap: NDArray[np.float64]
 
     @classmethod
     def at_rest(cls, gap: NDArray[np.float64], touching: NDArray[np.bool_]) -> ContactState:
@@ -38,7 +39,7 @@ class ContactState:
         n = len(touching)
         status = np.where(touching, STICK, OPEN)
         approach = np.stack([gap, np.full(n, np.nan), np.full(n, np.nan)])
-        return cls(np.zeros(n), np.zeros(n), status, touching, approach)
+        return cls(np.zeros(n), np.zeros(n), status, touching, approach, gap)
 
     def halted(self) -> ContactState:
         """Return the state where another motion begins: rates so far mean nothing."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.energy import Energy, stored_energy
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.increment import Increment
 from solver.outcome import Converged, IncrementFailed, Tolerances
@@ -127,7 +128,8 @@ class Stepper:
     def rest(self, state: State) -> Point:
         """Return the first point of a path: a state without contact forces at load zero."""
         at_rest = Increment(self.system, state, state.load, contact=False).solve()
-        return Point(replace(at_rest, state=state), None, Tally())
+        energy = Energy(stored=stored_energy(self.system.parts, at_rest.responses))
+        return Point(replace(at_rest, state=state, energy=energy), None, Tally())
 
     def together(self, state: State) -> Point:
         """Return the first point of a path, overlapping bodies having pushed each other apart.
@@ -144,6 +146,7 @@ class Stepper:
         except IncrementFailed as failure:
             error = NotConverged(f"the overlap of the bodies could not be resolved: {failure}")
             raise Stopped(error, replace(point, tally=self.timed(point.tally))) from failure
+        pushed = self.worked(point.now, pushed)
         return Point(pushed, None, self.timed(point.tally.plus(pushed)))
 
     def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
@@ -173,12 +176,17 @@ class Stepper:
                 if abs(step) < least * (1 - ROUNDING):
                     raise Stopped(self._ended(failure, state.load, load), point) from failure
                 continue
+            converged = self.worked(point.now, converged)
             point = Point(converged, state, self.timed(point.tally.plus(converged)))
             if converged.strayed:
                 error = NotConverged(f"{self._place(load)}: {converged.strayed}", state.load, load)
                 raise Stopped(error, point)
             self.report(load, f"load {load:.4g}: {converged.iterations} iterations")
         return point
+
+    def worked(self, before: Converged, now: Converged) -> Converged:
+        """Return an increment with the work along its path up to there."""
+        return replace(now, energy=before.energy.after(self.system.parts, before, now))
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
         way = f"between {self._place(reached)} and {self._place(attempted)}"

@@ -125,6 +125,12 @@ class Substructure(Part):
         del before, response
         return 0.0, 0.0
 
+    def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the nodal forces (n,) of the whole body for those of this part [N]."""
+        whole = np.zeros(self.whole.n)
+        whole[self._condensed.kept] = force[: len(self._condensed.kept)]
+        return whole
+
     def expand(self, u: NDArray[np.float64], load: float) -> NDArray[np.float64]:
         """Return the displacements of the whole body [mm]."""
         return self._condensed.expand(u, load, self.whole.n)[self.whole.copied]

@@ -130,11 +130,25 @@ QUANTITIES: Mapping[str, Quantity] = {
     "cpu_seconds": Quantity("processor time", "s"),
     "degrees_of_freedom": Quantity("degrees of freedom", count=True),
     "audit_residual": Quantity("force out of balance / largest force"),
-    "audit_overlap": Quantity("largest overlap of the bodies", "mm"),
-    "audit_closed_gap": Quantity("largest gap where the bodies touch", "mm"),
+    "audit_reactions": Quantity("loads, contact and reactions of a body out of balance / force"),
+    "audit_action_reaction": Quantity(
+        "contact force less what the stress of either body holds / contact force"
+    ),
+    "audit_law": Quantity("stress off the material law, stated anew / yield stress"),
+    "audit_increment_error": Quantity(
+        "change of stress that eight steps for one make in the last increment / yield stress"
+    ),
+    "audit_overlap": Quantity("largest overlap of the deformed bodies", "mm"),
+    "audit_closed_gap": Quantity("mean gap or overlap where the deformed bodies press", "mm"),
+    "audit_slip": Quantity("friction work that slip lacks / friction work"),
+    "audit_energy": Quantity("work of the loads not found again / work"),
     "audit_tension": Quantity("largest tensile contact force", "N"),
     "audit_friction_excess": Quantity("largest tangential force beyond friction", "N"),
     "audit_surface_shear": Quantity("largest contact shear / shear yield stress"),
+    "audit_friction_over_strength": Quantity(
+        "friction times contact pressure / shear yield stress: above 1 the surface shears instead "
+        "of slipping"
+    ),
     "audit_yield": Quantity("largest stress beyond the yield surface / yield stress"),
     "audit_dissipation": Quantity(
         "smallest plastic dissipation of an increment in a unit of volume", "MPa"

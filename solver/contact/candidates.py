@@ -47,6 +47,7 @@ class Candidates:
     status : (n,) of the current iterate
     rows : one a part, None for a part without contact surface
     covered : for each interface, the share of the hats of its candidates that faces the master
+    gaps : for each interface, the gap of all of its vertices, inf where nothing faces [mm]
     beyond : smallest gap of the vertices that are not candidates [mm]
     """
 
@@ -59,6 +60,7 @@ class Candidates:
     status: NDArray[np.int64]
     rows: tuple[Rows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
+    gaps: tuple[NDArray[np.float64], ...]
     beyond: float
 
     @property
@@ -106,6 +108,27 @@ class Candidates:
             worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
         return worst
 
+    def work(self, before: tuple[ContactState, ...]) -> tuple[float, float]:
+        """Return the work of friction and of the bodies against contact in an increment [N mm].
+
+        By the mean of the forces before and now. Contact takes no work but where vertices open or
+        close on the way, and that only as far as the mean is not the path.
+        """
+        normal, friction, at = 0.0, 0.0, 0
+        for state, vertices, gap in zip(before, self.vertices, self.gaps, strict=True):
+            here = slice(at, at + len(vertices))
+            at += len(vertices)
+            force = state.normal.copy()
+            force[vertices] += self.forces[: self.n][here]
+            moved = force > 0
+            with np.errstate(invalid="ignore"):
+                opened = np.nan_to_num(gap - state.gap, posinf=0.0, neginf=0.0)
+            normal -= float(force[moved] @ opened[moved]) / 2
+            if len(self.motion) > self.n:
+                shear = state.tangential[vertices] + self.forces[self.n :][here]
+                friction -= float(shear @ self.motion[self.n :][here]) / 2
+        return friction, normal
+
     def states(
         self,
         before: tuple[ContactState, ...],
@@ -131,7 +154,7 @@ class Candidates:
         out, at = [], 0
         rate = 1 / span if span else np.nan
         after = self.states(before, self.forces, self.status)
-        for old, new, vertices in zip(before, after, self.vertices, strict=True):
+        for old, new, vertices, gap in zip(before, after, self.vertices, self.gaps, strict=True):
             here = slice(at, at + len(vertices))
             at += len(vertices)
             approach = np.full_like(old.approach, np.nan)
@@ -139,7 +162,8 @@ class Candidates:
             approach[1] = (approach[0] - old.approach[0]) * rate
             if len(self.motion) > self.n:
                 approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] * rate
-            out.append(replace(new, touching=new.status != OPEN, approach=approach))
+            touching = new.status != OPEN
+            out.append(replace(new, touching=touching, approach=approach, gap=gap))
         return tuple(out)
 
 
@@ -149,8 +173,9 @@ def no_candidates(system: System) -> Candidates:
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
     covered = tuple(empty for _ in system.interfaces)
+    gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     status = empty.astype(int)
-    return Candidates(none, empty, empty, empty, empty, empty, status, rows, covered, np.inf)
+    return Candidates(none, empty, empty, empty, empty, empty, status, rows, covered, gaps, np.inf)
 
 
 def find_candidates(
@@ -220,6 +245,7 @@ def find_candidates(
         status=gather("status").astype(np.int64),
         rows=tuple(_join(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
+        gaps=tuple(p.gap for p in pairings),
         beyond=float(beyond),
     )
 

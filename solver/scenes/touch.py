@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from solver.audit import contact_pressure
+from solver.contact.pressure import contact_pressure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,9 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import PathControl, solve
+from solver import Body, ContactPair, Material, Model, PathControl, solve
 from solver.audit import audit
+from solver.audit.law import increment_error, law_error, of_state
+from solver.constitutive import PlasticState, respond
+from solver.kinematics import to_tensor
+from solver.mesh import grid, mapped
 from solver.scenes.punch import PunchParameters, model
+from tests.verification.bodies import block
 
 
 @pytest.fixture(scope="module")
@@ -52,4 +57,110 @@ def test_a_body_that_sinks_into_the_other_is_noticed(solution):
     state = solution.loaded.state
     u = tuple(ui + (0.01 if k == 1 else 0.0) for k, ui in enumerate(state.u))
     check = judged(solution, replace(solution.loaded, state=replace(state, u=u)))
-    assert any("audit_overlap" in text for text in check.violations)
+    assert any("audit_closed_gap" in text for text in check.violations)
+
+
+# -- contact on the deformed bodies --------------------------------------------------------------
+
+
+def hump(sliding):
+    """A soft block, held at its top and pushed sideways, over a steel hump of radius 10 mm."""
+
+    def arc(p):
+        return np.stack([p[0], p[1] - (10 - np.sqrt(100 - p[0] ** 2)) * (p[1] + 6) / 6])
+
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3)
+    base = Body(name="hump", mesh=mapped(grid(np.linspace(-8, 8, 33), np.linspace(-6, 0, 9)), arc),
+                material=steel, supports={"bottom": "xy"})  # fmt: skip
+    soft = block("soft", np.linspace(-3, 3, 13), np.linspace(-0.02, 8, 9),
+                 material=Material(youngs_modulus=10.0, poisson_ratio=0.3),
+                 supports={"top": "xy"}, pressure={"left": 2.0})  # fmt: skip
+    pair = ContactPair(slave=("soft", "bottom"), master=("hump", "top"), sliding=sliding)
+    return Model(bodies=(soft, base), contacts=(pair,))
+
+
+def test_small_sliding_that_moves_far_is_noticed():
+    """The pairing at rest holds the block up where the hump has fallen away under it."""
+    solution = solve(hump("small"), control=PathControl(load_step=0.25))
+    moved = solution.displacement("soft", "loaded")[0].max()
+    assert moved > 3.0
+    check = solution.audit()
+    assert [text.split(" = ")[0] for text in check.violations] == ["audit_closed_gap"]
+    assert check.figures["audit_closed_gap"] > 0.2
+
+
+def test_finite_sliding_follows_the_bodies():
+    solution = solve(hump("finite"), load=0.5, control=PathControl(load_step=0.05))
+    assert solution.displacement("soft", "loaded")[0].max() > 3.0
+    check = solution.audit()
+    assert check.passed, check.violations
+    assert check.figures["audit_closed_gap"] < 1e-4
+
+
+# -- the law, stated -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+@pytest.mark.parametrize("hardening", ["none", "isotropic", "kinematic", "mixed"])
+def test_return_mapping_obeys_the_stated_law(kinematics, hardening):
+    material = Material(
+        youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0, hardening=hardening,
+        hardening_ratio=0.02,
+    )  # fmt: skip
+    rng = np.random.default_rng(7)
+    state = PlasticState.virgin(500)
+    for _ in range(3):
+        strain = rng.normal(scale=3e-3, size=(4, 500))
+        if kinematics == "plane_strain":
+            strain[2] = 0.0
+        found = respond(strain, state, material, kinematics)
+        assert found.yielding.any()
+        stress, total = to_tensor(found.stress), to_tensor(strain)
+        before, after = of_state(state), of_state(found.state)
+        assert law_error(total, stress, before, after, material, kinematics) < 1e-11
+        more = (after[0], 1.01 * after[1])
+        assert law_error(total, stress, before, more, material, kinematics) > 1e-5
+        state = found.state
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
+def test_the_error_of_an_increment_falls_with_its_size(kinematics):
+    """Stress turns along the way: one step of backward Euler is of first order."""
+    material = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+    start = np.array([[3e-3], [-1e-3], [0.0], [0.0]])
+    state = respond(start, PlasticState.virgin(1), material, kinematics).state
+    errors = []
+    for size in (1e-3, 5e-4, 2.5e-4):
+        strain = start + np.array([[0.0], [0.0], [0.0], [size]])
+        stress = to_tensor(respond(strain, state, material, kinematics).stress)
+        strains = (to_tensor(start), to_tensor(strain))
+        errors.append(increment_error(strains, stress, of_state(state), material, kinematics))
+    assert errors[0] > 1e-3
+    assert errors[0] > 1.5 * errors[1] > 2.25 * errors[2]
+
+
+def test_a_proportional_increment_has_no_error():
+    material = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+    strain = np.array([[4e-3], [-4e-3], [0.0], [0.0]])
+    state = PlasticState.virgin(1)
+    stress = to_tensor(respond(strain, state, material, "plane_strain").stress)
+    strains = (np.zeros((4, 1)), to_tensor(strain))
+    assert increment_error(strains, stress, of_state(state), material, "plane_strain") < 1e-12
+
+
+# -- work ------------------------------------------------------------------------------------------
+
+
+def test_the_work_of_the_loads_is_found_again(solution):
+    energy = solution.loaded.energy
+    assert energy.external > 0
+    assert energy.plastic > 0
+    assert energy.friction > 0
+    assert judged(solution, solution.loaded).figures["audit_energy"] < 1e-9
+
+
+def test_lost_work_is_noticed(solution):
+    energy = solution.loaded.energy
+    short = replace(energy, plastic=0.9 * energy.plastic)
+    check = judged(solution, replace(solution.loaded, energy=short))
+    assert any("audit_energy" in text for text in check.violations)

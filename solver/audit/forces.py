@@ -1,0 +1,122 @@
+"""Whether forces balance: at every node, between the bodies, and with what is applied."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.audit.surfaces import deformed
+from solver.contact.candidates import find_candidates
+from solver.substructure import Substructure
+from solver.wheel import Wheel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.audit.bodies import AuditedBody
+    from solver.audit.pairs import AuditedPair
+    from solver.outcome import Converged
+    from solver.system import System
+
+    Array = NDArray[np.float64]
+
+
+def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
+    """Return the nodal forces (n_nodes, 2) of contact on each whole body, in its own frame [N]."""
+    state = converged.state
+    candidates = find_candidates(system, state, state.u, state.contacts)
+    out = {}
+    for i, (body, part) in enumerate(zip(system.model.bodies, system.parts, strict=True)):
+        force = candidates.on_part(i, candidates.forces, part.n)
+        whole = part.on_whole(force) if isinstance(part, Substructure) else force
+        out[body.name] = whole.reshape(-1, 2)
+    return out
+
+
+def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converged) -> float:
+    """Return external, internal and contact forces out of balance over the force level."""
+    contact = _on_bodies(system, converged)
+    square = 0.0
+    for body in bodies:
+        left = body.imbalance(converged, contact[body.name])
+        square += float((left[body.free] ** 2).sum())
+    return float(np.sqrt(square)) / (converged.state.force_scale or 1.0)
+
+
+def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the nodal forces (n_nodes, 2) the pairs exert on a body, in space, and its nodes."""
+    whole = body.plain.part
+    force = np.zeros((whole.X.shape[1], 2))
+    for pair in pairs:
+        surfaces, touching = pair.surfaces, pair.touching
+        for (name, _), chain, nodal in (
+            (surfaces.pair.slave, surfaces.slave, touching.on_slave),
+            (surfaces.pair.master, surfaces.master, touching.on_master),
+        ):
+            if name == body.name:
+                np.add.at(force, chain.nodes, nodal)
+    return force, (force != 0).any(axis=1)
+
+
+def action_reaction(
+    system: System,
+    bodies: Sequence[AuditedBody],
+    pairs: Sequence[AuditedPair],
+    converged: Converged,
+) -> float:
+    """Return how much the forces that bodies feel at their surfaces differ from the contact forces.
+
+    What a body feels is what its stress holds at the nodes of its contact surfaces. Resultant and
+    moment are compared on either side of every pair, so that both sides feel one and the same; the
+    figure is over the sum of normal forces (and the length of the contact).
+    """
+    level = sum(float(np.maximum(pair.normal, 0.0).sum()) for pair in pairs)
+    if level == 0.0:
+        return 0.0
+    turning = any(pair.surfaces.pair.sliding == "finite" for pair in pairs)
+    worst = 0.0
+    for body in bodies:
+        expected, nodes = _of_pairs(body, pairs)
+        if not nodes.any():
+            continue
+        x, Q = deformed(system, body.name, converged.state)
+        felt = -body.imbalance(converged, np.zeros_like(expected)) @ Q.T
+        miss = np.where(body.held, 0.0, felt - expected)[nodes]
+        x = x if turning else body.plain.part.X
+        arm = x[:, nodes].T - x[:, nodes].mean(axis=1)
+        size = float(np.abs(arm).max()) or 1.0
+        moment = float((arm[:, 0] * miss[:, 1] - arm[:, 1] * miss[:, 0]).sum()) / size
+        worst = max(worst, float(np.abs(miss.sum(axis=0)).max()), abs(moment))
+    return worst / level
+
+
+def reactions(
+    system: System,
+    bodies: Sequence[AuditedBody],
+    pairs: Sequence[AuditedPair],
+    converged: Converged,
+) -> float:
+    """Return how far loads, contact and reactions of a body are from balance, over the force level.
+
+    Pressures count by the shape of their boundary, the load of a wheel by its program; reactions
+    are what the stress exerts where supports hold.
+    """
+    load = converged.state.load
+    worst = 0.0
+    for body in bodies:
+        part = system.parts[system.part(body.name)]
+        contact, _ = _of_pairs(body, pairs)
+        total = contact.sum(axis=0)
+        if isinstance(part, Wheel):
+            # the advance is prescribed: what it takes along x is not known beforehand
+            total = np.array([0.0, total[1] - part.program.at(load, "force")])
+        else:
+            left = body.imbalance(converged, contact)
+            total = total + body.applied(load)[:2] - np.where(body.held, left, 0.0).sum(axis=0)
+            if body.plain.body.state == "axisymmetric":
+                total[0] = 0.0  # radial forces balance round the axis
+        worst = max(worst, float(np.abs(total).max()))
+    return worst / (converged.state.force_scale or 1.0)

@@ -1,0 +1,108 @@
+"""What each contact pair must satisfy, measured on the deformed bodies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.audit.surfaces import Surfaces
+from solver.model import effective_friction
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.audit.surfaces import Touching
+    from solver.model import ContactPair
+    from solver.outcome import Converged
+    from solver.system import System
+
+    Array = NDArray[np.float64]
+
+_STILL = 1e-3
+"""Slip below this part of the elastic approach is none."""
+
+
+class AuditedPair:
+    """A contact pair in a converged increment.
+
+    Attributes
+    ----------
+    touching : gaps, slips and nodal forces, from the bodies
+    normal, tangential : the contact forces (n,) of the state [N]
+    """
+
+    def __init__(self, system: System, number: int, converged: Converged) -> None:
+        self._system = system
+        self._pair: ContactPair = system.model.contacts[number]
+        contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
+        self.normal, self.tangential = contact.normal, contact.tangential
+        self.surfaces = Surfaces(system, self._pair)
+        self.touching: Touching = self.surfaces.touching(
+            converged.state, converged.start, self.normal, self.tangential
+        )
+
+    @property
+    def _closed(self) -> NDArray[np.bool_]:
+        return self.normal > 0
+
+    @property
+    def approach(self) -> float:
+        """How far contact presses the bodies into each other elastically [mm].
+
+        The peak pressure over the contact modulus E*, times the width of the contact.
+        """
+        closed, area = self._closed & (self.touching.area > 0), self.touching.area
+        if not closed.any():
+            return 0.0
+        compliance = 0.0
+        for name, _ in (self._pair.slave, self._pair.master):
+            material = self._system.model.body(name).material
+            compliance += (1 - material.poisson_ratio**2) / material.youngs_modulus
+        pressure = float((self.normal[closed] / area[closed]).max())
+        return pressure * compliance * float(self.touching.edge[closed].sum())
+
+    @property
+    def _bound(self) -> Array:
+        mu = effective_friction(self._pair.friction)
+        strength = min(
+            self._system.model.body(name).material.shear_yield_stress
+            for name, _ in (self._pair.slave, self._pair.master)
+        )
+        limit = np.full(len(self.normal), np.inf)
+        if np.isfinite(self._pair.shear_limit):
+            limit = self._pair.shear_limit * strength * self.touching.area
+        return np.minimum(mu * np.maximum(self.normal, 0.0), limit)
+
+    def figures(self) -> dict[str, float]:
+        """Return the figures of the pair; lengths in mm, forces in N."""
+        gap = np.nan_to_num(self.touching.gap)
+        closed = self._closed
+        whole = float(self.normal[closed].sum()) or 1.0
+        # a vertex that bodies overlap at must be one that contact knows of
+        overlap = np.where(closed, 0.0, np.maximum(-gap, 0.0))
+        return {
+            "audit_overlap": float(np.maximum(-gap, 0.0).max(initial=0.0)),
+            "audit_closed_gap": float(np.abs(gap[closed]) @ self.normal[closed]) / whole,
+            "audit_tension": max(0.0, -float(self.normal.min(initial=0.0))),
+            "audit_friction_excess": float(
+                (np.abs(self.tangential) - self._bound).max(initial=0.0)
+            ),
+            "audit_slip": self._wrong_slip(),
+            "open": float(overlap.max(initial=0.0)),
+        }
+
+    def _wrong_slip(self) -> float:
+        """Return the friction work that slip lacks over the work it should do.
+
+        Slip against a shear below its bound, or along it, is wrong: nothing may slip before the
+        bound is reached, and friction opposes what slips. Vertices new in contact are left out.
+        """
+        judged = self._closed & self._start.touching & (self.touching.area > 0)
+        bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
+        least = _STILL * self.approach
+        should = float(bound @ np.maximum(np.abs(slip), least))
+        if should == 0.0:
+            return 0.0
+        does = -float(self.tangential[judged] @ slip)
+        return (float(bound @ np.abs(slip)) - does) / should

@@ -1,0 +1,298 @@
+"""Faults put into the solver on purpose, one at a time, which the audit must notice.
+
+Each takes a `pytest.MonkeyPatch` and stays in force for the whole run, its audit included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import solver.increment
+import solver.step
+import solver.stepper
+import solver.system
+from solver import discretisation, kinematics, substructure
+from solver.constitutive import PlasticState
+from solver.contact import candidates, complementarity
+from solver.contact.complementarity import OPEN, STICK, ContactSolution
+from solver.discretisation import Discretisation
+from solver.model import effective_friction
+from solver.outcome import Tolerances
+from solver.wheel import Wheel
+
+Patch = pytest.MonkeyPatch
+Fault = Callable[[Patch], None]
+
+PUNCH: dict[str, Any] = {
+    "smallest_element": 0.02, "growth": 2.0, "friction": 0.3, "load_ratio": 0.8571,
+    "load_step": 0.1, "hardening": "isotropic",
+}  # fmt: skip
+ROLLING: dict[str, Any] = {
+    "element_size": 2.0, "advance_step": 2.0, "track": 12.0, "traction": 0.5, "press_steps": 4,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mutation:
+    """A fault, the scene that has it, and the condition it breaks (one of several, if so)."""
+
+    fault: Fault
+    breaks: tuple[str, ...]
+    scene: str = "punch"
+    parameters: dict[str, Any] | None = None
+
+
+# -- friction and contact ----------------------------------------------------------------------
+
+
+def friction_times(factor: float) -> Fault:
+    def fault(patch: Patch) -> None:
+        patch.setattr(
+            solver.system, "effective_friction", lambda mu: factor * effective_friction(mu)
+        )
+
+    return fault
+
+
+def motion_offset(gap: float = 0.0, slip: float = 0.0) -> Fault:
+    find = candidates.find_candidates
+
+    def shifted(*args: Any) -> Any:
+        found = find(*args)
+        offset = np.concatenate([np.full(found.n, gap), np.full(len(found.motion) - found.n, slip)])
+        return replace(found, motion=found.motion + offset)
+
+    def fault(patch: Patch) -> None:
+        patch.setattr(solver.increment, "find_candidates", shifted)
+
+    return fault
+
+
+def half_tangential_rows(patch: Patch) -> None:
+    pair = solver.system.pair
+
+    def halved(*args: Any) -> Any:
+        found = pair(*args)
+        return replace(found, tangent=tuple(side / 2 for side in found.tangent))
+
+    patch.setattr(solver.system, "pair", halved)
+
+
+def less_on_the_master(normal: float, tangential: float) -> Fault:
+    """The master's part of the contact forces is multiplied by these factors."""
+    on_part = candidates.Candidates.on_part
+
+    def lessened(self: Any, part: int, forces: Any, size: int) -> Any:
+        if part == MASTER:
+            factor = np.full(len(forces), tangential)
+            factor[: self.n] = normal
+            forces = factor * forces
+        return on_part(self, part, forces, size)
+
+    def fault(patch: Patch) -> None:
+        patch.setattr(candidates.Candidates, "on_part", lessened)
+
+    return fault
+
+
+MASTER = 1
+
+
+def glue(patch: Patch) -> None:
+    """What has touched once never opens again."""
+
+    def glued(problem: Any, start: Any) -> ContactSolution | None:
+        found = complementarity.solve_contact(problem, start)
+        if found is None:
+            return None
+        status = np.where((found.status != OPEN) | (start != OPEN), STICK, OPEN)
+        forces = complementarity._forces(problem, status, np.zeros(problem.n, dtype=bool))
+        return None if forces is None else ContactSolution(*forces, status, False)
+
+    patch.setattr(solver.step, "solve_contact", glued)
+    patch.setattr(candidates.Candidates, "violation", lambda self, stiffness: 0.0)
+
+
+def overlooked_contact(patch: Patch) -> None:
+    """Every third vertex never comes near anything."""
+    near, find = candidates._near, candidates.find_candidates
+
+    def some(*args: Any) -> Any:
+        found = near(*args)
+        return found[found % 3 != 1]
+
+    patch.setattr(candidates, "_near", some)
+    patch.setattr(
+        solver.increment, "find_candidates", lambda *args: replace(find(*args), beyond=np.inf)
+    )
+
+
+def master_stands_still(patch: Patch) -> None:
+    """Gaps do not see the master move."""
+    pairing = solver.system.Interface.pairing
+
+    def still(self: Any, u: Any) -> Any:
+        number = self.sides[1][0]
+        return pairing(self, tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u)))
+
+    patch.setattr(solver.system.Interface, "pairing", still)
+
+
+# -- the law -----------------------------------------------------------------------------------
+
+
+def other_material(**changes: float) -> Fault:
+    respond = discretisation.respond
+
+    def with_other(strain: Any, state: Any, material: Any, kind: str) -> Any:
+        fields = {name: factor * getattr(material, name) for name, factor in changes.items()}
+        return respond(strain, state, replace(material, **fields), kind)
+
+    def fault(patch: Patch) -> None:
+        patch.setattr(discretisation, "respond", with_other)
+
+    return fault
+
+
+def more_flow(patch: Patch) -> None:
+    respond = discretisation.respond
+
+    def flowing(strain: Any, state: Any, material: Any, kind: str) -> Any:
+        found = respond(strain, state, material, kind)
+        plastic = state.plastic_strain + 1.3 * (found.state.plastic_strain - state.plastic_strain)
+        return found._replace(state=PlasticState(plastic, found.state.accumulated))
+
+    patch.setattr(discretisation, "respond", flowing)
+
+
+def forgotten_flow(patch: Patch) -> None:
+    """One increment begins as if nothing had yielded before."""
+    advance = solver.stepper.Stepper.advance
+
+    def forgetful(self: Any, point: Any, target: float, **options: Any) -> Any:
+        point = advance(self, point, target, **options)
+        if not 0.75 < target < 0.85:
+            return point
+        state = point.now.state
+        virgin = tuple(PlasticState.virgin(p.accumulated.size) for p in state.plastic)
+        return replace(point, now=replace(point.now, state=replace(state, plastic=virgin)))
+
+    patch.setattr(solver.stepper.Stepper, "advance", forgetful)
+
+
+def no_hoop_strain(patch: Patch) -> None:
+    operator = kinematics.strain_operator
+    patch.setattr(
+        kinematics, "strain_operator", lambda v, g, r, state: operator(v, g, r, "plane_strain")
+    )
+
+
+# -- bodies and loads --------------------------------------------------------------------------
+
+
+def heavier_points(patch: Patch) -> None:
+    """Points stand for more volume than they have."""
+    build = Discretisation.__init__
+
+    def heavier(self: Any, body: Any) -> None:
+        build(self, body)
+        self.weights = 1.1 * self.weights
+
+    patch.setattr(Discretisation, "__init__", heavier)
+
+
+def loads_times(kind: type, factor: float) -> Fault:
+    external = kind.external  # type: ignore[attr-defined]
+
+    def fault(patch: Patch) -> None:
+        patch.setattr(kind, "external", lambda self, load: factor * external(self, load))
+
+    return fault
+
+
+def one_support_more(patch: Patch) -> None:
+    """A side of the half-plane nobody named is held."""
+    hold = Discretisation._hold
+
+    def held(self: Any) -> None:
+        declared = self.body
+        if declared.name == "half_plane":
+            self.body = replace(declared, supports={**declared.supports, "right": "x"})
+        hold(self)
+        self.body = declared
+
+    patch.setattr(Discretisation, "_hold", held)
+
+
+def soft_condensation(patch: Patch) -> None:
+    build = substructure._Condensed.__init__
+
+    def softer(self: Any, *args: Any) -> None:
+        build(self, *args)
+        self.stiffness = 0.9 * self.stiffness
+
+    patch.setattr(substructure._Condensed, "__init__", softer)
+    patch.setattr(substructure, "_CACHE", type(substructure._CACHE)())
+
+
+def hasty_release(patch: Patch) -> None:
+    """The last increment is taken as converged as soon as it is begun."""
+    build = solver.increment.Increment.__init__
+
+    def hasty(self: Any, *args: Any, **options: Any) -> None:
+        build(self, *args, **options)
+        if not self.contact and self.start.force_scale > 0:
+            self.tolerances = Tolerances(residual=1.0)
+
+    patch.setattr(solver.increment.Increment, "__init__", hasty)
+
+
+MUTATIONS: dict[str, Mutation] = {
+    "friction ignored": Mutation(fault=friction_times(0.0), breaks=("slip",)),
+    "friction halved": Mutation(fault=friction_times(0.5), breaks=("slip",)),
+    "slip offset by 2 um": Mutation(fault=motion_offset(slip=2e-3), breaks=("slip",)),
+    "stress from 0.7 E": Mutation(fault=other_material(youngs_modulus=0.7), breaks=("law",)),
+    "plastic flow times 1.3": Mutation(fault=more_flow, breaks=("law",)),
+    "gap plus 1 um": Mutation(fault=motion_offset(gap=1e-3), breaks=("closed_gap", "overlap")),
+    "tangential rows halved": Mutation(fault=half_tangential_rows, breaks=("action_reaction",)),
+    "friction without reaction": Mutation(
+        fault=less_on_the_master(1.0, 0.0), breaks=("action_reaction",)
+    ),
+    "a tenth of the pressure lost": Mutation(
+        fault=less_on_the_master(0.9, 1.0), breaks=("action_reaction",)
+    ),
+    "friction beyond its bound": Mutation(fault=friction_times(1.1), breaks=("friction_excess",)),
+    "contact that pulls": Mutation(
+        fault=glue, breaks=("tension",), scene="rolling", parameters={"traction": 0.0}
+    ),
+    "every third vertex overlooked": Mutation(fault=overlooked_contact, breaks=("overlap",)),
+    "gaps that do not see the master": Mutation(
+        fault=master_stands_still, breaks=("closed_gap", "overlap")
+    ),
+    "half the back stress": Mutation(
+        fault=other_material(hardening_ratio=0.5),
+        breaks=("law",),
+        parameters={"hardening": "kinematic"},
+    ),
+    "flow forgotten between increments": Mutation(fault=forgotten_flow, breaks=("energy",)),
+    "no hoop strain": Mutation(
+        fault=no_hoop_strain, breaks=("law",), parameters={"state": "axisymmetric"}
+    ),
+    "points of too much volume": Mutation(fault=heavier_points, breaks=("residual",)),
+    "nine tenths of the pressure applied": Mutation(
+        fault=loads_times(Discretisation, 0.9), breaks=("reactions",)
+    ),
+    "nine tenths of the axle's load": Mutation(
+        fault=loads_times(Wheel, 0.9), breaks=("reactions",), scene="rolling"
+    ),
+    "a support too many": Mutation(fault=one_support_more, breaks=("residual",)),
+    "a condensed body too soft": Mutation(
+        fault=soft_condensation, breaks=("residual", "action_reaction"), scene="rolling"
+    ),
+    "release not solved to the end": Mutation(fault=hasty_release, breaks=("residual",)),
+}
