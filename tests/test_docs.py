@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+from studies.quantities import QUANTITIES
 from tests.architecture.sources import PACKAGES, ROOT
 
 PAGES = [
@@ -100,3 +101,9 @@ def test_every_kind_of_block_is_found() -> None:
     assert (program.language, program.text, program.line) == ("python", "x = 1\n", 3)
     assert (server.skipped, command.skipped) == (True, False)
     assert command.programs() == [["-c", COMMAND, "scenes", "punch"]]
+
+
+def test_the_page_of_the_audit_names_every_figure_and_no_other():
+    named = set(re.findall(r"`(audit_\w+)`", (ROOT / "docs/audit.md").read_text()))
+    stored = {name for name in QUANTITIES if name.startswith("audit_")}
+    assert named - {"audit_failed"} == stored
