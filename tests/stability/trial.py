@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from solver import LimitLoad, ModelError, NotConverged
 
-PATIENCE = 30.0
-"""Seconds of CPU after which a scene counts as hanging; the slowest take a few."""
+PATIENCE = 60.0
+"""Seconds of CPU after which a scene counts as hanging; the slowest that fail take 25."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
@@ -175,7 +175,7 @@ def _stopped(scene: Scene, error: NotConverged) -> Verdict:
 def _tells_loads(error: NotConverged) -> bool:
     """Whether the loads between which a path stopped are told, to the digits printed."""
     told = numbers(str(error))
-    return error.reached < error.attempted and all(
+    return error.reached != error.attempted and all(
         any(abs(load - n) <= 1e-5 * load for n in told) for load in (error.reached, error.attempted)
     )
 

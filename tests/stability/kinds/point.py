@@ -23,7 +23,10 @@ YIELDING = Material(
 
 @dataclass(frozen=True, kw_only=True)
 class Tip:
-    """A block, its lower side a cylinder or a wedge of a little slope, pressed on a plate."""
+    """A block, its lower side a cylinder or a wedge of a little slope, pressed on a plate.
+
+    ``held`` holds its top sideways, which makes the problem an easy one.
+    """
 
     round_: bool = True
     pressure: float = 20.0
@@ -32,11 +35,11 @@ class Tip:
     state: str = "plane_strain"
     sliding: str = "small"
     material: Material = STEEL
-    columns: int = 16
+    held: bool = False
 
     def solve(self) -> Solution:
         """Return the solution."""
-        flat = grid(np.linspace(-WIDTH / 2, WIDTH / 2, self.columns + 1), np.linspace(0, 3, 4))
+        flat = grid(np.linspace(-WIDTH / 2, WIDTH / 2, 17), np.linspace(0, 3, 4))
 
         def shaped(p: np.ndarray) -> np.ndarray:
             depth = p[0] ** 2 / 60 if self.round_ else np.abs(p[0]) * 0.02
@@ -47,6 +50,7 @@ class Tip:
             mesh=mapped(flat, shaped),
             material=self.material,
             state=self.state,
+            supports={"top": "x"} if self.held else {},
             pressure={"top": self.pressure} | ({"left": self.push} if self.push else {}),
         )
         plate = Body(

@@ -10,10 +10,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from solver import SCENES, Record, Status, System
+from solver import SCENES, LimitLoad, NotConverged, Record, Status, System, passes
 from solver.scenes import rolling
 from solver.scenes.harvest import End, Harvest
 from solver.scenes.rolling_model import RollingParameters
+from solver.state import State
+from solver.stepper import Point, Stepper, Stopped
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure, Scene, tells
 
@@ -77,13 +79,49 @@ def roll(parameters: RollingParameters) -> Rolled:
             seen.append((self.system, end))
             return super().record(parameters, end)
 
+    last: list[State] = []
+
+    class Stepping(Stepper):
+        def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
+            try:
+                return super().advance(point, target, contact=contact)
+            except Stopped as stopped:
+                last.append(stopped.point.now.state)
+                raise
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rolling, "Harvest", Watched)
+        patch.setattr(passes, "Stepper", Stepping)
         (record,) = SCENES["rolling"].path(parameters, [1], lambda share, message: None)
     ((system, end),) = seen
     if end.error is not None:
-        raise end.error
+        raise _judged(parameters, system, end.error, last[-1])
     return Rolled(parameters=parameters, record=record, system=system, end=end)
+
+
+def _judged(
+    parameters: RollingParameters, system: System, error: NotConverged, last: State
+) -> NotConverged:
+    """Return the error, told as a `LimitLoad` only where no equilibrium is proven to exist.
+
+    The mechanism of a driven wheel is a thin layer under the contact, as wide as it is, that
+    shears: without hardening it bears k times that width (upper bound theorem), and no more
+    traction. Pressed alone, a wheel sinks until the contact is wide enough. A limit of a body
+    that hardens is false, and left as it is.
+    """
+    p = parameters
+    if not isinstance(error, LimitLoad) or p.hardening != "none":
+        return error
+    surface = system.interfaces[0].slave_surface
+    x = surface.X[0, surface.vertices][last.contacts[0].normal > 0]
+    width = float(np.ptp(x)) + p.element_size if len(x) else 0.0
+    driven = min(max(error.attempted - 1.0, 0.0), 1.0)
+    shear = abs(p.traction) * p.friction * p.force * driven
+    borne = p.yield_stress / math.sqrt(3) * width
+    if shear > borne:
+        return error
+    text = f"{error} [traction {shear:.4g} N, a contact {width:.3g} mm wide bears {borne:.4g} N]"
+    return NotConverged(text, error.reached, error.attempted)
 
 
 def judge(rolled: Rolled) -> dict[str, Figure]:
@@ -115,11 +153,10 @@ def judge(rolled: Rolled) -> dict[str, Figure]:
             ),
             f"tension {stage}": Figure(-float(pressure.min()) / pressure.max(), 1e-9),
         }
-        # the fine rim and track end 2.5 half-widths beyond the ends of the way
-        room = 2.5 * p.half_width + (p.track / 2 if stage == "mid_track" else 0.0)
         touching = s[pressure > 0]
-        beyond = float(np.abs(touching).max()) - room
-        figures[f"beyond the rim {stage}"] = Figure(beyond, 0.0)
+        if stage == "loaded":  # the fine rim ends 2.5 half-widths beyond the ends of the way
+            beyond = float(np.abs(touching).max()) - 2.5 * p.half_width
+            figures["beyond the rim loaded"] = Figure(beyond, 0.0)
     # pressure off the middle turns the wheel as well: P e in R F, and e is within the contact
     longitudinal = abs(record.scalars["longitudinal_force"] - way)
     figures["longitudinal force"] = Figure(longitudinal / force, p.half_width / p.radius)
@@ -157,6 +194,8 @@ def _laws(rolled: Rolled) -> dict[str, Figure]:
     assert end.unloaded is not None
     (contact,) = end.loaded.state.contacts
     N, T = contact.normal, contact.tangential
+    surface, p = system.interfaces[0].slave_surface, rolled.parameters
+    touching = np.abs(surface.X[0, surface.vertices])[N > 0]
     laws = [law(system, "half_space", c) for c in (end.loaded, end.unloaded)]
     first, last = (
         system.response("half_space", c).state.accumulated for c in (end.loaded, end.unloaded)
@@ -164,29 +203,16 @@ def _laws(rolled: Rolled) -> dict[str, Figure]:
     largest = max(float(last.max()), 1e-12)
     return {
         **{k: Figure(max(found[k] for found in laws), 1e-7) for k in laws[0]},
-        "force cone": Figure(
-            float((np.abs(T) - rolled.parameters.friction * N).max() / N.sum()), 1e-6
+        "beyond the rim mid_track": Figure(
+            float(touching.max()) - p.track / 2 - 2.5 * p.half_width, 0.0
         ),
+        "force cone": Figure(float((np.abs(T) - p.friction * N).max() / N.sum()), 1e-6),
         "force tension": Figure(-float(N.min()) / float(N.sum()), 0.0),
         "plastic strain shrinks": Figure(float((first - last).max()) / largest, 1e-12),
         "left over": Figure(
             float(max(np.abs(c.normal).max() for c in end.unloaded.state.contacts)), 0.0
         ),
     }
-
-
-def bears(parameters: RollingParameters) -> float:
-    """Return the least share of its load at which a wheel may have no equilibrium, or infinity.
-
-    The track bears a traction of k over a contact as wide as it can be: the fine rim. A driven
-    wheel whose traction is below that, and which hardens or not, may go on.
-    """
-    if parameters.hardening != "none":
-        return math.inf
-    k = parameters.yield_stress / math.sqrt(3)
-    widest = 2 * 2.5 * parameters.half_width
-    shear = abs(parameters.traction) * parameters.friction * parameters.force
-    return 0.0 if shear > k * widest else math.inf
 
 
 off_the_rim = tells("contact", "rim|fine track|beyond")
@@ -208,7 +234,7 @@ def scenes() -> list[Scene]:
             judge=judge,
             refusal=off_the_rim if p.load_ratio >= HEAVY else None,
             honest=off_the_rim if p.load_ratio >= HEAVY else None,
-            safe=bears(p),
+            safe=math.inf if p.hardening != "none" else 0.0,
             in_loads=False,
         )
         for p in made
