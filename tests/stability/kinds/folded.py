@@ -74,8 +74,9 @@ def _inside_out() -> tuple[Mesh, set[int]]:
 
 
 def _flat() -> tuple[Mesh, set[int]]:
-    """Two neighbouring nodes at one place, and two more: the element between has no area."""
-    return _points({_node(2, 1): (1, 1), _node(2, 2): (1, 2)}), {_element(1, 1)}
+    """Two nodes at one place, and two more: no area between, and a side without length beside."""
+    beside = {_element(1, y) for y in (0, 1, 2)}
+    return _points({_node(2, 1): (1, 1), _node(2, 2): (1, 2)}), beside
 
 
 def _folded_triangle() -> tuple[Mesh, set[int]]:

@@ -83,15 +83,16 @@ def _scene(column: Column, judge_: Callable[[Solution], dict[str, Figure]] | Non
 def scenes() -> list[Scene]:
     """Return small overlaps, which have an answer, and big ones, which are refused."""
     base = Column(clamped=True, pressure=0.0)
+    tiny = replace(base, width=5e-6, heights=(4e-6, 6e-6))
     small = [
-        replace(base, overlap=1e-5),
-        replace(base, overlap=1e-3, side=20.0),
+        replace(tiny, overlap=4e-10),
+        replace(base, overlap=1e-3, side=20.0, element="quad4"),
         replace(base, overlap=1e-3, upper=SOFT, lower=SOFT, sliding="finite"),
         replace(base, overlap=1e-2, upper=HARDENING, lower=HARDENING),
-        replace(base, overlap=1e-2, upper=HARDENING, friction=0.0, element="tri6"),
+        replace(base, overlap=1e-2, upper=HARDENING, element="tri6"),
         replace(base, overlap=5e-3, upper=IDEAL, lower=HARDENING, element="quad9"),
         replace(base, overlap=5e-3, upper=IDEAL),
-        replace(base, overlap=2e-3, element="quad4", side=5.0, lower=SOFT),
+        replace(base, overlap=4e-3, upper=IDEAL),
     ]
     big = [
         replace(base, overlap=0.8),

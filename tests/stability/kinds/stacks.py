@@ -163,7 +163,6 @@ def random_stack(number: int, rng: np.random.Generator) -> Stack:
             )
         )
     ideal = any(not m.elastic and m.plastic_modulus == 0 for m in (k.material for k in layers))
-    pads = state != "axisymmetric" and n == 2 and widths[1] > 8 and rng.random() < 0.7
     ratio = rng.uniform(0.2, 0.9) if ideal else float(rng.choice([0.5, 0.98, 1.3, 2.0]))
     friction = float(rng.choice([0.0, 0.05, 0.3, 1.0]))
     return Stack(
@@ -172,15 +171,23 @@ def random_stack(number: int, rng: np.random.Generator) -> Stack:
         state=state,
         friction=friction,
         sliding=str(rng.choice(["small", "small", "finite"])),
-        pads=bool(pads),
         thickness=float(10 ** rng.uniform(-2, 2)),
         steps=int(rng.choice([1, 4, 10])),
     )
 
 
+def _with_pads(stack: Stack) -> Stack:
+    """Return the stack with its first body twice, on others wide enough for both."""
+    first, *others = stack.layers
+    wide = [replace(o, width=12.0 + 2.0 * k, cells=(10, 3)) for k, o in enumerate(others)]
+    return replace(stack, layers=(first, *wide), pads=True)
+
+
 def scenes() -> list[Scene]:
-    """Return the stacks; the last two have the slave below, its ends beyond the master's."""
+    """Return the stacks, some with two bodies side by side, some with the slave below."""
     rng = np.random.default_rng(SEED)
     stacks = [random_stack(number, rng) for number in range(COUNT)]
-    stacks[-2:] = [replace(s, slave_below=True, sliding="small", pads=False) for s in stacks[-2:]]
+    for k in (7, 10, 16, 25):
+        stacks[k] = _with_pads(stacks[k])
+    stacks[-2:] = [replace(s, slave_below=True, sliding="small") for s in stacks[-2:]]
     return [stack.scene() for stack in stacks]
