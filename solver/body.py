@@ -13,6 +13,7 @@ from solver.discretisation import Discretisation
 from solver.elements import element_type
 from solver.errors import ModelError
 from solver.kinematics import STATES, State
+from solver.mesh_check import check_mesh
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -62,24 +63,27 @@ class Body:
             raise ModelError("state", self.state, "must be one of " + ", ".join(STATES))
         if not (np.isfinite(self.thickness) and self.thickness > 0):
             raise ModelError("thickness", self.thickness, "must be positive [mm]")
-        corners = 4 if element_type(self.element).cells == "quad" else 3
+        element = element_type(self.element)
+        corners = 4 if element.cells == "quad" else 3
         if self.mesh.t.shape[0] != corners:
             raise ModelError(
                 "element", self.element, f"needs cells of {corners} corners; the mesh of body "
                 f"{self.name!r} has {self.mesh.t.shape[0]}",
             )  # fmt: skip
+        # a wheel is cut from hub to rim, far from where it rolls
+        check_mesh(self.mesh, self.name, element)
         if self.state == "axisymmetric" and self.mesh.p[0].min() < 0:
             raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
         for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
             for boundary in names:
-                self.facets(boundary, kind)
+                self.facets(boundary, kind, outer=kind == "pressure")
         for boundary, held in self.supports.items():
             if held not in ("x", "y", "xy"):
                 raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
         if self.axle is not None and not self.material.elastic:
             raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
         if self.travelling is not None:
-            self.facets(self.travelling.boundary, "travelling")
+            self.facets(self.travelling.boundary, "travelling", outer=True)
             if self.material.elastic and self.condense:
                 raise ModelError("travelling", self.name, "needs condense=False on elastic bodies")
         if self.periodic is not None:
@@ -98,18 +102,36 @@ class Body:
         if self.state == "axisymmetric":
             raise ModelError("periodic", sides, "an axisymmetric body does not repeat itself")
         for boundary in sides:
-            self.facets(boundary, "periodic")
+            self.facets(boundary, "periodic", outer=True)
             for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
                 if boundary in names:
                     raise ModelError(f"{kind}.{boundary}", names[boundary], "is periodic")
 
-    def facets(self, boundary: str, field: str = "boundary") -> np.ndarray:
-        """Return the facet numbers of a named boundary."""
+    def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:
+        """Return the facet numbers of a named boundary, with ``outer`` one of the body's outside.
+
+        Supports may hold facets inside the body; pressure and contact need an outside to act on.
+        """
         known = self.mesh.boundaries or {}
         if boundary not in known or len(known[boundary]) == 0:
             allowed = "must name a boundary of the mesh: " + (", ".join(known) or "it has none")
             raise ModelError(field, boundary, allowed)
-        return np.asarray(known[boundary])
+        facets = np.asarray(known[boundary])
+        count = self.mesh.nfacets
+        if facets.dtype.kind not in "iu" or facets.min() < 0 or facets.max() >= count:
+            allowed = f"must be a boundary of facet numbers from 0 to {count - 1}"
+            raise ModelError(field, boundary, allowed)
+        if len(np.unique(facets)) < len(facets):
+            raise ModelError(field, boundary, "must be a boundary that has each facet once")
+        inside = facets[self.mesh.f2t[1, facets] != -1] if outer else facets[:0]
+        if len(inside):
+            first, second = self.mesh.f2t[:, inside[0]]
+            allowed = (
+                f"must lie on the outside of body {self.name!r}; {len(inside)} of its facets are "
+                f"inside, one between elements {first} and {second}"
+            )
+            raise ModelError(field, boundary, allowed)
+        return facets
 
     @cached_property
     def discretisation(self) -> Discretisation:

@@ -139,6 +139,13 @@ class Discretisation(Part):
             return load * self.load
         return travelling_forces(self, self.body.travelling, load)
 
+    def grows(self, before: float, after: float) -> bool:
+        """Whether the external load grows from one load factor or time to another."""
+        travelling = self.body.travelling
+        if travelling is None:
+            return super().grows(before, after)
+        return travelling.now(after)[0] > travelling.now(before)[0]
+
     # -- the law at all points ---------------------------------------------------------------
 
     def virgin(self) -> PlasticState:
@@ -175,6 +182,12 @@ class Discretisation(Part):
         tangent = np.einsum("ap,abp,bp->p", strain, response.tangent, strain) @ weight
         elastic = (strain * (C @ strain)).sum(axis=0) @ weight
         return float(tangent), float(elastic)
+
+    def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
+        """Return the point that a step strains most [mm]."""
+        at = int((self.strain(step) ** 2).sum(axis=0).argmax())
+        x, y = self.points.reshape(2, -1)[:, at]
+        return float(x), float(y)
 
     def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
         """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""

@@ -18,17 +18,18 @@ load a plastic tangent of the step before would diverge.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
-from solver.contact.complementarity import ContactProblem, solve_contact
+from solver.contact.ends import strayed
+from solver.flow import Flow, mechanism, softer
 from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.state import State
+from solver.step import Step, newton_step, on_parts
 from solver.threads import one_thread
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.constitutive import Response
-    from solver.operators import Operator
     from solver.state import ContactState
     from solver.system import System
 
@@ -48,18 +48,8 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
-_TOUCHING = 1e-9  # overlap before anything is loaded [mm]
 _LATE = 1
 """Iterations after which a step without stiffness tells that the structure flows."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """A Newton step: displacements of each part, contact forces and statuses."""
-
-    u: Vectors
-    forces: NDArray[np.float64]
-    status: NDArray[np.int64]
 
 
 class Increment:
@@ -105,13 +95,15 @@ class Increment:
         origin = self.guess or self.start
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
-        best, since_best, softest = np.inf, 0, 1.0
+        best, since_best, softest = np.inf, 0, Flow()
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
-            best = min(best, error)
+            # bodies that overlap can be balanced as they are: what follows must not be measured
+            # against nothing
+            best = max(min(best, error), tolerances.residual)
             hopeless = since_best > _PATIENCE or error > _DIVERGED * best
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
@@ -119,9 +111,10 @@ class Increment:
             if balanced and candidates.beyond >= 0:
                 return self._commit(u, responses, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
-            step = self._step(residuals, responses, candidates, elastic_first)
+            blends = _BLENDS[-1:] if elastic_first else _BLENDS
+            step = self._step(residuals, responses, candidates, blends)
             if iteration >= _LATE:
-                softest = min(softest, self._stiffness(step, responses))
+                softest = softer(softest, self.system.parts, step.u, responses)
             share, u, responses = self._search(u, residuals, candidates, step)
             forces = (1 - share) * candidates.forces + share * step.forces
             contacts = candidates.states(contacts, forces, step.status)
@@ -131,7 +124,7 @@ class Increment:
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
             # what stops at rounding does not flow
-            softest if best > _UNBALANCED * tolerances.residual else 1.0,
+            softest if best > _UNBALANCED * tolerances.residual else None,
         )
 
     # -- 1, 2: where we are ------------------------------------------------------------------
@@ -155,20 +148,18 @@ class Increment:
         span = self.load - self.start.load
         return find_candidates(self.system, self.start, u, contacts, span)
 
-    def _on_parts(self, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
-        return tuple(
-            candidates.on_part(i, forces, part.n) for i, part in enumerate(self.system.parts)
-        )
-
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
-        inner = self._on_parts(candidates, candidates.forces)
-        level = _norm([part.external(self.load) for part in parts]) + _norm(inner)
+        inner = on_parts(self.system, candidates, candidates.forces)
+        external = _norm([part.external(self.load) for part in parts])
+        level = external + _norm(inner)
+        if external == 0:  # bodies that overlap push each other: stress alone tells how much
+            level += _norm(residuals)
         scale = max(self.start.force_scale, level)
-        if scale == 0:  # nothing loads the bodies yet; overlapping ones are not in balance
+        if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
-            return 0.0, float(overlap < -_TOUCHING), 0.0
+            return 0.0, float(overlap < -self.system.touching), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
         W = candidates.compliance([o.elastic for o in self.system.operators])
         return scale, _norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
@@ -180,72 +171,62 @@ class Increment:
         residuals: Vectors,
         responses: Sequence[Response],
         candidates: Candidates,
-        elastic: bool,
-    ) -> _Step:
-        for blend in (1.0,) if elastic else _BLENDS:
+        blends: Sequence[float],
+    ) -> Step:
+        """Return the step of the softest tangent that has one; a lone blend is no choice."""
+        for blend in blends:
             try:
                 operators = [
                     o.tangent(response, blend)
                     for o, response in zip(self.system.operators, responses, strict=True)
                 ]
-                step = self._blended_step(residuals, operators, candidates)
+                step = newton_step(self.system, residuals, operators, candidates, self.contact)
             except Singular:
                 continue
-            if step is not None:
-                self._blended += 0 < blend and not elastic
+            if step is not None and (blend == blends[-1] or not self._adrift(step, responses)):
+                self._pivoted += step.pivoted
+                self._blended += 0 < blend and len(blends) > 1
                 return step
-        raise IncrementFailed("no contact forces were found that balance this load", 1.0)
+        raise IncrementFailed(
+            "no contact forces were found that balance this load" + self._apart(candidates)
+        )
 
-    def _blended_step(
-        self, residuals: Vectors, operators: Sequence[Operator], candidates: Candidates
-    ) -> _Step | None:
-        parts = self.system.parts
-        # all large forces balance first: what is left to solve for is small, and rounding of
-        # the factor, about 1e-16 (size of the body / smallest element)^2, acts on that alone
-        held = self._on_parts(candidates, candidates.forces)
-        balanced = [r + c for r, c in zip(residuals, held, strict=True)]
-        W = candidates.compliance(operators)
-        motion = candidates.motion - W @ candidates.forces
-        for i, (operator, r) in enumerate(zip(operators, balanced, strict=True)):
-            motion += candidates.of_part(i, operator.solve(r))
-        floating = [part.rigid if self.contact else part.rigid[:, :0] for part in parts]
-        solution = solve_contact(
-            ContactProblem(
-                W=W,
-                offset=motion,
-                friction=candidates.friction,
-                A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-                balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
-            ),
-            candidates.status,
+    def _adrift(self, step: Step, responses: Sequence[Response]) -> bool:
+        """Whether a step is a plastic mechanism though nothing loads the bodies.
+
+        They push each other apart by a given distance then, which plastic flow alone can do in many
+        ways: the step would be any of them, and as large as rounding makes it.
+        """
+        loaded = any(part.external(self.load).any() for part in self.system.parts)
+        return not loaded and mechanism(self.system.parts, step.u, responses)
+
+    def _apart(self, candidates: Candidates) -> str:
+        """Return which bodies are held by contact alone, where nothing touches yet."""
+        floating = [repr(p.body.name) for p in self.system.parts if p.rigid.shape[1]]
+        if not floating or candidates.forces.any():
+            return ""
+        gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
+        return (
+            f"; body {' and '.join(floating)} is held by contact alone and stands {gap:.3g} mm "
+            "apart: the load must push it towards what holds it"
         )
-        if solution is None:
-            return None
-        self._pivoted += solution.pivoted
-        change = self._on_parts(candidates, solution.forces - candidates.forces)
-        rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
-        u = tuple(
-            operator.solve(r + c) + R @ q
-            for operator, r, c, R, q in zip(
-                operators, balanced, change, floating, rigid, strict=True
-            )
-        )
-        if not all(np.isfinite(du).all() for du in u):
-            return None
-        return _Step(u, solution.forces, solution.status)
 
     # -- 5: line search ------------------------------------------------------------------------
 
     def _search(
-        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: _Step
+        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: Step
     ) -> tuple[float, Vectors, tuple[Response, ...]]:
         trial: tuple[Vectors, tuple[Response, ...]]
 
+        # where vertices change sides the forces before the step may oppose it; those after it never
+        # do: with them its slope is the tangent's quadratic form
+        before = candidates.forces
+        if self._slope(step, residuals, candidates, before) <= 0:
+            before = step.forces
+
         def along(share: float, residual: Vectors) -> float:
-            forces = (1 - share) * candidates.forces + share * step.forces
-            inner = self._on_parts(candidates, forces)
-            terms = zip(step.u, residual, inner, strict=True)
-            return sum(float(du @ (r + c)) for du, r, c in terms)
+            forces = (1 - share) * before + share * step.forces
+            return self._slope(step, residual, candidates, forces)
 
         def slope(share: float) -> float:
             nonlocal trial
@@ -255,6 +236,13 @@ class Increment:
 
         share = search(slope, along(0.0, residuals))
         return share, *trial
+
+    def _slope(
+        self, step: Step, residual: Vectors, candidates: Candidates, forces: NDArray[np.float64]
+    ) -> float:
+        """Return minus the derivative of the energy along a step under given contact forces."""
+        terms = zip(step.u, residual, on_parts(self.system, candidates, forces), strict=True)
+        return sum(float(du @ (r + c)) for du, r, c in terms)
 
     # -- 6: the end ----------------------------------------------------------------------------
 
@@ -282,16 +270,8 @@ class Increment:
             elastic=not any(r.yielding.any() for r in responses),
             pivoted=self._pivoted,
             blended=self._blended,
+            strayed=strayed(self.system, u, candidates),
         )
-
-    def _stiffness(self, step: _Step, responses: Sequence[Response]) -> float:
-        """Return the tangent stiffness along a step over the elastic one."""
-        forms = [
-            part.stiffness_along(du, response)
-            for part, du, response in zip(self.system.parts, step.u, responses, strict=True)
-        ]
-        tangent, elastic = (sum(form[k] for form in forms) for k in (0, 1))
-        return tangent / elastic if elastic > 0 else 1.0
 
 
 def _norm(vectors: Sequence[NDArray[np.float64]]) -> float:

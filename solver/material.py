@@ -54,6 +54,11 @@ class Material:
         return math.isinf(self.yield_stress)
 
     @property
+    def shear_yield_stress(self) -> float:
+        """Shear stress at first yield, k = yield stress / sqrt(3) [MPa]."""
+        return self.yield_stress / math.sqrt(3)
+
+    @property
     def shear_modulus(self) -> float:
         """G [MPa]."""
         return self.youngs_modulus / (2 * (1 + self.poisson_ratio))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 from skfem import MeshQuad, MeshQuad2, MeshTri
 
 from solver.errors import ModelError
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
     from skfem import Mesh
+
+
+_SAME = 1e-9
+"""Distance over the size of a mesh below which corners lie on one another."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> NDArray[np.float64]:
@@ -71,3 +76,29 @@ def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.floa
         doflocs=np.asarray(function(curved.doflocs)), t=curved.t, sort_t=False, validate=False
     )
     return moved.with_boundaries(dict(mesh.boundaries or {}))
+
+
+def merged(mesh: MeshQuad2) -> MeshQuad2:
+    """Return the mesh with corners that lie on one another made one; boundary names are kept.
+
+    A grid bent until its ends meet becomes a ring; what is inside it now is no boundary.
+    """
+    corners = mesh.p[:, : mesh.nvertices]
+    tolerance = _SAME * float(np.ptp(corners, axis=1).max())
+    first = np.arange(mesh.nvertices)
+    pairs = cKDTree(corners.T).query_pairs(tolerance, output_type="ndarray")
+    first[pairs.max(axis=1)] = pairs.min(axis=1)
+    kept, number = np.unique(first, return_inverse=True)
+    straight = MeshQuad(np.ascontiguousarray(corners[:, kept]), number[mesh.t], sort_t=False)
+    ring = MeshQuad2.from_mesh(straight)
+    nodes = ring.doflocs.copy()
+    nodes[:, ring.dofs.element_dofs] = mesh.doflocs[:, mesh.dofs.element_dofs]
+    ring = MeshQuad2(doflocs=nodes, t=ring.t, sort_t=False, validate=False)
+    facets = {frozenset(ends): k for k, ends in enumerate(ring.facets.T.tolist())}
+
+    def renumbered(which: NDArray[np.int64]) -> NDArray[np.int64]:
+        found = [facets[frozenset(ends)] for ends in number[mesh.facets[:, which]].T.tolist()]
+        return np.intersect1d(found, ring.boundary_facets())
+
+    names = mesh.boundaries or {}
+    return ring.with_boundaries({name: renumbered(which) for name, which in names.items()})

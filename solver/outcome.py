@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from solver.errors import SolverError
+from solver.flow import Flow
 
 if TYPE_CHECKING:
     from solver.constitutive import Response
     from solver.state import State
-
-_FLOWING = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +35,8 @@ class Converged:
 
     ``iterations`` of Newton; ``elastic`` when no point yielded; ``plastic_work`` of the increment
     [N mm] and the least ``dissipation`` at a point [N mm/mm3]; ``pivoted`` and ``blended`` count
-    the iterations whose inner problem needed the fallback or a blended tangent.
+    the iterations whose inner problem needed the fallback or a blended tangent; ``strayed`` says
+    where contact has come to the end of a surface that goes on, empty where it has not.
     """
 
     state: State
@@ -47,6 +47,7 @@ class Converged:
     dissipation: float
     pivoted: int
     blended: int
+    strayed: str = ""
 
 
 class Yielded(SolverError):
@@ -54,17 +55,8 @@ class Yielded(SolverError):
 
 
 class IncrementFailed(SolverError):
-    """The increment did not converge.
+    """The increment did not converge; ``flow`` is the softest of its late steps."""
 
-    ``stiffness`` is the least share of the elastic stiffness left along a late step; next to
-    nothing means that the structure flows.
-    """
-
-    def __init__(self, message: str, stiffness: float) -> None:
+    def __init__(self, message: str, flow: Flow | None = None) -> None:
         super().__init__(message)
-        self.stiffness = stiffness
-
-    @property
-    def flowing(self) -> bool:
-        """Whether a late step was a plastic mechanism."""
-        return self.stiffness < _FLOWING
+        self.flow = flow or Flow()

@@ -9,6 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.body import Body
     from solver.surface import Surface
 
 
@@ -19,6 +20,7 @@ class Part:
     """
 
     n: int
+    body: Body
     load: NDArray[np.float64]
 
     def start(self) -> NDArray[np.float64]:
@@ -29,13 +31,25 @@ class Part:
         """Return the external nodal forces (n,) at a load factor [N]."""
         return load * self.load
 
+    def grows(self, before: float, after: float) -> bool:
+        """Whether the external load grows from one load factor to another."""
+        return abs(after) > abs(before) and bool(self.load.any())
+
+    def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
+        """Return where a step (n,) strains this part most [mm]; nowhere in one without points."""
+        del step
+        return np.nan, np.nan
+
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         return u[surface.dofs].reshape(-1, 2).T
 
     def pull_back(
-        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64]
+        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return unknowns and rows on them from rows on a surface's displacements."""
-        del u
+        """Return unknowns and rows on them from rows on a surface's displacements.
+
+        The first ``gaps`` rows are those of gaps, the others those of slips.
+        """
+        del u, gaps
         return surface.dofs, block

@@ -47,9 +47,12 @@ class Path:
 
     def branches(self, loads: Sequence[float]) -> Iterator[Branch]:
         """Yield a branch for every load factor, in increasing order."""
-        trunk = self._stepper.rest(self.system.initial())
-        step = self.control.load_step
         error: NotConverged | None = None
+        try:
+            trunk = self._stepper.together(self.system.initial())
+        except Stopped as stopped:
+            error, trunk = stopped.error, stopped.point
+        step = self.control.load_step
         for load in sorted(loads):
             direct = self._elastic(load)
             if direct is not None:
@@ -96,6 +99,8 @@ class Path:
                 tolerances=self.control.tolerances,
             ).solve()
         except (Yielded, IncrementFailed):
+            return None
+        if converged.strayed:  # stepping tells at which load
             return None
         self._stepper.report(load, f"load {load:.4g}: elastic")
         tally = self._stepper.timed(start.tally.plus(converged))

@@ -129,6 +129,23 @@ class Stepper:
         at_rest = Increment(self.system, state, state.load, contact=False).solve()
         return Point(replace(at_rest, state=state), None, Tally())
 
+    def together(self, state: State) -> Point:
+        """Return the first point of a path, overlapping bodies having pushed each other apart.
+
+        They do so before any load acts, so that what they resist is not taken for a limit load.
+        """
+        point = self.rest(state)
+        if not self.system.overlapping:
+            return point
+        try:
+            pushed = Increment(
+                self.system, state, state.load, tolerances=self.control.tolerances
+            ).solve()
+        except IncrementFailed as failure:
+            error = NotConverged(f"the overlap of the bodies could not be resolved: {failure}")
+            raise Stopped(error, replace(point, tally=self.timed(point.tally))) from failure
+        return Point(pushed, None, self.timed(point.tally.plus(pushed)))
+
     def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at load ``target`` or raise `Stopped`."""
         step = target - point.now.state.load
@@ -157,18 +174,17 @@ class Stepper:
                     raise Stopped(self._ended(failure, state.load, load), point) from failure
                 continue
             point = Point(converged, state, self.timed(point.tally.plus(converged)))
+            if converged.strayed:
+                error = NotConverged(f"{self._place(load)}: {converged.strayed}", state.load, load)
+                raise Stopped(error, point)
             self.report(load, f"load {load:.4g}: {converged.iterations} iterations")
         return point
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
         way = f"between {self._place(reached)} and {self._place(attempted)}"
-        if failure.flowing and abs(attempted) > abs(reached):
-            return LimitLoad(
-                f"no equilibrium {way}: the structure flows with {failure.stiffness:.1%} of its "
-                "elastic stiffness",
-                reached,
-                attempted,
-            )
+        growing = any(part.grows(reached, attempted) for part in self.system.parts)
+        if failure.flow.limit and growing:
+            return LimitLoad(f"no equilibrium {way}: {failure.flow}", reached, attempted)
         return NotConverged(f"the increment {way} failed: {failure}", reached, attempted)
 
     def timed(self, tally: Tally) -> Tally:

@@ -9,6 +9,7 @@ displacements back. Supports of kept nodes stay supports; rigid motions stay rig
 from __future__ import annotations
 
 from collections import OrderedDict
+from dataclasses import replace
 from hashlib import sha256
 from typing import TYPE_CHECKING
 
@@ -89,7 +90,7 @@ class Substructure(Part):
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
         nodes = np.searchsorted(self._condensed.nodes, surface.nodes)
-        return Surface(nodes, surface.edges, surface.X, surface.measure)
+        return replace(surface, nodes=nodes)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the one operator an elastic part has."""

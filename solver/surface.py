@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from solver.motion import TravellingPressure
 
 
+_CORNER = float(np.cos(np.radians(30.0)))
+
+
 def shape_functions(xi: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return edge shape functions (..., count) at ``xi`` in [-1, 1]: both ends, then the middle."""
     if count == 2:
@@ -43,12 +46,14 @@ class Surface:
     edges : (n_edges, 2 or 3) positions in ``nodes``: start, end (, middle)
     X : (2, n_nodes) reference positions [mm]
     measure : (n_nodes,) thickness, or 2 pi r, at the nodes [mm]
+    goes_on : whether the boundary of the body goes on smoothly beyond the start and the end
     """
 
     nodes: NDArray[np.int64]
     edges: NDArray[np.int64]
     X: NDArray[np.float64]
     measure: NDArray[np.float64]
+    goes_on: tuple[bool, bool] = (False, False)
 
     @property
     def vertices(self) -> NDArray[np.int64]:
@@ -107,7 +112,23 @@ def extract(part: Discretisation, boundary: str) -> Surface:
             raise ModelError("boundary", boundary, allowed)
         nodes, X, chain = _repeated(part.same[nodes], X, chain)
     measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
-    return Surface(nodes, chain, X, measure)
+    first, last = edges[order[0]], edges[order[-1]]
+    beyond = (_goes_on(part, first[1], first[0]), _goes_on(part, last[0], last[1]))
+    return Surface(nodes, chain, X, measure, (True, True) if part.period else beyond)
+
+
+def _goes_on(part: Discretisation, before: int, end: int) -> bool:
+    """Return whether the boundary of a body goes on where a chain comes from ``before`` to ``end``.
+
+    It does not where it turns by more than `_CORNER`.
+    """
+    mesh = part.body.mesh
+    pairs = part.basis.nodal_dofs[0][mesh.facets[:, mesh.boundary_facets()]].T
+    others = np.concatenate([pairs[pairs[:, k] == end, 1 - k] for k in (0, 1)])
+    onward = part.X[:, others[others != before]] - part.X[:, [end]]
+    along = part.X[:, end] - part.X[:, before]
+    turn = (along @ onward) / (np.linalg.norm(along) * np.linalg.norm(onward, axis=0))
+    return bool((turn > _CORNER).any())
 
 
 def _repeated(

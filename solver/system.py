@@ -11,8 +11,10 @@ from scipy.linalg import null_space
 
 from solver import surface
 from solver.contact.geometry import Pairing, pair
+from solver.contact.overlap import check_overlap, largest_overlap
 from solver.discretisation import Discretisation
 from solver.errors import ModelError
+from solver.model import effective_friction
 from solver.state import ContactState, State
 from solver.substructure import Substructure
 from solver.wheel import Wheel
@@ -27,16 +29,25 @@ if TYPE_CHECKING:
     from solver.surface import Surface
 
 
+_TOUCHING = 1e-9
+"""Over the length of the longest contact surface."""
+
+
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A contact pair on its two parts."""
+    """A contact pair on its two parts.
+
+    ``shear_strength`` is the largest shear it carries whatever the pressure [MPa].
+    """
 
     slave: int
     master: int
     slave_surface: Surface
     master_surface: Surface
     friction: float
+    shear_strength: float
     parts: tuple[Part, Part]
+    reach: float
     reference: Pairing | None
 
     @property
@@ -47,6 +58,11 @@ class Interface:
             (self.master, self.parts[1], self.master_surface),
         )
 
+    @property
+    def floating(self) -> bool:
+        """Whether contact has to hold a rigid motion of either part."""
+        return any(part.rigid.shape[1] for part in self.parts)
+
     def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
         """Return gap, area and derivative rows at displacements ``u``."""
         motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
@@ -56,7 +72,7 @@ class Interface:
                 for block, motion in zip(self.reference.normal, motions, strict=True)
             )
             return replace(self.reference, gap=self.reference.gap + change)
-        return pair(self.slave_surface, motions[0], self.master_surface, motions[1])
+        return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
 
 
 Part = Discretisation | Substructure
@@ -91,13 +107,30 @@ def _interface(
         part = parts[number]
         sides.append((number, part.surface(chain) if isinstance(part, Substructure) else chain))
     (slave, slave_surface), (master, master_surface) = sides
-    reference = None
+    both = (parts[slave], parts[master])
+    check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
+    reference, reach = None, float(np.ptp(both[0].body.mesh.p, axis=1).max())
     if contact.sliding == "small":
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
-        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1])
-    both = (parts[slave], parts[master])
+        reach = largest_overlap(both[0].body, both[1].body)
+        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
+        if not reference.area.any():
+            raise ModelError(
+                "contacts", (contact.slave, contact.master),
+                "these surfaces do not face each other: at rest no normal of the first meets the "
+                "second from outside",
+            )  # fmt: skip
+    strength = min(part.body.material.shear_yield_stress for part in both)
     return Interface(
-        slave, master, slave_surface, master_surface, contact.friction, both, reference
+        slave=slave,
+        master=master,
+        slave_surface=slave_surface,
+        master_surface=master_surface,
+        friction=effective_friction(contact.friction),
+        shear_strength=contact.shear_limit * strength,
+        parts=both,
+        reach=reach,
+        reference=reference,
     )
 
 
@@ -131,11 +164,12 @@ class System:
         rows = []
         for interface in self.interfaces:
             pairing = interface.pairing(tuple(part.start() for part in self.parts))
-            for kind in (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]:
+            kinds = (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]
+            for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
                 A = np.zeros((len(pairing.area), ends[-1]))
                 for (number, part, chain), block in zip(interface.sides, kind, strict=True):
                     columns = slice(ends[number] - sizes[number], ends[number])
-                    dofs, rows_of = part.pull_back(chain, part.start(), block)
+                    dofs, rows_of = part.pull_back(chain, part.start(), block, gaps)
                     A[:, columns] += rows_of @ part.rigid[dofs]
                 rows.append(A)
         A = np.vstack([np.zeros((0, ends[-1])), *rows])
@@ -154,18 +188,31 @@ class System:
         return sum(len(part.free) for part in self.parts)
 
     @cached_property
+    def touching(self) -> float:
+        """Distance up to which surfaces at rest touch, and neither part nor overlap [mm]."""
+        lengths = [np.ptp(i.slave_surface.X, axis=1).max() for i in self.interfaces]
+        return _TOUCHING * float(max(lengths, default=0.0))
+
+    @cached_property
+    def overlapping(self) -> bool:
+        """Whether bodies overlap before loading."""
+        start = self.initial().u
+        return any((i.pairing(start).gap < -self.touching).any() for i in self.interfaces)
+
+    @cached_property
     def proportional(self) -> bool:
         """Whether elastic states do not depend on how the load was brought on.
 
         True without friction, and where all facing vertices touch before loading, so that
-        every status stays as it is while the load grows.
+        every status stays as it is while the load grows: but for a limit of shear, which does
+        not grow with it.
         """
-        conforming = all(
-            (np.isinf(gap) | (np.abs(gap) < 1e-9 * np.ptp(i.slave_surface.X))).all()
-            for i in self.interfaces
-            for gap in [i.pairing(self.initial().u).gap]
-        )
-        return conforming or all(i.friction == 0 for i in self.interfaces)
+        if self.overlapping or not all(np.isinf(i.shear_strength) for i in self.interfaces):
+            return False
+        start = self.initial().u
+        gaps = np.concatenate([np.zeros(0), *(i.pairing(start).gap for i in self.interfaces)])
+        conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()
+        return bool(conforming) or all(i.friction == 0 for i in self.interfaces)
 
     def part(self, name: str) -> int:
         """Return the number of the part called ``name``."""
@@ -195,7 +242,5 @@ class System:
         contacts = []
         for interface in self.interfaces:
             gap = interface.pairing(u).gap
-            length = np.ptp(interface.slave_surface.X, axis=1).max()
-            touching = gap <= 1e-9 * length
-            contacts.append(ContactState.at_rest(gap, touching))
+            contacts.append(ContactState.at_rest(gap, gap <= self.touching))
         return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))

@@ -58,6 +58,13 @@ class Wheel(Substructure):
             force[self.rim + 2] = self.program.at(load, "moment") / self.radius
         return force
 
+    def grows(self, before: float, after: float) -> bool:
+        """Whether force or moment on the axle grow from one time to another."""
+        return any(
+            abs(self.program.at(after, name)) > abs(self.program.at(before, name))
+            for name in ("force", "moment")
+        )
+
     def residual(
         self, load: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:
@@ -79,29 +86,46 @@ class Wheel(Substructure):
 
     # -- kinematics ----------------------------------------------------------------------------
 
-    def _frame(self, u: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the rotation matrix and its derivative with respect to w."""
+    def _frame(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the rotation matrix."""
         angle = u[self.rim + 2] / self.radius
         c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]]) / self.radius
+        return np.array([[c, -s], [s, c]])
 
-    def _arms(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _passing(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how far material moves along a rim of constant shape for an arc (2, n_nodes)."""
+        x, y = surface.X - self.centre[:, None]
+        starts, middles = surface.edges[:, :1], surface.edges[:, 2:]
+        chain = np.append(np.hstack([starts, middles]), surface.edges[-1, 1])
+        arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(surface.X[:, chain]), axis=0)))
         d = u[surface.dofs].reshape(-1, 2).T
-        return surface.X - self.centre[:, None] + d
+        out = np.stack([-y, x]) / self.radius
+        out[:, chain] += np.gradient(d[:, chain], arc, axis=1)
+        return out
 
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
-        Q, _ = self._frame(u)
+        Q = self._frame(u)
         hub = u[self.rim : self.rim + 2, None]
-        return Q @ self._arms(surface, u) + self.centre[:, None] + hub - surface.X
+        d = u[surface.dofs].reshape(-1, 2).T
+        return Q @ (surface.X - self.centre[:, None] + d) + self.centre[:, None] + hub - surface.X
 
     def pull_back(
-        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64]
+        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return rows on rim, hub and rotation from rows on a surface's displacements."""
-        Q, dQ = self._frame(u)
+        """Return rows on rim, hub and rotation from rows on a surface's displacements.
+
+        The rotation turns the wheel under the shape that its rim has. That takes no work from
+        a round elastic wheel, and changes no gap: moment comes from friction alone, on the arm
+        with which material passes. Turned with the displacements it has, the wheel changes gaps
+        as well, and pressure gets a moment: in the continuum what makes up for the other arm,
+        on a mesh of ten points of contact 1e-4 of force times radius more or less, which would
+        turn a wheel that less friction holds.
+        """
+        Q = self._frame(u)
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
-        turning = (nodal * (dQ @ self._arms(surface, u)).T).sum(axis=(1, 2))
+        turning = (nodal * (Q @ self._passing(surface, u)).T).sum(axis=(1, 2))
+        turning[:gaps] = 0.0
         hub = nodal.sum(axis=1)
         rows = np.hstack([(nodal @ Q).reshape(block.shape), hub, turning[:, None]])
         return np.append(surface.dofs, self.rim + np.arange(3)), rows

@@ -85,8 +85,25 @@ QUANTITIES: Mapping[str, Quantity] = {
         "estimated error of residual stress under mid-track that the advance leaves", "MPa"
     ),
     "travel": Quantity("length rolled in the last pass", "mm"),
-    "surface_residual_x": Quantity("residual stress xx at the surface, mid-track", "MPa"),
-    "surface_residual_z": Quantity("residual stress zz at the surface, mid-track", "MPa"),
+    "surface_residual_x": Quantity(
+        "residual stress xx at the surface, mid-track, extrapolated to its nodes", "MPa"
+    ),
+    "surface_residual_z": Quantity(
+        "residual stress zz at the surface, mid-track, extrapolated to its nodes", "MPa"
+    ),
+    "first_row_residual_x": Quantity(
+        "residual stress xx at the first row of integration points, mid-track", "MPa"
+    ),
+    "first_row_residual_z": Quantity(
+        "residual stress zz at the first row of integration points, mid-track", "MPa"
+    ),
+    "first_row_depth": Quantity("depth of the first row of integration points, mid-track", "mm"),
+    "free_surface_residual_x": Quantity(
+        "residual stress xx at the surface, mid-track, by the conditions of a free surface", "MPa"
+    ),
+    "free_surface_residual_z": Quantity(
+        "residual stress zz at the surface, mid-track, by the conditions of a free surface", "MPa"
+    ),
     "lowest_residual_x": Quantity("smallest residual stress xx under mid-track", "MPa"),
     "lowest_residual_z": Quantity("smallest residual stress zz under mid-track", "MPa"),
     "depth_of_lowest_residual_x": Quantity("depth of the smallest residual stress xx", "mm"),

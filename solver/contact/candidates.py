@@ -40,21 +40,25 @@ class Candidates:
     vertices : for each interface, the slave vertices that are candidates
     friction : (n,) coefficient; zero where the vertex had no contact before and nothing is
         known of its approach: it then starts without tangential force
+    limit : (n,) largest tangential force whatever the normal one [N]
     motion : (n or 2n,) gap, and slip when there is friction [mm]
     apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
     status : (n,) of the current iterate
     rows : one a part, None for a part without contact surface
+    covered : for each interface, the share of the hats of its candidates that faces the master
     beyond : smallest gap of the vertices that are not candidates [mm]
     """
 
     vertices: tuple[NDArray[np.int64], ...]
     friction: NDArray[np.float64]
+    limit: NDArray[np.float64]
     motion: NDArray[np.float64]
     apart: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
     rows: tuple[Rows | None, ...]
+    covered: tuple[NDArray[np.float64], ...]
     beyond: float
 
     @property
@@ -88,8 +92,8 @@ class Candidates:
     def violation(self, stiffness: NDArray[np.float64]) -> float:
         """Return the natural residual of the contact conditions, as a force [N].
 
-        ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -mu N, mu N)|``
-        with the stiffness k of the elastic contact points.
+        ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -s, s)|`` with
+        ``s = min(mu N, limit)`` and the stiffness k of the elastic contact points.
         """
         n, F, k = self.n, self.forces, stiffness
         if n == 0:
@@ -97,7 +101,7 @@ class Candidates:
         N = F[:n]
         worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
         if len(F) > n:
-            bound = self.friction * np.maximum(N, 0)
+            bound = np.minimum(self.friction * np.maximum(N, 0), self.limit)
             wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
             worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
         return worst
@@ -125,15 +129,16 @@ class Candidates:
     def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of load."""
         out, at = [], 0
+        rate = 1 / span if span else np.nan
         after = self.states(before, self.forces, self.status)
         for old, new, vertices in zip(before, after, self.vertices, strict=True):
             here = slice(at, at + len(vertices))
             at += len(vertices)
             approach = np.full_like(old.approach, np.nan)
             approach[0, vertices] = self.motion[: self.n][here]
-            approach[1] = (approach[0] - old.approach[0]) / span
+            approach[1] = (approach[0] - old.approach[0]) * rate
             if len(self.motion) > self.n:
-                approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] / span
+                approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] * rate
             out.append(replace(new, touching=new.status != OPEN, approach=approach))
         return tuple(out)
 
@@ -143,7 +148,9 @@ def no_candidates(system: System) -> Candidates:
     empty = np.zeros(0)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
-    return Candidates(none, empty, empty, empty, empty, empty.astype(int), rows, np.inf)
+    covered = tuple(empty for _ in system.interfaces)
+    status = empty.astype(int)
+    return Candidates(none, empty, empty, empty, empty, empty, status, rows, covered, np.inf)
 
 
 def find_candidates(
@@ -159,11 +166,15 @@ def find_candidates(
     it touched, if the last increment tells how it came near.
     """
     pairings = [interface.pairing(u) for interface in system.interfaces]
-    vertices = [_near(p, c) for p, c in zip(pairings, contacts, strict=True)]
+    vertices = [
+        _near(pairing, contact, interface.floating)
+        for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)
+    ]
     n = sum(len(v) for v in vertices)
     frictional = any(interface.friction > 0 for interface in system.interfaces)
     m = 2 * n if frictional else n
     motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
+    limit = np.zeros(n)
     pieces: list[list[Rows]] = [[] for _ in system.parts]
     first = 0
     for interface, pairing, at, before in zip(
@@ -175,8 +186,13 @@ def find_candidates(
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
+        if interface.floating and len(at) and not before.touching.any():
+            # nothing but its first point holds a body that comes to rest on it
+            first_point = normal.start + pairing.gap[at].argmin()
+            apart[first_point] = np.nan_to_num(apart[first_point])
         friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
         apart[normal] = np.nan_to_num(apart[normal])
+        limit[normal] = interface.shear_strength * pairing.area[at]
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
@@ -184,7 +200,7 @@ def find_candidates(
                 block[tangent] = pairing.tangent[side][at]
                 moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
                 motion[tangent] += block[tangent] @ moved.T.ravel()
-            pieces[number].append(Rows(*part.pull_back(surface, u[number], block)))
+            pieces[number].append(Rows(*part.pull_back(surface, u[number], block, n)))
 
     if frictional:
         motion[n:] -= apart
@@ -197,11 +213,13 @@ def find_candidates(
     return Candidates(
         vertices=tuple(vertices),
         friction=friction,
+        limit=limit,
         motion=motion,
         apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
         rows=tuple(_join(p) for p in pieces),
+        covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         beyond=float(beyond),
     )
 
@@ -216,8 +234,15 @@ def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
     return np.asarray(np.where(share < 1.0, sliding * np.maximum(share, 0.0), np.nan))
 
 
-def _near(pairing: Pairing, contact: ContactState) -> NDArray[np.int64]:
-    near = (pairing.gap < _MARGIN * pairing.length) | (contact.normal > 0)
+def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:
+    """Return the vertices near contact.
+
+    A floating body comes down however far it is: its nearest vertex is near.
+    """
+    margin = _MARGIN * pairing.length
+    if floating:
+        margin = margin + max(pairing.gap.min(initial=np.inf, where=pairing.area > 0), 0.0)
+    near = (pairing.gap < margin) | (contact.normal > 0)
     return np.flatnonzero(near & (pairing.area > 0))
 
 

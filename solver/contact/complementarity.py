@@ -5,7 +5,7 @@ motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction
 
     (gap, slip) = offset + W F + A q        0 = balance + A' F
     N >= 0, gap >= 0, N gap = 0
-    |T| <= mu N,  slip = 0 where below,  T = -mu N sign(slip) where equal
+    |T| <= s,  slip = 0 where below,  T = -s sign(slip) where equal,  s = min(mu N, limit)
 
 Active sets by semismooth Newton solve nearly every instance in a few dense solves. Where the
 sets cycle, the friction bound is lagged: each pass is a convex problem, solved by Lemke's
@@ -22,15 +22,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
+from solver.contact.given_bound import given_bound
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 _MAX_SETS = 40
 _MAX_PASSES = 20
-_PIVOTS_PER_UNKNOWN = 20
 _TOLERANCE = 1e-10
+_ROUNDING = 1e-14
+LEAST_FRICTION = _TOLERANCE
+"""Friction of this and less is none. All it carries is within the tolerance of normal forces here,
+a hundredth of the imbalance and a thousandth of the contact violation an increment may leave."""
 _ACCURATE = 1e-6
+_KNOWN = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +50,7 @@ class ContactProblem:
     friction : (n,) coefficient at each point; zero holds the tangential force at zero
     A : (m, k) gap and slip of the free rigid motions
     balance : (k,) resultants of all other forces on those motions [N]
+    limit : (n,) largest tangential force whatever the normal one [N]; inf, or None for all, is none
     """
 
     W: NDArray[np.float64]
@@ -51,6 +58,7 @@ class ContactProblem:
     friction: NDArray[np.float64]
     A: NDArray[np.float64]
     balance: NDArray[np.float64]
+    limit: NDArray[np.float64] | None = None
 
     @property
     def n(self) -> int:
@@ -61,6 +69,24 @@ class ContactProblem:
     def frictional(self) -> bool:
         """Whether tangential unknowns exist."""
         return len(self.offset) > self.n
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """A force [N] and a length [mm] that tolerances refer to."""
+        compliance = np.abs(np.diag(self.W)).max()
+        length = np.abs(self.offset[: self.n]).max()
+        force = np.abs(self.balance).sum()
+        length = max(length, force * compliance * 1e-3, 1e-30)
+        return max(force, length / compliance), length
+
+    @property
+    def limits(self) -> NDArray[np.float64]:
+        """The limit of every point (n,) [N]."""
+        return np.full(self.n, np.inf) if self.limit is None else self.limit
+
+    def bound(self, N: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest tangential forces (n,) under normal forces N [N]."""
+        return np.minimum(self.friction * np.maximum(N, 0), self.limits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +108,12 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
         empty = np.zeros(0)
         solvable = not problem.balance.size
         return ContactSolution(empty, empty, start, False) if solvable else None
-    return _active_sets(problem, start) or _lag_bound(problem)
-
-
-def _scales(problem: ContactProblem) -> tuple[float, float]:
-    """Return a force [N] and a length [mm] that tolerances refer to."""
-    compliance = np.abs(np.diag(problem.W)).max()
-    length = np.abs(problem.offset[: problem.n]).max()
-    force = np.abs(problem.balance).sum()
-    length = max(length, force * compliance * 1e-3, 1e-30)
-    return max(force, length / compliance), length
+    capped = np.zeros(problem.n, dtype=bool)
+    return _active_sets(problem, start, capped) or _lag_bound(problem)
 
 
 def _forces(
-    problem: ContactProblem, status: NDArray[np.int64]
+    problem: ContactProblem, status: NDArray[np.int64], capped: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Return forces and rigid motions of given statuses, or None for a singular system."""
     n, k = problem.n, len(problem.balance)
@@ -105,13 +123,18 @@ def _forces(
         stick = stick[problem.friction[stick] > 0]
     if not len(closed) and not k:
         return np.zeros(len(problem.offset)), np.zeros(0)
-    # columns of F: each normal force carries the friction force of a slipping point
+    # columns of F: each normal force carries the friction force of a slipping point, unless
+    # that is at its limit and known
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
+    known = np.zeros(len(problem.offset))
     P[closed, np.arange(len(closed))] = 1.0
     if problem.frictional:
         sign = np.where(status[closed] == FORWARD, -1.0, 0.0)
         sign[status[closed] == BACKWARD] = 1.0
         P[n + closed, np.arange(len(closed))] = sign * problem.friction[closed]
+        full, limit = np.flatnonzero(capped[closed]), problem.limits
+        P[n + closed[full], full] = 0.0
+        known[n + closed[full]] = sign[full] * limit[closed[full]]
         P[n + stick, len(closed) + np.arange(len(stick))] = 1.0
     rows = np.concatenate([closed, n + stick])
     size = len(rows)
@@ -120,33 +143,55 @@ def _forces(
     S[:size, size:] = problem.A[rows]
     S[size:, :size] = problem.A.T @ P
     rhs = -np.concatenate([problem.offset[rows], problem.balance])
+    rhs -= np.concatenate([problem.W[rows] @ known, problem.A.T @ known])
     # forces and motions differ by the magnitude of the compliance: balance the rows
     weight = np.ones(size + k)
     if k and size:
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
-    _, _, solution, info = linalg.lapack.dgesv(S, weight * rhs)
-    miss = np.abs(S @ solution - weight * rhs).max(initial=0.0)
-    if info or not miss <= _ACCURATE * np.abs(weight * rhs).max(initial=0.0):
-        return None
+    rhs *= weight
+    _, _, solution, info = linalg.lapack.dgesv(S, rhs)
+    if info or not _solves(S, solution, rhs):
+        if not size or np.linalg.matrix_rank(problem.A[rows]) == k:
+            return None
+        # a body on one point is free to turn about it, and stays where nothing turns it
+        solution = linalg.lstsq(S, rhs)[0]
+        if not _solves(S, solution, rhs):
+            return None
     solution *= weight
-    return P @ solution[:size], solution[size:]
+    return P @ solution[:size] + known, solution[size:]
 
 
-def _active_sets(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
+def _solves(
+    S: NDArray[np.float64], solution: NDArray[np.float64], rhs: NDArray[np.float64]
+) -> bool:
+    miss = np.abs(S @ solution - rhs).max(initial=0.0)
+    return bool(miss <= _ACCURATE * np.abs(rhs).max(initial=0.0))
+
+
+def _active_sets(
+    problem: ContactProblem, start: NDArray[np.int64], capped: NDArray[np.bool_]
+) -> ContactSolution | None:
+    """Return the solution that is reached from a status, or None where the sets cycle.
+
+    ``capped`` (n,) belongs to the status: which sliding points are at their limit.
+    """
     n, mu = problem.n, problem.friction
-    force, length = _scales(problem)
+    force, length = problem.scales
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
+    # under little friction a small part of what it carries, but no less than rounding
+    tiny_shear = force * np.clip(_ACCURATE * mu, _ROUNDING, _TOLERANCE)
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
         status[np.argmin(problem.offset[:n])] = STICK
+    limit = problem.limits
     seen = set()
     for _ in range(_MAX_SETS):
-        key = status.tobytes()
+        key = status.tobytes() + capped.tobytes()
         if key in seen:
             return None
         seen.add(key)
-        found = _forces(problem, status)
+        found = _forces(problem, status, capped)
         if found is None:
             return None
         F, q = found
@@ -157,15 +202,18 @@ def _active_sets(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSo
         new[~closed & (gap < -tiny_length)] = STICK
         if problem.frictional:
             T, slip = F[n:], motion[n:]
-            bound = mu * np.maximum(N, 0) + tiny_force
+            bound = problem.bound(N) + tiny_shear
             keep = closed & (new != OPEN) & (mu > 0)
             new[keep & (status == STICK) & (T > bound)] = BACKWARD
             new[keep & (status == STICK) & (T < -bound)] = FORWARD
             new[keep & (status == FORWARD) & (slip < -tiny_length)] = STICK
             new[keep & (status == BACKWARD) & (slip > tiny_length)] = STICK
-        if np.array_equal(new, status):
+        # one at its limit stays there within the tolerance, so that rounding makes no cycle
+        reached = mu * N - limit > np.where(capped, -tiny_force, tiny_force)
+        reached &= (mu > 0) & (new > STICK)
+        if np.array_equal(new, status) and np.array_equal(reached, capped):
             return ContactSolution(F, q, status, False)
-        status = new
+        status, capped = new, reached
     return None
 
 
@@ -176,13 +224,14 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     exact and the passes need not converge themselves.
     """
     n, mu = problem.n, problem.friction
-    force, _ = _scales(problem)
+    force, _ = problem.scales
     # from above: a motion that friction has to hold must find enough of it in every pass
-    bound = mu * force if len(problem.balance) else np.zeros(n)
+    bound = problem.bound(np.full(n, force if len(problem.balance) else 0.0))
     for _ in range(_MAX_PASSES):
-        F = _given_bound(problem, bound)
-        if F is None:
+        solved = given_bound(problem, bound)
+        if solved is None:
             return None
+        F, q = solved
         N = np.maximum(F[:n], 0.0)
         status = np.where(N > 1e-9 * force, STICK, OPEN)
         if problem.frictional:
@@ -190,89 +239,27 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
             reached = np.abs(F[n:]) >= bound * (1 - 1e-9)
             status[sliding & reached & (F[n:] < 0)] = FORWARD
             status[sliding & reached & (F[n:] > 0)] = BACKWARD
-        found = _active_sets(problem, status)
+        found = _active_sets(problem, status, (status > STICK) & (mu * N > problem.limits))
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
-        if np.abs(mu * N - bound).max() < 1e-12 * force:
-            return None
-        bound = mu * N
+        before, bound = bound, problem.bound(N)
+        if np.abs(bound - before).max() < 1e-12 * force:
+            return ContactSolution(F, q, status, True) if _holds(problem, F, q) else None
     return None
 
 
-def _given_bound(problem: ContactProblem, bound: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return the forces when |T| <= bound is given: a convex problem, by Lemke's method.
+def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
+    """Whether forces and motions meet all conditions.
 
-    z = (N, tau, back), w = (gap, fore, sigma) with tau = T + bound, sigma = bound - T and
-    slip = fore - back: the matrix is positive semidefinite, so the method ends with a
-    solution where one exists. Rigid motions are eliminated by a principal pivot on as many
-    contact forces as there are motions.
+    A solution may be known that no status gives: where nothing turns a body, every rotation that
+    leaves its open points open is one.
     """
-    # compiled, and rarely needed: only who comes here pays for importing the compiler
-    from solver.contact.lemke import lemke
-
-    n, k = problem.n, len(problem.balance)
-    # scaled so that forces and gaps are of order one
-    force, length = _scales(problem)
-    at = np.flatnonzero(bound > 0) if problem.frictional else np.zeros(0, dtype=int)
-    m = len(at)
-    rows = np.concatenate([np.arange(n), n + at])
-    limit = bound[at] / force
-    M = np.zeros((n + 2 * m, n + 2 * m))
-    M[: n + m, : n + m] = force / length * problem.W[np.ix_(rows, rows)]
-    M[n : n + m, n + m :] = np.eye(m)
-    M[n + m :, n : n + m] = -np.eye(m)
-    r = np.concatenate([problem.offset[rows] / length, 2 * limit])
-    r[: n + m] -= M[: n + m, n : n + m] @ limit
-    held = np.zeros(0, dtype=int)
-    if k:
-        shape = np.abs(problem.A).max()
-        A = np.zeros((n + 2 * m, k))
-        A[: n + m] = problem.A[rows] / shape
-        balance = problem.balance / (force * shape) - A[n : n + m].T @ limit
-        held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
-        eliminated = _eliminate(M, r, A, A.T, balance, held)
-        if eliminated is None:
-            return None
-        M, r = eliminated
-    z, solved = lemke(M, r, _PIVOTS_PER_UNKNOWN * len(r))
-    if not solved:
-        return None
-    if k:
-        z[held] = (M @ z + r)[held]
-    F = np.zeros(len(problem.offset))
-    F[:n] = force * z[:n]
-    F[n + at] = force * (z[n : n + m] - limit)
-    return F
-
-
-def _eliminate(
-    M: NDArray[np.float64],
-    r: NDArray[np.float64],
-    A: NDArray[np.float64],
-    columns: NDArray[np.float64],
-    balance: NDArray[np.float64],
-    held: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Exchange the normal forces ``held`` with their gaps, and remove the rigid motions."""
-    N, k = M.shape[0], len(held)
-    rest = np.setdiff1d(np.arange(N), held)
-    block = np.zeros((2 * k, 2 * k))
-    block[:k, :k] = M[np.ix_(held, held)]
-    block[:k, k:] = A[held]
-    block[k:, :k] = columns[:, held]
-    known = np.zeros((2 * k, N + 1))  # of (gap at held, other z, 1)
-    known[np.arange(k), held] = 1.0
-    known[:k, rest] = -M[np.ix_(held, rest)]
-    known[k:, rest] = -columns[:, rest]
-    known[:k, N] = -r[held]
-    known[k:, N] = -balance
-    try:
-        inner = np.linalg.solve(block, known)
-    except np.linalg.LinAlgError:
-        return None
-    new = np.zeros((N, N + 1))
-    new[held] = inner[:k]
-    new[rest] = M[np.ix_(rest, held)] @ inner[:k] + A[rest] @ inner[k:]
-    new[np.ix_(rest, rest)] += M[np.ix_(rest, rest)]
-    new[rest, N] += r[rest]
-    return new[:, :N], new[:, N]
+    n, (force, length) = problem.n, problem.scales
+    motion = problem.offset + problem.W @ F + problem.A @ q
+    N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
+    off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
+    if problem.frictional:
+        bound = np.where(problem.friction > 0, problem.bound(np.maximum(N, 0.0)) / force, 0.0)
+        T, slip = F[n:] / force, motion[n:] / length
+        off = np.concatenate([off, np.clip(T - slip, -bound, bound) - T])
+    return bool((np.abs(off) <= _KNOWN).all())

@@ -37,6 +37,7 @@ class Pairing:
     Attributes
     ----------
     area : (n,) integral of the hat over the part that faces the master [mm2]
+    covered : (n,) share of the hat that faces the master
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
         nothing faces the vertex
@@ -45,6 +46,7 @@ class Pairing:
     """
 
     area: NDArray[np.float64]
+    covered: NDArray[np.float64]
     length: NDArray[np.float64]
     gap: NDArray[np.float64]
     normal: tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -132,13 +134,22 @@ def _nearest(
     master: Surface,
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
+    reach: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return the master edge nearest to each point along its normal, and whether there is one."""
+    """Return the master edge that faces each point and is nearest, and whether there is one.
+
+    A surface faces another where their normals are opposed, however far ahead, and up to ``reach``
+    behind, where the bodies overlap.
+    """
     passing = _cross(normals[:, :, None], x[:, None, master.vertices] - points[:, :, None])
     point, edge = _near(passing[:, :-1], passing[:, 1:])
+    chord = x[:, master.edges[edge, 1]] - x[:, master.edges[edge, 0]]
+    opposed = _cross(chord, normals[:, point]) > 0
+    point, edge = point[opposed], edge[opposed]
     eta, along = _project_on_master(x, master.edges[edge], points[:, point], normals[:, point])
     distance = np.full((points.shape[1], len(master.edges)), np.inf)
-    distance[point, edge] = np.where(np.abs(eta) <= 1 + 1e-6, np.abs(along), np.inf)
+    met = np.abs(eta) <= 1 + 1e-6
+    distance[point, edge] = np.where(met & (along > -reach), np.abs(along), np.inf)
     partner = distance.argmin(axis=1)
     return partner, np.isfinite(distance[np.arange(len(partner)), partner])
 
@@ -161,8 +172,12 @@ def pair(
     slave_u: NDArray[np.float64],
     master: Surface,
     master_u: NDArray[np.float64],
+    reach: float = np.inf,
 ) -> Pairing:
-    """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm]."""
+    """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm].
+
+    What lies farther than ``reach`` [mm] behind the slave does not face it.
+    """
     xs, xm = slave.X + slave_u, master.X + master_u
     normals = vertex_normals(xs, slave)
     cut, xi = _project_on_slave(xs, normals, slave, xm[:, master.vertices])
@@ -176,7 +191,7 @@ def pair(
         return position, n / np.linalg.norm(n, axis=0)
 
     middle, n = on_slave(edge, (start + end) / 2)
-    partner, facing = _nearest(xm, master, middle, n)
+    partner, facing = _nearest(xm, master, middle, n, reach)
     edge, partner, start, end = edge[facing], partner[facing], start[facing], end[facing]
 
     at = ((start + end)[:, None] + (end - start)[:, None] * _GAUSS_XI) / 2
@@ -206,17 +221,19 @@ def _integrate(
     jacobian = np.linalg.norm(
         (slave.X[:, slave.edges[edge]] * shape_derivatives(xi, k)).sum(axis=-1), axis=0
     )
+    bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
     weight = weight * jacobian * (slave.measure[slave.edges[edge]] * Ns).sum(axis=-1)
     hats = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
     t = np.stack([-n[1], n[0]])
 
     rows = len(slave.edges) + 1
-    area, gap = np.zeros(rows), np.zeros(rows)
+    area, gap, facing = np.zeros((3, rows))
     on_slave = np.zeros((2, rows, len(slave.nodes), 2))
     on_master = np.zeros((2, rows, len(master.nodes), 2))
     for end, hat in enumerate(hats):
         vertex = edge + end
         np.add.at(area, vertex, hat)
+        np.add.at(facing, vertex, bare[end])
         np.add.at(gap, vertex, hat * distance)
         for kind, direction in enumerate((n, -t)):
             for target, N, nodes, sign in (
@@ -233,6 +250,7 @@ def _integrate(
     flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in (on_slave, on_master)]
     return Pairing(
         area=np.where(covered, area, 0.0),
+        covered=facing / _hat_sum(np.ones_like(length)),
         length=_hat_sum(length) / _hat_sum(np.ones_like(length)),
         gap=np.where(covered, gap * scale, np.inf),
         normal=(flat[0][0], flat[1][0]),

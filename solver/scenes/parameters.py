@@ -14,6 +14,7 @@ from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
 
 from solver.errors import ModelError
 from solver.material import Hardening, Material
+from solver.model import ContactPair, effective_friction
 
 
 def described(default: Any, description: str) -> Any:
@@ -55,6 +56,36 @@ class MaterialParameters:
             hardening=self.hardening,
             hardening_ratio=self.hardening_ratio,
             isotropic_fraction=self.isotropic_fraction,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactParameters(MaterialParameters):
+    """Material and friction, which every scene of two bodies asks for."""
+
+    friction: Friction = described(0.0, "Coulomb friction coefficient")
+    shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
+        0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
+    )
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether the contact is solved without friction."""
+        return effective_friction(self.friction) == 0.0
+
+    def contact(
+        self,
+        slave: tuple[str, str],
+        master: tuple[str, str],
+        sliding: Literal["small", "finite"] = "small",
+    ) -> ContactPair:
+        """Return a pair of boundaries with this friction."""
+        return ContactPair(
+            slave=slave,
+            master=master,
+            friction=self.friction,
+            shear_limit=self.shear_limit or math.inf,
+            sliding=sliding,
         )
 
 

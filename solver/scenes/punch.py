@@ -26,12 +26,12 @@ from solver.body import Body
 from solver.elements import element_type
 from solver.errors import ModelError
 from solver.mesh import graded, grid
-from solver.model import ContactPair, Model
+from solver.model import Model
 from solver.outcome import Converged
 from solver.path import Path
 from solver.record import Record
 from solver.scenes.harvest import End, Harvest, Layout
-from solver.scenes.parameters import Friction, Length, MaterialParameters, Ratio, described
+from solver.scenes.parameters import ContactParameters, Length, Ratio, described
 from solver.scenes.scene import Monitor, Scene
 from solver.stepper import PathControl
 from solver.system import System
@@ -45,11 +45,10 @@ _MOST_ELEMENTS = 60_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PunchParameters(MaterialParameters):
+class PunchParameters(ContactParameters):
     """Parameters of the punch (N, mm, MPa)."""
 
     load_ratio: Ratio = described(0.5714, "mean pressure on the punch / yield stress")
-    friction: Friction = described(0.0, "Coulomb friction coefficient")
     state: Literal["plane_stress", "plane_strain", "axisymmetric"] = described(
         "plane_stress", "two-dimensional state; axisymmetric is a flat-ended cylinder"
     )
@@ -80,7 +79,7 @@ class PunchParameters(MaterialParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        MaterialParameters.__post_init__(self)
+        ContactParameters.__post_init__(self)
         under, beyond, up, down = (len(nodes) for nodes in _nodes(self))
         elements = under * up + (under + beyond) * down
         if elements > _MOST_ELEMENTS:
@@ -134,11 +133,7 @@ def model(parameters: PunchParameters) -> Model:
         element=parameters.element,
         supports={"left": "x", "bottom": "y"},
     )
-    contact = ContactPair(
-        slave=("punch", "bottom"),
-        master=("half_plane", "top"),
-        friction=parameters.friction,
-    )
+    contact = parameters.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
     return Model(bodies=(punch, half_plane), contacts=(contact,))
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from solver.errors import LimitLoad
 from solver.passes import PassResult
 from solver.record import Record
+from solver.scenes.free_surface import FreeSurface
 from solver.scenes.harvest import End, Harvest, Layout
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Monitor, Scene
@@ -62,6 +63,7 @@ def _figures(harvest: Harvest, trace: Trace, result: PassResult) -> dict[str, fl
         out[f"surface_residual_{name}"] = float(profile[0])
         out[f"lowest_residual_{name}"] = float(profile.min())
         out[f"depth_of_lowest_residual_{name}"] = float(depth[profile.argmin()])
+    out |= _surface(harvest.system, result)
     out["surface_plastic_strain"] = float(strain[middle, 0])
     out["highest_plastic_strain"] = float(strain[middle].max())
     out["depth_of_highest_plastic_strain"] = float(depth[strain[middle].argmax()])
@@ -74,6 +76,23 @@ def _figures(harvest: Harvest, trace: Trace, result: PassResult) -> dict[str, fl
         out["axle_height"] = float(wheel[-2])
         out["axle_rotation"] = float(wheel[-1]) / part.radius
     return out
+
+
+def _surface(system: System, result: PassResult) -> dict[str, float]:
+    """Return residual stress at mid-track that is not extrapolated to the surface."""
+    assert result.unloaded is not None
+    surface = FreeSurface.of(system.full("half_space"), "top")
+    response = system.response("half_space", result.unloaded)
+    u = system.displacement("half_space", result.unloaded.state)
+    free = surface.at(0.0, surface.stress(u, response.state.plastic_strain))
+    row = surface.at(0.0, surface.first_row(response.stress))
+    return {
+        "first_row_residual_x": float(row[0]),
+        "first_row_residual_z": float(row[1]),
+        "first_row_depth": float(surface.at(0.0, surface.depth)),
+        "free_surface_residual_x": float(free[0]),
+        "free_surface_residual_z": float(free[1]),
+    }
 
 
 def beyond_strength(parameters: RollingParameters) -> LimitLoad | None:

@@ -12,15 +12,15 @@ from annotated_types import Interval, Unit
 from solver.body import Body
 from solver.errors import ModelError
 from solver.material import Material
-from solver.mesh import graded, grid, mapped
-from solver.model import ContactPair, Model
+from solver.mesh import graded, grid, mapped, merged
+from solver.model import Model
 from solver.motion import Axle, AxleProgram, TravellingPressure
 from solver.passes import Schedule
-from solver.scenes.parameters import Friction, Length, MaterialParameters, described
+from solver.scenes.parameters import ContactParameters, Friction, Length, described
 from solver.scenes.settling import HALVINGS
 
-_MARGIN = 2.5  # fine track beyond the ends / Hertz half-width
-_RIM = 2.5  # fine rim beyond the track / Hertz half-width
+_MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
+_SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
 _HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
 _DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
 _PERIOD = 6.0  # least length of a track without ends / Hertz half-width
@@ -31,7 +31,7 @@ _MOST_INCREMENTS = 100_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RollingParameters(MaterialParameters):
+class RollingParameters(ContactParameters):
     """Parameters of rolling (N, mm, MPa; forces a mm of width)."""
 
     yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
@@ -95,12 +95,16 @@ class RollingParameters(MaterialParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        MaterialParameters.__post_init__(self)
-        if self.traction and not self.friction:
+        ContactParameters.__post_init__(self)
+        if self.traction and self.frictionless:
             raise ModelError("traction", self.traction, "must be 0 without friction")
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
+        if self.shear_limit and self.load == "hertz":
+            raise ModelError(
+                "shear_limit", self.shear_limit, "must be 0: load = hertz prescribes the shear"
+            )
         if prescribed and self.traction:
             raise ModelError("traction", self.traction, "must be 0 where creepage is given")
         if self.given_creepage and not prescribed:
@@ -116,7 +120,7 @@ class RollingParameters(MaterialParameters):
                 "advance_step", self.advance_step,
                 f"must be at most {self.track / 2:g} mm, half the track",
             )  # fmt: skip
-        columns = (self.track + 2 * _MARGIN * self.half_width) / self.element_size
+        columns = (self.track + 2 * self.margin) / self.element_size
         if columns > _MOST_COLUMNS:
             raise ModelError(
                 "element_size", self.element_size,
@@ -139,7 +143,7 @@ class RollingParameters(MaterialParameters):
             )  # fmt: skip
         longest = _LONGEST_REACH * math.pi * self.radius
         if self.load == "contact" and self.reach > longest:
-            room = 2 * (longest - _RIM * self.half_width) / self._turning
+            room = 2 * (longest - self.margin) / self._turning
             raise ModelError(
                 *(("track", self.track) if room > 0 else ("load_ratio", self.load_ratio)),
                 f"the rim of a wheel of radius {self.radius:g} has room for a track of at most "
@@ -147,9 +151,14 @@ class RollingParameters(MaterialParameters):
             )  # fmt: skip
 
     @property
+    def margin(self) -> float:
+        """Length beyond the end of the track that may come into contact [mm]."""
+        return max(_MARGIN, _SINKS * self.load_ratio) * self.half_width
+
+    @property
     def reach(self) -> float:
         """Half the length of the rim that may come into contact [mm]."""
-        return self.track / 2 * self._turning + _RIM * self.half_width
+        return self.track / 2 * self._turning + self.margin
 
     @property
     def _turning(self) -> float:
@@ -196,7 +205,7 @@ class RollingParameters(MaterialParameters):
 def _half_space(parameters: RollingParameters) -> Body:
     a, h = parameters.half_width, parameters.element_size
     periodic = parameters.periodic
-    fine = parameters.track / 2 + (0.0 if periodic else _MARGIN * a)
+    fine = parameters.track / 2 + (0.0 if periodic else parameters.margin)
     far = parameters.track if periodic else _HALF_SPACE * a
     beyond = fine + graded(far, h, 1.4, far / 4)[1:]
     track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
@@ -218,9 +227,12 @@ def _half_space(parameters: RollingParameters) -> Body:
             position=knots["position"],
             shear_ratio=ratio * ways,
         )
+    mesh = grid(x, y)
+    top = np.asarray(mesh.boundaries["top"])
+    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
     return Body(
         name="half_space",
-        mesh=grid(x, y),
+        mesh=mesh.with_boundaries({"track": top[np.abs(middle) < fine]}),
         material=parameters.material(),
         supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
@@ -252,7 +264,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     rotation = None
     if parameters.traction == 1.0:  # locked
         rotation = np.full_like(knots["time"], -turned)
-    elif parameters.control == "creepage" or parameters.friction == 0.0:
+    elif parameters.control == "creepage" or parameters.frictionless:
         # without friction nothing turns the wheel: it is turned to roll
         rotation = -turned - (1 - parameters.given_creepage) * knots["position"] / R
     program = AxleProgram(
@@ -264,7 +276,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     )
     return Body(
         name="wheel",
-        mesh=mapped(ring, around),
+        mesh=merged(mapped(ring, around)),
         material=Material(
             youngs_modulus=parameters.youngs_modulus * parameters.wheel_stiffness,
             poisson_ratio=parameters.poisson_ratio,
@@ -279,10 +291,7 @@ def model(parameters: RollingParameters) -> Model:
     half_space = _half_space(parameters)
     if parameters.load == "hertz":
         return Model(bodies=(half_space,))
-    contact = ContactPair(
-        slave=("half_space", "top"),
-        master=("wheel", "rim"),
-        friction=parameters.friction,
-        sliding="finite",
+    contact = parameters.contact(
+        slave=("half_space", "track"), master=("wheel", "rim"), sliding="finite"
     )
     return Model(bodies=(_wheel(parameters), half_space), contacts=(contact,))

@@ -55,11 +55,16 @@ class Contact:
         if not state.contacts[0].normal.any():
             gap = np.full_like(gap, np.nan)
 
-        def sampled(values: Array) -> Array:
-            found = np.interp(x, self._x[order], values[order], left=np.nan, right=np.nan)
+        def sampled(values: Array, beyond: Array) -> Array:
+            left, right = beyond
+            found = np.interp(x, self._x[order], values[order], left=left, right=right)
             return np.asarray(found)
 
-        return sampled(pressure), sampled(-shear), sampled(gap)
+        # contact does not go on where the surface of the pair ends and that of the body does not
+        free = np.where(self._interface.slave_surface.goes_on, 0.0, np.nan)
+        free = free if self._x[0] < self._x[-1] else free[::-1]
+        nowhere = np.full(2, np.nan)
+        return sampled(pressure, free), sampled(-shear, free), sampled(gap, nowhere)
 
     def extent(self, converged: Converged) -> tuple[float, float]:
         """See `Touch`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,8 @@ def natural_residual(problem, solution):
     worst = [np.abs(N - np.maximum(0.0, N - stiffness[:n] * motion[:n])).max()]
     if problem.frictional:
         bound = problem.friction * np.maximum(N, 0.0)
+        if problem.limit is not None:
+            bound = np.minimum(bound, problem.limit)
         wanted = np.clip(F[n:] - stiffness[n:] * motion[n:], -bound, bound)
         worst.append(np.abs(F[n:] - wanted).max())
     worst.append(np.abs(problem.balance + problem.A.T @ F).max(initial=0.0))
@@ -85,6 +89,38 @@ def test_frictional_solutions_satisfy_coulombs_law(friction, rigid):
         assert natural_residual(problem, solution) < 1e-8
         seen |= set(solution.status.tolist())
     assert seen == {OPEN, STICK, FORWARD, BACKWARD}
+
+
+@pytest.mark.parametrize("rigid", [0, 1, 2])
+@pytest.mark.parametrize("friction", [0.1, 0.4, 0.8])
+def test_frictional_solutions_keep_to_their_limits(friction, rigid):
+    """Limits spread over points, so that one instance has points at them and points below."""
+    at_limit = mixed = 0
+    for seed in range(60):
+        problem = instance(seed, friction, rigid=rigid)
+        limit = np.random.default_rng(seed + 1000).uniform(0.01, 0.2, problem.n) * friction
+        problem = replace(problem, limit=limit)
+        solution = solve_contact(problem, np.full(problem.n, OPEN))
+        assert solution is not None
+        assert natural_residual(problem, solution) < 1e-8
+        N, T = solution.forces[: problem.n], solution.forces[problem.n :]
+        full = np.isclose(np.abs(T), limit) & (limit < friction * N)
+        assert (solution.status[full] > STICK).all()
+        below = (solution.status > STICK) & ~full
+        at_limit += full.any()
+        mixed += full.any() and below.any()
+    assert at_limit > 25
+    assert mixed > 15
+
+
+def test_a_limit_that_is_not_reached_changes_no_number():
+    for seed in range(40):
+        problem = instance(seed, 0.4, rigid=seed % 3)
+        start = np.full(problem.n, STICK)
+        free = solve_contact(problem, start)
+        limited = solve_contact(replace(problem, limit=np.full(problem.n, 1e3)), start)
+        assert np.array_equal(free.forces, limited.forces)
+        assert np.array_equal(free.status, limited.status)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

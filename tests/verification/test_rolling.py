@@ -55,6 +55,10 @@ def test_rolling_the_other_way_gives_the_mirror_image():
             there = profile(forward, component, station)
             back = profile(backward, component, mirrored)
             assert np.abs(there - sign * back).max() < 1e-3
+    for kind in ("surface", "first_row", "free_surface"):
+        for component in "xz":
+            name = f"{kind}_residual_{component}"
+            assert forward.scalars[name] == pytest.approx(backward.scalars[name], abs=1e-3)
 
 
 # -- yielding ----------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from studies import Store, Study
 from studies.cli import main
 from studies.combine import combine
 from studies.comparison.compare import Comparison, _line, compare
-from studies.comparison.problem import REFINING
+from studies.comparison.problem import REFINING, differences, other_problem
 from studies.comparison.profiles import Computed, Profile, read_profiles
 from studies.comparison.reference import Published, published_cases, read_reference, reference_of
 from studies.comparison.table import comparison_table
@@ -24,6 +24,8 @@ from studies.dataset import STATUSES, run_dataset
 from studies.errors import StudyError
 from studies.parameters import parameters_of
 from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
+
+ROOT = Path(__file__).parents[3]
 
 
 def published(**given: object) -> Published:
@@ -297,6 +299,28 @@ def test_two_results_at_one_refinement_are_refused_with_what_refines_too(tmp_pat
 def test_what_refines_is_a_parameter_of_a_scene() -> None:
     known = {name for scene in SCENES.values() for name in parameters_of(scene)}
     assert known >= REFINING
+
+
+def test_meshes_whose_growth_goes_with_their_side_are_of_one_problem(tmp_path: Path) -> None:
+    paths = [
+        written(data_set({"A": 1}, (size,), fixed={"growth": growth}), tmp_path / f"{size}.nc")
+        for size, growth in ((2.0, 1.3225), (1.0, 1.15), (0.5, 1.0724))
+    ]
+    computed = read_profiles(paths, {})
+    assert computed.levels == [(2.0, 1.0), (1.0, 1.0), (0.5, 1.0)]
+    assert only(computed, published(value=-200.0)).orders[0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", ["rolling-convergence", "rolling-fine"])
+def test_studies_of_convergence_refine_depth_with_length_and_nothing_else(name: str) -> None:
+    """Growth to the power of 1 / element size is one number: sides in depth halve everywhere."""
+    study = Study.from_toml(ROOT / "data" / "studies" / f"{name}.toml")
+    cases = published_cases("rolling")
+    for case in study.cases():
+        base, place = cases[study.place(case)["case"]], study.place(case)
+        assert not other_problem(case.values, base, 1), place
+        assert set(differences(case.values, base)) <= REFINING | {"passes", "direction"}
+        assert case.values["growth"] == pytest.approx(1.15 ** case.values["element_size"], abs=1e-4)
 
 
 def test_an_advance_that_was_chosen_by_the_run_is_its_increment(tmp_path: Path) -> None:

@@ -1,0 +1,70 @@
+"""Contact must stay on its surfaces.
+
+A surface is a chain of edges that its body's boundary may go on beyond. What comes into contact
+there is not known to the problem: a state in which contact has come to such an end is wrong,
+however well it is in balance. Where the body ends with the chain, at a corner, contact ends too.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.candidates import Candidates
+    from solver.system import Interface, System
+
+_COVERED = 1 - 1e-6
+
+
+def strayed(system: System, u: tuple[NDArray[np.float64], ...], candidates: Candidates) -> str:
+    """Return which surface contact has come to the end of, or nothing."""
+    first = 0
+    for interface, vertices, covered in zip(
+        system.interfaces, candidates.vertices, candidates.covered, strict=True
+    ):
+        pressed = candidates.forces[first : first + len(vertices)] > 0
+        first += len(vertices)
+        side = _side(interface, u, vertices[pressed], covered[pressed])
+        if side is not None:
+            body = interface.parts[side].body.name
+            return (
+                f"contact has come to the end of the surface of body {body!r}, which goes on "
+                "beyond it: make the boundary of the contact pair longer"
+            )
+    return ""
+
+
+def _side(
+    interface: Interface,
+    u: tuple[NDArray[np.float64], ...],
+    vertices: NDArray[np.int64],
+    covered: NDArray[np.float64],
+) -> int | None:
+    """Return the side (0 slave, 1 master) whose end the vertices in contact have reached."""
+    slave, master = interface.slave_surface, interface.master_surface
+    last = len(slave.edges)
+    at_end = [end for end, vertex in enumerate((0, last)) if vertex in vertices]
+    cut = vertices[covered < _COVERED]
+    if not any(slave.goes_on[end] for end in at_end) and not len(cut):
+        return None
+    (xs, xm) = (
+        chain.X[:, chain.vertices] + part.motion(chain, u[number])[:, chain.vertices]
+        for number, part, chain in interface.sides
+    )
+    ends = xm[:, [0, -1]]
+    for end in at_end:
+        here = xs[:, -end]
+        nearest = np.linalg.norm(ends - here[:, None], axis=0)
+        edge = np.linalg.norm(xs[:, -end] - xs[:, (1, -2)[end]])
+        master_ends_too = nearest.min() < edge / 2 and not master.goes_on[nearest.argmin()]
+        if slave.goes_on[end] and not master_ends_too:
+            return 0
+    for vertex in cut:
+        nearest = np.linalg.norm(ends - xs[:, vertex, None], axis=0)
+        if master.goes_on[nearest.argmin()]:
+            return 1
+    return None

@@ -1,0 +1,107 @@
+"""The contact problem with given friction bounds: convex, solved by Lemke's method."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.complementarity import ContactProblem
+
+_PIVOTS_PER_UNKNOWN = 20
+
+
+def given_bound(
+    problem: ContactProblem, bound: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return forces and rigid motions when |T| <= bound is given.
+
+    A convex problem, solved by Lemke's method.
+
+    z = (N, tau, back), w = (gap, fore, sigma) with tau = T / bound + 1, sigma = 1 - T / bound
+    and slip = fore - back: the matrix is positive semidefinite but for the scale of its
+    columns, so the method ends with a solution where one exists. In units of its bound a
+    tangential force is as exact under the least friction as a normal one. Rigid motions are
+    eliminated by a principal pivot on as many contact forces as there are motions.
+    """
+    # compiled, and rarely needed: only who comes here pays for importing the compiler
+    from solver.contact.lemke import lemke
+
+    n, k = problem.n, len(problem.balance)
+    # scaled so that forces and gaps are of order one
+    force, length = problem.scales
+    at = np.flatnonzero(bound > 0) if problem.frictional else np.zeros(0, dtype=int)
+    m = len(at)
+    rows = np.concatenate([np.arange(n), n + at])
+    limit = bound[at] / force
+    unit = np.concatenate([np.ones(n), limit])
+    M = np.zeros((n + 2 * m, n + 2 * m))
+    M[: n + m, : n + m] = force / length * problem.W[np.ix_(rows, rows)] * unit
+    M[n : n + m, n + m :] = np.eye(m)
+    M[n + m :, n : n + m] = -np.eye(m)
+    r = np.concatenate([problem.offset[rows] / length, np.full(m, 2.0)])
+    r[: n + m] -= M[: n + m, n : n + m].sum(axis=1)
+    held = np.zeros(0, dtype=int)
+    if k:
+        shape = np.abs(problem.A).max()
+        A = np.zeros((n + 2 * m, k))
+        A[: n + m] = problem.A[rows] / shape
+        columns = np.zeros((k, n + 2 * m))
+        columns[:, : n + m] = A[: n + m].T * unit
+        balance = problem.balance / (force * shape) - columns[:, n : n + m].sum(axis=1)
+        held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
+        if len(held) < k:  # too few points to hold what floats
+            return None
+        eliminated = _eliminate(M, r, A, columns, balance, held)
+        if eliminated is None:
+            return None
+        whole, (M, r) = (M[held], r[held]), eliminated
+    z, solved = lemke(M, r, _PIVOTS_PER_UNKNOWN * len(r))
+    if not solved:
+        return None
+    q = np.zeros(k)
+    if k:
+        motion = z[held]
+        z[held] = (M @ z + r)[held]
+        q = np.linalg.solve(A[held], motion - whole[0] @ z - whole[1]) * length / shape
+    F = np.zeros(len(problem.offset))
+    F[:n] = force * z[:n]
+    F[n + at] = bound[at] * (z[n : n + m] - 1)
+    return F, q
+
+
+def _eliminate(
+    M: NDArray[np.float64],
+    r: NDArray[np.float64],
+    A: NDArray[np.float64],
+    columns: NDArray[np.float64],
+    balance: NDArray[np.float64],
+    held: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Exchange the normal forces ``held`` with their gaps, and remove the rigid motions."""
+    N, k = M.shape[0], len(held)
+    rest = np.setdiff1d(np.arange(N), held)
+    block = np.zeros((2 * k, 2 * k))
+    block[:k, :k] = M[np.ix_(held, held)]
+    block[:k, k:] = A[held]
+    block[k:, :k] = columns[:, held]
+    known = np.zeros((2 * k, N + 1))  # of (gap at held, other z, 1)
+    known[np.arange(k), held] = 1.0
+    known[:k, rest] = -M[np.ix_(held, rest)]
+    known[k:, rest] = -columns[:, rest]
+    known[:k, N] = -r[held]
+    known[k:, N] = -balance
+    try:
+        inner = np.linalg.solve(block, known)
+    except np.linalg.LinAlgError:
+        return None
+    new = np.zeros((N, N + 1))
+    new[held] = inner[:k]
+    new[rest] = M[np.ix_(rest, held)] @ inner[:k] + A[rest] @ inner[k:]
+    new[np.ix_(rest, rest)] += M[np.ix_(rest, rest)]
+    new[rest, N] += r[rest]
+    return new[:, :N], new[:, N]

@@ -1,0 +1,65 @@
+"""Bodies that overlap before loading: by how much, and how much is allowed.
+
+A small overlap is pushed apart in the first increment. One that is a good part of a body is a
+mistake in the model: small strains cannot undo it, and which surface a point came through is a
+guess.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.body import Body
+    from solver.surface import Surface
+
+_ALLOWED = 0.05
+
+
+def largest_overlap(first: Body, second: Body) -> float:
+    """Return the overlap allowed: a twentieth of the thinner body's narrow side [mm]."""
+    return _ALLOWED * float(min(np.ptp(body.mesh.p, axis=1).min() for body in (first, second)))
+
+
+def check_overlap(slave: Body, master: Body, sides: tuple[Surface, Surface]) -> None:
+    """Raise `ModelError` where a vertex of either surface is too deep inside the other body."""
+    allowed = largest_overlap(slave, master)
+    for body, other, surface in ((slave, master, sides[0]), (master, slave, sides[1])):
+        points = surface.X[:, surface.vertices]
+        depth = _depth(points, other, allowed)
+        if depth.max(initial=0.0) > allowed:
+            x, y = points[:, depth.argmax()]
+            raise ModelError(
+                "contacts", (body.name, other.name),
+                f"body {body.name!r} overlaps {other.name!r} by {depth.max():.4g} mm at "
+                f"x = {x:.4g}, y = {y:.4g} mm; at most {allowed:.4g} mm, a twentieth of the "
+                "thinner body, can be pushed apart",
+            )  # fmt: skip
+
+
+def _depth(points: NDArray[np.float64], body: Body, allowed: float) -> NDArray[np.float64]:
+    """Return how deep points (2, n) are inside a body (n,) [mm], 0 for those outside."""
+    mesh = body.mesh
+    low, high = mesh.p.min(axis=1) + allowed, mesh.p.max(axis=1) - allowed
+    within = ((points.T > low) & (points.T < high)).all(axis=1)
+    depth = np.zeros(points.shape[1])
+    start, end = (mesh.p[:, nodes] for nodes in mesh.facets[:, mesh.boundary_facets()])
+    for i in np.flatnonzero(within):
+        point = points[:, i, None]
+        # a ray along x crosses the outline an odd number of times from inside
+        above, below = start[1] > point[1], end[1] > point[1]
+        crosses = above != below
+        share = (point[1] - start[1, crosses]) / (end[1, crosses] - start[1, crosses])
+        at = start[0, crosses] + share * (end[0, crosses] - start[0, crosses])
+        if (at > point[0]).sum() % 2:
+            along = end - start
+            share = ((point - start) * along).sum(axis=0) / (along**2).sum(axis=0)
+            foot = start + np.clip(share, 0.0, 1.0) * along
+            depth[i] = np.linalg.norm(point - foot, axis=0).min()
+    return depth

@@ -1,0 +1,83 @@
+"""One Newton step: all parts at once, condensed to the contact points and solved there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.complementarity import ContactProblem, solve_contact
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.candidates import Candidates
+    from solver.operators import Operator
+    from solver.system import System
+
+    Vectors = tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Displacements of each part, contact forces and statuses, and whether these were pivoted."""
+
+    u: Vectors
+    forces: NDArray[np.float64]
+    status: NDArray[np.int64]
+    pivoted: bool
+
+
+def on_parts(system: System, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
+    """Return the nodal forces that contact forces exert on each part [N]."""
+    return tuple(candidates.on_part(i, forces, part.n) for i, part in enumerate(system.parts))
+
+
+def newton_step(
+    system: System,
+    residuals: Vectors,
+    operators: Sequence[Operator],
+    candidates: Candidates,
+    contact: bool,
+) -> Step | None:
+    """Return the step under given tangents, or None where no contact forces balance the load.
+
+    Parameters
+    ----------
+    residuals : external minus internal forces of each part, contact forces left out [N]
+    contact : False leaves floating bodies where they are
+    """
+    # all large forces balance first: what is left to solve for is small, and rounding of
+    # the factor, about 1e-16 (size of the body / smallest element)^2, acts on that alone
+    held = on_parts(system, candidates, candidates.forces)
+    balanced = [r + c for r, c in zip(residuals, held, strict=True)]
+    W = candidates.compliance(operators)
+    motion = candidates.motion - W @ candidates.forces
+    for i, (operator, r) in enumerate(zip(operators, balanced, strict=True)):
+        motion += candidates.of_part(i, operator.solve(r))
+    floating = [part.rigid if contact else part.rigid[:, :0] for part in system.parts]
+    solution = solve_contact(
+        ContactProblem(
+            W=W,
+            offset=motion,
+            friction=candidates.friction,
+            limit=candidates.limit,
+            A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
+            balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
+        ),
+        candidates.status,
+    )
+    if solution is None:
+        return None
+    change = on_parts(system, candidates, solution.forces - candidates.forces)
+    rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
+    u = tuple(
+        operator.solve(r + c) + R @ q
+        for operator, r, c, R, q in zip(operators, balanced, change, floating, rigid, strict=True)
+    )
+    if not all(np.isfinite(du).all() for du in u):
+        return None
+    return Step(u, solution.forces, solution.status, solution.pivoted)
