@@ -48,6 +48,8 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
+_MOVING = 0.01
+"""Share of an increment's displacements in its last step above which it has not come to rest."""
 _LATE = 1
 """Iterations after which a step without stiffness tells that the structure flows."""
 
@@ -95,7 +97,7 @@ class Increment:
         origin = self.guess or self.start
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
-        best, since_best, softest = np.inf, 0, Flow()
+        best, since_best, softest, moving = np.inf, 0, Flow(), False
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
@@ -116,6 +118,7 @@ class Increment:
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
             share, u, responses = self._search(u, residuals, candidates, step)
+            moving = share * _largest(step.u) > _MOVING * _largest(u, self.start.u)
             forces = (1 - share) * candidates.forces + share * step.forces
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
@@ -123,8 +126,8 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            # what stops at rounding does not flow
-            softest if best > _UNBALANCED * tolerances.residual else None,
+            # what stops at rounding does not flow; what flows on without resistance is in balance
+            softest if moving or best > _UNBALANCED * tolerances.residual else None,
         )
 
     # -- 1, 2: where we are ------------------------------------------------------------------
@@ -278,6 +281,12 @@ class Increment:
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),
         )
+
+
+def _largest(vectors: Vectors, origin: Vectors | None = None) -> float:
+    """Return the largest change of an unknown from an origin, or from zero."""
+    start = origin or tuple(np.zeros_like(v) for v in vectors)
+    return max(float(np.abs(v - o).max()) for v, o in zip(vectors, start, strict=True))
 
 
 def _norm(vectors: Sequence[NDArray[np.float64]]) -> float:

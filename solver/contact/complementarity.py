@@ -150,11 +150,15 @@ def _forces(
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
     rhs *= weight
-    _, _, solution, info = linalg.lapack.dgesv(S, rhs)
-    if info or not _solves(S, solution, rhs):
-        if not size or np.linalg.matrix_rank(problem.A[rows]) == k:
+    # fewer conditions than motions: the body is free to turn about the one point it stands on.
+    # A factor of that singular matrix turns it as rounding likes; the least solution does not
+    free = 0 < size < k
+    if not free:
+        _, _, solution, info = linalg.lapack.dgesv(S, rhs)
+        free = bool(info) or not _solves(S, solution, rhs)
+        if free and (not size or np.linalg.matrix_rank(problem.A[rows]) == k):
             return None
-        # a body on one point is free to turn about it, and stays where nothing turns it
+    if free:
         solution = linalg.lstsq(S, rhs)[0]
         if not _solves(S, solution, rhs):
             return None
@@ -244,6 +248,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
         before, bound = bound, problem.bound(N)
         if np.abs(bound - before).max() < 1e-12 * force:
+            F = np.where(np.resize(status, len(F)) == OPEN, 0.0, F)
             return ContactSolution(F, q, status, True) if _holds(problem, F, q) else None
     return None
 

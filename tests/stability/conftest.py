@@ -1,4 +1,4 @@
-"""Runs each extreme scene once, and prints what all of them came to."""
+"""Runs each scene once, and prints what all of them came to."""
 
 from __future__ import annotations
 
@@ -6,24 +6,22 @@ from collections.abc import Callable
 
 import pytest
 
-from solver import Status
-from tests.stability.scenes import extreme_scenes
+from tests.stability.families import scene
 from tests.stability.table import describe, summary
-from tests.stability.trial import Trial, attempt
+from tests.stability.trial import Trial, Verdict, attempt
 
-_TRIALS = pytest.StashKey[dict[int, Trial]]()
+_TRIALS = pytest.StashKey[dict[str, Trial]]()
 
 
 @pytest.fixture(scope="session")
-def trial(request: pytest.FixtureRequest) -> Callable[[int], Trial]:
-    """Return the outcome of a scene by its number."""
+def trial(request: pytest.FixtureRequest) -> Callable[[str], Trial]:
+    """Return the end of a scene by its name, ``family-number``."""
     done = request.config.stash.setdefault(_TRIALS, {})
-    scenes = extreme_scenes()
 
-    def of(number: int) -> Trial:
-        if number not in done:
-            done[number] = attempt(number, scenes[number])
-        return done[number]
+    def of(name: str) -> Trial:
+        if name not in done:
+            done[name] = attempt(name, scene(name))
+        return done[name]
 
     return of
 
@@ -31,11 +29,11 @@ def trial(request: pytest.FixtureRequest) -> Callable[[int], Trial]:
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Print the table, and every scene without a usable answer that was not a collapse."""
+    """Print the table, and every scene that did not end as it must or did not converge."""
     trials = list(config.stash.get(_TRIALS, {}).values())
     if not trials:
         return
     terminalreporter.section("extreme scenes")
-    lost = [t for t in trials if t.status not in (Status.OK, Status.LIMIT_LOAD)]
-    for line in summary(trials) + [describe(t) for t in lost]:
+    told = [t for t in trials if not t.right or t.verdict is Verdict.HONEST]
+    for line in summary(trials) + [describe(t) for t in told]:
         terminalreporter.write_line(line)

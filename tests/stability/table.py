@@ -1,61 +1,65 @@
-"""What the extreme scenes came to, in a page."""
+"""What the scenes came to, in a page."""
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import asdict, fields
 
-import numpy as np
-
-from solver import Status
-from solver.scenes.punch import PunchParameters
-from tests.stability.oracle import LIMITS
-from tests.stability.trial import Trial
+from tests.stability.trial import Figure, Trial, Verdict
 
 
 def summary(trials: Sequence[Trial]) -> list[str]:
-    """Return lines: statuses, effort, worst figures of the oracle and of the audit."""
-    done = [t for t in trials if t.figures]
-    count = Counter(t.status for t in trials)
+    """Return lines: verdicts by family, effort, the worst figures of the oracles."""
+    count = Counter(t.verdict for t in trials)
+    always = (Verdict.WRONG, Verdict.FALSE_LIMIT, Verdict.HUNG, Verdict.NOT_CONVERGED)
+    told = ", ".join(f"{count[v]} {v.value}" for v in Verdict if count[v] or v in always)
     seconds = [t.seconds for t in trials]
+    slowest = max(trials, key=lambda t: t.seconds)
     lines = [
-        f"{len(trials)} scenes: " + ", ".join(f"{count[s]} {s.name}" for s in Status if count[s]),
-        f"slowest {max(seconds):.1f} s, all {sum(seconds):.0f} s",
+        f"{len(trials)} scenes: {told}",
+        f"slowest {slowest.seconds:.1f} s ({slowest.name}), all {sum(seconds):.0f} s of CPU",
+        f"{'family':<16}{'scenes':>7}{'right':>7}{'CPU [s]':>9}  worst figure",
     ]
-    scalars = [t.record.scalars for t in done]
-    if not done:
-        return lines
-    increments = sum(s["increments"] for s in scalars)
-    lines.append(
-        f"{increments:.0f} increments of the {len(done)} carried: {_total(done, 'iterations'):.0f}"
-        f" iterations (at most {max(s['iterations'] / s['increments'] for s in scalars):.1f} an "
-        f"increment of a scene), {_total(done, 'cut_increments'):.0f} cuts, "
-        f"{_total(done, 'blended_tangents'):.0f} blended tangents"
-    )
-    lines.append(f"{'oracle':<32}{'worst':>10}{'limit':>10}  scene")
-    for name, limit in LIMITS.items():
-        worst = max(done, key=lambda t: t.figures[name])
-        lines.append(f"{name:<32}{worst.figures[name]:>10.1e}{limit:>10.0e}  {worst.number}")
-    lines.append(f"{'audit, stored with the run':<32}{'worst':>10}{'median':>10}  scene")
-    for name in sorted(n for n in scalars[0] if n.startswith("audit_")):
-        # the least dissipation is negative where it is wrong
-        sign = -1.0 if name == "audit_dissipation" else 1.0
-        worst = max(done, key=lambda t: sign * t.record.scalars[name])
-        middle = np.median([s[name] for s in scalars])
-        value = worst.record.scalars[name]
-        lines.append(f"{name:<32}{value:>10.1e}{middle:>10.1e}  {worst.number}")
+    for family, members in _families(trials).items():
+        right = sum(t.right for t in members)
+        spent = sum(t.seconds for t in members)
+        lines.append(
+            f"{family:<16}{len(members):>7}{right:>7}{spent:>9.1f}  {_worst_of_all(members)}"
+        )
+    lines.append(f"{'oracles of right answers':<32}{'worst':>10}{'limit':>10}  scene")
+    for name, (figure, scene) in sorted(_worst(trials).items()):
+        lines.append(f"{name:<32}{figure.value:>10.1e}{figure.limit:>10.0e}  {scene}")
     return lines
 
 
 def describe(trial: Trial) -> str:
-    """Return what is needed to run a scene again, and how it ended."""
-    default = PunchParameters()
-    given = {f.name: getattr(trial.parameters, f.name) for f in fields(PunchParameters)}
-    changed = {k: v for k, v in given.items() if v != asdict(default)[k]}
-    text = ", ".join(f"{k}={v!r}" for k, v in changed.items())
-    return f"scene {trial.number}: {trial.status.name}: {trial.record.message}\n    {text}"
+    """Return how a scene ended and what it is."""
+    return f"{trial.name}: {trial.verdict.value}: {trial.message}\n    {trial.scene.what}"
 
 
-def _total(trials: Sequence[Trial], name: str) -> float:
-    return float(sum(t.record.scalars[name] for t in trials))
+def _families(trials: Sequence[Trial]) -> dict[str, list[Trial]]:
+    out: dict[str, list[Trial]] = defaultdict(list)
+    for trial in trials:
+        out[trial.name.rpartition("-")[0]].append(trial)
+    return out
+
+
+def _share(figure: Figure) -> float:
+    return figure.value / figure.limit if figure.limit else figure.value
+
+
+def _worst(trials: Sequence[Trial]) -> dict[str, tuple[Figure, str]]:
+    out: dict[str, tuple[Figure, str]] = {}
+    for trial in trials:
+        for name, figure in trial.figures.items() if trial.right else ():
+            if name not in out or _share(figure) > _share(out[name][0]):
+                out[name] = (figure, trial.name)
+    return out
+
+
+def _worst_of_all(trials: Sequence[Trial]) -> str:
+    worst = _worst(trials)
+    if not worst:
+        return ""
+    name, (figure, _) = max(worst.items(), key=lambda item: _share(item[1][0]))
+    return f"{name} {figure.value:.1e} of {figure.limit:.0e}"

@@ -10,7 +10,7 @@ import pytest
 from solver import Branch, Path, PathControl, System
 from solver.outcome import Converged
 from solver.scenes.punch import PunchParameters, model
-from tests.stability.oracle import LIMITS, judge
+from tests.stability.kinds.punch_oracle import LIMITS, judge
 
 PARAMETERS = PunchParameters(
     friction=0.4, load_ratio=0.7, smallest_element=0.03, growth=2.0, half_plane_size=4.0

@@ -63,7 +63,7 @@ def judge(parameters: PunchParameters, system: System, branch: Branch) -> dict[s
         ],
         "residual_work": [_work(system, body, unloaded, axis) for body in _BODIES for axis in "xy"],
     }
-    laws = [_law(system, b, c) for b in _BODIES for c in (loaded, unloaded)]
+    laws = [law(system, b, c) for b in _BODIES for c in (loaded, unloaded)]
     return {
         "force": abs(N.sum() - force) / force,
         **{name: max(abs(v) for v in values) / force for name, values in work.items()},
@@ -131,7 +131,7 @@ def _hats(parameters: PunchParameters, system: System, converged: Converged) -> 
     return under_hats(at) / area, under_hats(value) / area
 
 
-def _law(system: System, body: str, converged: Converged) -> dict[str, float]:
+def law(system: System, body: str, converged: Converged) -> dict[str, float]:
     """Return how far stress and strain at the points of a body are from its law."""
     part, response = system.full(body), system.response(body, converged)
     material, stress = part.body.material, response.stress

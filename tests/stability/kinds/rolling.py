@@ -1,0 +1,244 @@
+"""Wheels on coarse short tracks: light to heavy loads, coasting to nearly locked or spinning."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import partial
+from itertools import product
+
+import numpy as np
+import pytest
+
+from solver import SCENES, LimitLoad, NotConverged, Record, Status, System, passes
+from solver.scenes import rolling
+from solver.scenes.harvest import End, Harvest
+from solver.scenes.rolling_model import RollingParameters
+from solver.state import State
+from solver.stepper import Point, Stepper, Stopped
+from tests.stability.kinds.punch_oracle import law
+from tests.stability.trial import Figure, Scene, tells
+
+COUNT = 40
+SEED = 1882
+LOADS = (0.5, 1.0, 2.0, 4.0, 10.0)
+TRACTIONS = (-0.99, -0.75, 0.0, 0.75, 0.99)
+FRICTION = (0.1, 0.3, 0.5)
+RULES = ("none", "isotropic", "kinematic")
+WIDTHS = 2.5
+"""Length of the track over the Hertz half-width."""
+
+HEAVY = 4.0
+"""Loads from which the contact may spread beyond the fine rim, which must then be told."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rolled:
+    """The record of a run, and what it was taken from."""
+
+    parameters: RollingParameters
+    record: Record
+    system: System
+    end: End
+
+
+def parameters_of(number: int, rng: np.random.Generator) -> RollingParameters:
+    """Return a wheel whose contact is about eight elements wide."""
+    cases = list(product(LOADS, TRACTIONS))
+    load, traction = cases[number % len(cases)]
+    friction = float(rng.choice(FRICTION)) if traction else float(rng.choice([0.0, *FRICTION]))
+    rule = RULES[(number + number // len(cases)) % 3]
+    given = {
+        "load_ratio": load,
+        "traction": traction,
+        "friction": friction,
+        "hardening": rule,
+        "hardening_ratio": 0.0 if rule == "none" else float(rng.choice([0.01, 0.1])),
+    }
+    # the half-width grows with load and radius: one track for all
+    radius = 334.92 / load
+    a = RollingParameters(radius=radius, load_ratio=load).half_width
+    return RollingParameters(
+        radius=radius,
+        track=WIDTHS * a,
+        element_size=a / 4,
+        growth=1.5,
+        advance_step=WIDTHS * a / 10,
+        press_steps=4,
+        unload_steps=2,
+        **given,
+    )
+
+
+def roll(parameters: RollingParameters) -> Rolled:
+    """Run the scene, or raise what ended it."""
+    seen: list[tuple[System, End]] = []
+
+    class Watched(Harvest):
+        def record(self, parameters: object, end: End) -> Record:
+            seen.append((self.system, end))
+            return super().record(parameters, end)
+
+    last: list[State] = []
+
+    class Stepping(Stepper):
+        def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
+            try:
+                return super().advance(point, target, contact=contact)
+            except Stopped as stopped:
+                last.append(stopped.point.now.state)
+                raise
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rolling, "Harvest", Watched)
+        patch.setattr(passes, "Stepper", Stepping)
+        (record,) = SCENES["rolling"].path(parameters, [1], lambda share, message: None)
+    ((system, end),) = seen
+    if end.error is not None:
+        raise _judged(parameters, system, end.error, last[-1])
+    return Rolled(parameters=parameters, record=record, system=system, end=end)
+
+
+def _judged(
+    parameters: RollingParameters, system: System, error: NotConverged, last: State
+) -> NotConverged:
+    """Return the error, told as a `LimitLoad` only where no equilibrium is proven to exist.
+
+    The mechanism of a driven wheel is a thin layer under the contact, as wide as it is, that
+    shears: without hardening it bears k times that width (upper bound theorem), and no more
+    traction. Pressed alone, a wheel sinks until the contact is wide enough. A limit of a body
+    that hardens is false, and left as it is.
+    """
+    p = parameters
+    if not isinstance(error, LimitLoad) or p.hardening != "none":
+        return error
+    surface = system.interfaces[0].slave_surface
+    x = surface.X[0, surface.vertices][last.contacts[0].normal > 0]
+    width = float(np.ptp(x)) + p.element_size if len(x) else 0.0
+    driven = min(max(error.attempted - 1.0, 0.0), 1.0)
+    shear = abs(p.traction) * p.friction * p.force * driven
+    borne = p.yield_stress / math.sqrt(3) * width
+    if shear > borne:
+        return error
+    text = f"{error} [traction {shear:.4g} N, a contact {width:.3g} mm wide bears {borne:.4g} N]"
+    return NotConverged(text, error.reached, error.attempted)
+
+
+def judge(rolled: Rolled) -> dict[str, Figure]:
+    """Return the figures: resultants from the record, laws from what it was taken from.
+
+    The record samples a piecewise linear pressure at eight points a millimetre: its integral
+    lacks what the kinks at the vertices make, about (spacing / element)^2 of it.
+    """
+    p, record = rolled.parameters, rolled.record
+    force = p.force
+    way = p.traction * p.friction * force
+    figures = {"audit": Figure(float(record.status is not Status.OK), 0.0)}
+    if record.status is not Status.OK:
+        return figures
+    stages = list(record.coordinates["stage"])
+    s = record.coordinates["s"]
+    near = 0.02 + (s[1] - s[0]) ** 2 / p.element_size**2
+    for stage in ("loaded", "mid_track"):
+        at = stages.index(stage)
+        pressure, shear = (
+            np.nan_to_num(record.fields[name][1][at])
+            for name in ("contact_pressure", "contact_shear")
+        )
+        figures |= {
+            f"pressure {stage}": Figure(abs(np.trapezoid(pressure, s) / force - 1), near),
+            f"shear {stage}": Figure(abs(np.trapezoid(shear, s) - way) / force, near),
+            f"cone {stage}": Figure(
+                float((np.abs(shear) - p.friction * pressure).max() / pressure.max()), 1e-6
+            ),
+            f"tension {stage}": Figure(-float(pressure.min()) / pressure.max(), 1e-9),
+        }
+        touching = s[pressure > 0]
+        if stage == "loaded":  # at the end of the way, and the fine rim ends a margin beyond it
+            beyond = float(np.abs(touching).max()) - p.margin
+            figures["beyond the rim loaded"] = Figure(beyond, 0.0)
+    # pressure off the middle turns the wheel as well: P e in R F, and e is within the contact
+    longitudinal = abs(record.scalars["longitudinal_force"] - way)
+    figures["longitudinal force"] = Figure(longitudinal / force, p.half_width / p.radius)
+    return figures | _laws(rolled) | _wheel(rolled)
+
+
+def _wheel(rolled: Rolled) -> dict[str, Figure]:
+    """Return figures of the wheel's balance, from the stress in the track.
+
+    What the stress leaves at the nodes of the surface is the contact force on them. Friction alone
+    turns the wheel in the solver, on the arm of its rim; here pressure has its moment too. The two
+    are one in the continuum; on about eight points of contact the middle of the pressure is known
+    to some hundredths of the half-width.
+    """
+    p, end = rolled.parameters, rolled.end
+    assert end.loaded is not None
+    system = rolled.system
+    track = system.full("half_space")
+    nodes = track.boundary_nodes("top")
+    left = track.internal_force(system.response("half_space", end.loaded).stress)
+    force = left.reshape(-1, 2)[nodes].T
+    u = system.displacement("half_space", end.loaded.state).reshape(-1, 2)[nodes].T
+    hub = np.array([0.0, p.radius]) + end.loaded.state.u[0][-3:-1]
+    arm = track.X[:, nodes] + u - hub[:, None]
+    turning = -float((arm[0] * force[1] - arm[1] * force[0]).sum())
+    figures = {"vertical force": Figure(abs(float(force[1].sum()) / p.force + 1), 1e-7)}
+    if p.friction and p.traction:
+        wanted = p.radius * p.traction * p.friction * p.force
+        miss = abs(turning + wanted) / (p.radius * p.force)
+        figures["moment"] = Figure(miss, 0.02 * p.half_width / p.radius)
+    return figures
+
+
+def _laws(rolled: Rolled) -> dict[str, Figure]:
+    end, system = rolled.end, rolled.system
+    assert end.loaded is not None
+    assert end.unloaded is not None
+    (contact,) = end.loaded.state.contacts
+    N, T = contact.normal, contact.tangential
+    surface, p = system.interfaces[0].slave_surface, rolled.parameters
+    touching = np.abs(surface.X[0, surface.vertices])[N > 0]
+    laws = [law(system, "half_space", c) for c in (end.loaded, end.unloaded)]
+    first, last = (
+        system.response("half_space", c).state.accumulated for c in (end.loaded, end.unloaded)
+    )
+    largest = max(float(last.max()), 1e-12)
+    return {
+        **{k: Figure(max(found[k] for found in laws), 1e-7) for k in laws[0]},
+        # the last vertex of the fine track must be open
+        "beyond the rim mid_track": Figure(
+            float(touching.max()) + p.element_size / 2 - p.track / 2 - p.margin, 0.0
+        ),
+        "force cone": Figure(float((np.abs(T) - p.friction * N).max() / N.sum()), 1e-6),
+        "force tension": Figure(-float(N.min()) / float(N.sum()), 0.0),
+        "plastic strain shrinks": Figure(float((first - last).max()) / largest, 1e-12),
+        "left over": Figure(
+            float(max(np.abs(c.normal).max() for c in end.unloaded.state.contacts)), 0.0
+        ),
+    }
+
+
+off_the_rim = tells("contact", "rim|fine track|beyond")
+
+
+def scenes() -> list[Scene]:
+    """Return the wheels."""
+    rng = np.random.default_rng(SEED)
+    made = [parameters_of(number, rng) for number in range(COUNT)]
+    default = RollingParameters()
+    return [
+        Scene(
+            what=", ".join(
+                f"{f.name}={getattr(p, f.name)!r}"
+                for f in fields(p)
+                if getattr(p, f.name) != getattr(default, f.name)
+            ),
+            run=partial(roll, p),
+            judge=judge,
+            refusal=off_the_rim if p.load_ratio >= HEAVY else None,
+            honest=off_the_rim if p.load_ratio >= HEAVY else None,
+            safe=math.inf if p.hardening != "none" else 0.0,
+            in_loads=False,
+        )
+        for p in made
+    ]
