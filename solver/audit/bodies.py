@@ -12,6 +12,8 @@ from solver.kinematics import to_tensor
 from solver.substructure import Substructure
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from solver.outcome import Converged
@@ -95,20 +97,28 @@ class AuditedBody:
             return self.plain.elastic_energy(self.stress(converged))
         return part.stiffness_along(u, converged.responses[self._number])[1] / 2
 
-    def law(self, converged: Converged) -> tuple[float, float]:
-        """Return how far the increment is from its law, and its stress beyond yield, relative."""
+    def law(self, states: Sequence[Converged]) -> tuple[float, float]:
+        """Return how far increments are from their law, and stress beyond yield, relative.
+
+        To the yield stress, or the largest stress of a body that cannot yield.
+        """
         if not self.meshed:
             return 0.0, 0.0
-        body, response = self.plain.body, converged.responses[self._number]
-        before = of_state(converged.start.plastic[self._number])
-        after = of_state(response.state)
-        stress = to_tensor(response.stress)
-        strain = self.strain(converged.state).reshape(4, -1)
-        broken = law_error(strain, stress, before, after, body.material, body.state)
-        if body.material.elastic:
-            return broken, 0.0
-        beyond = excess(stress, *after, body.material).max(initial=0.0)
-        return broken, float(beyond) / body.material.yield_stress
+        body, broken, beyond, largest = self.plain.body, 0.0, 0.0, 1e-300
+        for converged in states:
+            response = converged.responses[self._number]
+            before = of_state(converged.start.plastic[self._number])
+            after = of_state(response.state)
+            stress = to_tensor(response.stress)
+            strain = self.strain(converged.state).reshape(4, -1)
+            here = law_error(strain, stress, before, after, body.material, body.state)
+            broken = float(np.maximum(broken, here))
+            largest = max(largest, float(np.abs(stress).max(initial=0.0)))
+            if not body.material.elastic:
+                f = excess(stress, *after, body.material).max(initial=0.0)
+                beyond = float(np.maximum(beyond, f))
+        strength = largest if body.material.elastic else body.material.yield_stress
+        return broken / strength, beyond / strength
 
     def increment_error(self, converged: Converged) -> float:
         """Return the change of stress that smaller steps make where it flows, over yield stress."""

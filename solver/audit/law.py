@@ -69,7 +69,7 @@ def law_error(
     material: Material,
     kinematics: str,
 ) -> float:
-    """Return by how much an increment breaks its law, over the yield stress (or largest stress).
+    """Return by how much an increment breaks its law [MPa].
 
     ``before`` and ``after`` are plastic strain (4, n) and accumulated strain (n,); all tensors have
     tensor components.
@@ -78,7 +78,7 @@ def law_error(
     miss = stress - hooke(strain - plastic, material, kinematics)
     worst = float(np.abs(miss).max(initial=0.0))
     if material.elastic:
-        return worst / max(float(np.abs(stress).max(initial=0.0)), 1e-300)
+        return worst
     dp = accumulated - before[1]
     flowing = dp > 0
     f = excess(stress, plastic, accumulated, material)
@@ -88,7 +88,7 @@ def law_error(
     stray = np.abs(plastic - before[0] - flow).max(initial=0.0)
     G = material.youngs_modulus / (2 * (1 + material.poisson_ratio))
     reverse = max(0.0, -float(dp.min(initial=0.0)))
-    return float(max(worst, 2 * G * stray, 2 * G * reverse)) / material.yield_stress
+    return float(max(worst, 2 * G * stray, 2 * G * reverse))
 
 
 def increment_error(

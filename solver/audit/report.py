@@ -62,7 +62,7 @@ def audit(
     states = (loaded, unloaded)
     bodies = [AuditedBody(system, body.name) for body in system.model.bodies]
     pairs = [AuditedPair(system, k, loaded) for k in range(len(system.interfaces))]
-    laws = [body.law(state) for body in bodies for state in states]
+    laws = [body.law(states) for body in bodies]
     touch = [pair.figures() for pair in pairs]
     names = ("audit_overlap", "audit_closed_gap", "audit_tension", "audit_friction_excess",
              "audit_slip")  # fmt: skip
@@ -87,12 +87,14 @@ def audit(
 
 
 def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
-    """Return the work of the loads that is not found again, over all work done."""
+    """Return the work of the loads that is not found again, over the largest of all works."""
     work = loaded.energy
-    stored = sum(body.stored(loaded) for body in bodies)
-    found = stored - work.stored + work.plastic + work.friction + work.contact
-    level = abs(work.external) + work.stored + abs(work.plastic) + abs(work.friction)
-    return abs(work.external - found) / level if level else 0.0
+    terms = np.array([
+        sum(body.stored(loaded) for body in bodies), -work.stored, work.plastic, work.friction,
+        work.contact, -work.external,
+    ])  # fmt: skip
+    level = float(np.abs(terms).max())
+    return abs(float(terms.sum())) / level if level else 0.0
 
 
 def _strength(system: System, loaded: Converged) -> dict[str, float]:

@@ -160,17 +160,21 @@ def _forces(
             return None
     if free:
         solution = linalg.lstsq(S, rhs)[0]
-        if not _solves(S, solution, rhs):
+        # what holds nothing must miss nothing: no part of what little friction carries
+        if not _solves(S, solution, rhs, 1e2 * _ROUNDING):
             return None
     solution *= weight
     return P @ solution[:size] + known, solution[size:]
 
 
 def _solves(
-    S: NDArray[np.float64], solution: NDArray[np.float64], rhs: NDArray[np.float64]
+    S: NDArray[np.float64],
+    solution: NDArray[np.float64],
+    rhs: NDArray[np.float64],
+    accurate: float = _ACCURATE,
 ) -> bool:
     miss = np.abs(S @ solution - rhs).max(initial=0.0)
-    return bool(miss <= _ACCURATE * np.abs(rhs).max(initial=0.0))
+    return bool(miss <= accurate * np.abs(rhs).max(initial=0.0))
 
 
 def _active_sets(

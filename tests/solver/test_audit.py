@@ -117,9 +117,9 @@ def test_return_mapping_obeys_the_stated_law(kinematics, hardening):
         assert found.yielding.any()
         stress, total = to_tensor(found.stress), to_tensor(strain)
         before, after = of_state(state), of_state(found.state)
-        assert law_error(total, stress, before, after, material, kinematics) < 1e-11
+        assert law_error(total, stress, before, after, material, kinematics) < 1e-8
         more = (after[0], 1.01 * after[1])
-        assert law_error(total, stress, before, more, material, kinematics) > 1e-5
+        assert law_error(total, stress, before, more, material, kinematics) > 1e-3
         state = found.state
 
 
