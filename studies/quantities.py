@@ -136,10 +136,12 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "audit_law": Quantity("stress off the material law, stated anew / yield stress"),
     "audit_increment_error": Quantity(
-        "change of stress that eight steps for one make in the last increment / yield stress"
+        "change of stress that four steps for one make in the last increment / yield stress"
     ),
-    "audit_overlap": Quantity("largest overlap of the deformed bodies", "mm"),
-    "audit_closed_gap": Quantity("mean gap or overlap where the deformed bodies press", "mm"),
+    "audit_overlap": Quantity(
+        "largest overlap of the deformed bodies, or mean gap where they press", "mm"
+    ),
+    "audit_closed_gap": Quantity("mean gap or overlap where the bodies press", "mm"),
     "audit_slip": Quantity("friction work that slip lacks / friction work"),
     "audit_energy": Quantity("work of the loads not found again / work"),
     "audit_tension": Quantity("largest tensile contact force", "N"),

