@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.acceleration import Series
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import strayed
 from solver.flow import Flow, mechanism, softer
@@ -29,7 +30,7 @@ from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.state import State
-from solver.step import Step, newton_step, on_parts
+from solver.step import Step, largest, newton_step, norm, on_parts
 from solver.threads import one_thread
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ class Increment:
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
         best, since_best, softest, moving = np.inf, 0, Flow(), False
+        series = Series()
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
@@ -117,9 +119,13 @@ class Increment:
             step = self._step(residuals, responses, candidates, blends)
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
-            share, u, responses = self._search(u, residuals, candidates, step)
-            moving = share * _largest(step.u) > _MOVING * _largest(u, self.start.u)
+            before, (share, u, responses) = u, self._search(u, residuals, candidates, step)
+            moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
             forces = (1 - share) * candidates.forces + share * step.forces
+            ahead = series.sum(before, candidates, step, share)
+            if ahead is not None:
+                u, forces = ahead
+                responses = self._respond(u)
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
@@ -155,17 +161,17 @@ class Increment:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
         inner = on_parts(self.system, candidates, candidates.forces)
-        external = _norm([part.external(self.load) for part in parts])
-        level = external + _norm(inner)
+        external = norm([part.external(self.load) for part in parts])
+        level = external + norm(inner)
         if external == 0:  # bodies that overlap push each other: stress alone tells how much
-            level += _norm(residuals)
+            level += norm(residuals)
         scale = max(self.start.force_scale, level)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             return 0.0, float(overlap < -self.system.touching), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
         W = candidates.compliance([o.elastic for o in self.system.operators])
-        return scale, _norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
+        return scale, norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -275,13 +281,3 @@ class Increment:
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),
         )
-
-
-def _largest(vectors: Vectors, origin: Vectors | None = None) -> float:
-    """Return the largest change of an unknown from an origin, or from zero."""
-    start = origin or tuple(np.zeros_like(v) for v in vectors)
-    return max(float(np.abs(v - o).max()) for v, o in zip(vectors, start, strict=True))
-
-
-def _norm(vectors: Sequence[NDArray[np.float64]]) -> float:
-    return float(np.sqrt(sum(float(v @ v) for v in vectors)))
