@@ -116,7 +116,12 @@ class Increment:
                 return self._commit(u, responses, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             blends = _BLENDS[-1:] if elastic_first else _BLENDS
-            step = self._step(residuals, responses, candidates, blends)
+            try:
+                step = self._step(residuals, responses, candidates, blends)
+            except IncrementFailed as failure:
+                if error > _UNBALANCED * tolerances.residual:
+                    failure.flow = softest
+                raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
             before, (share, u, responses) = u, self._search(u, residuals, candidates, step)
