@@ -63,6 +63,8 @@ class Increment:
     guess : state to iterate from, usually extrapolated; ``start`` when absent
     contact : False takes the bodies apart
     elastic_only : raise `Yielded` as soon as a point yields
+    patient : where every body hardens, so that there is an equilibrium, iterate as often as the
+        tolerances allow: in bodies that hardly do the residual comes and goes as the energy falls
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class Increment:
         contact: bool = True,
         elastic_first: bool = True,
         elastic_only: bool = False,
+        patient: bool = False,
         tolerances: Tolerances | None = None,
     ) -> None:
         self.system = system
@@ -84,6 +87,8 @@ class Increment:
         self.contact = contact
         self.elastic_first = elastic_first
         self.elastic_only = elastic_only
+        materials = [part.body.material for part in system.parts]
+        self.patient = patient and all(m.elastic or m.plastic_modulus > 0 for m in materials)
         self.tolerances = tolerances or Tolerances()
         self._pivoted = 0
         self._blended = 0
@@ -108,7 +113,8 @@ class Increment:
             # bodies that overlap can be balanced as they are: what follows must not be measured
             # against nothing
             best = max(min(best, error), tolerances.residual)
-            hopeless = since_best > _PATIENCE or error > _DIVERGED * best
+            hopeless = since_best > _PATIENCE and not self.patient
+            hopeless |= error > _DIVERGED * best
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
