@@ -68,7 +68,7 @@ def softer(
         return than
     most = int((forms[:, 1] - forms[:, 0]).argmax())
     return Flow(
-        stiffness=float(tangent / elastic),
+        stiffness=max(float(tangent / elastic), 0.0),  # below it is rounding
         body=parts[most].body.name,
         place=parts[most].most_strained(step[most]),
         hardens=parts[most].body.material.plastic_modulus > 0,

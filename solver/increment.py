@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.acceleration import Series
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import strayed
 from solver.flow import Flow, mechanism, softer
@@ -29,7 +30,7 @@ from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.state import State
-from solver.step import Step, newton_step, on_parts
+from solver.step import Step, largest, newton_step, norm, on_parts
 from solver.threads import one_thread
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ class Increment:
     guess : state to iterate from, usually extrapolated; ``start`` when absent
     contact : False takes the bodies apart
     elastic_only : raise `Yielded` as soon as a point yields
+    patient : where every body hardens, so that there is an equilibrium, iterate as often as the
+        tolerances allow: in bodies that hardly do the residual comes and goes as the energy falls
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class Increment:
         contact: bool = True,
         elastic_first: bool = True,
         elastic_only: bool = False,
+        patient: bool = False,
         tolerances: Tolerances | None = None,
     ) -> None:
         self.system = system
@@ -83,6 +87,8 @@ class Increment:
         self.contact = contact
         self.elastic_first = elastic_first
         self.elastic_only = elastic_only
+        materials = [part.body.material for part in system.parts]
+        self.patient = patient and all(m.elastic or m.plastic_modulus > 0 for m in materials)
         self.tolerances = tolerances or Tolerances()
         self._pivoted = 0
         self._blended = 0
@@ -98,6 +104,7 @@ class Increment:
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
         best, since_best, softest, moving = np.inf, 0, Flow(), False
+        series = Series()
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
@@ -106,7 +113,8 @@ class Increment:
             # bodies that overlap can be balanced as they are: what follows must not be measured
             # against nothing
             best = max(min(best, error), tolerances.residual)
-            hopeless = since_best > _PATIENCE or error > _DIVERGED * best
+            hopeless = since_best > _PATIENCE and not self.patient
+            hopeless |= error > _DIVERGED * best
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
             balanced = error < tolerances.residual and violation < tolerances.contact
@@ -114,12 +122,21 @@ class Increment:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             blends = _BLENDS[-1:] if elastic_first else _BLENDS
-            step = self._step(residuals, responses, candidates, blends)
+            try:
+                step = self._step(residuals, responses, candidates, blends)
+            except IncrementFailed as failure:
+                if error > _UNBALANCED * tolerances.residual:
+                    failure.flow = softest
+                raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
-            share, u, responses = self._search(u, residuals, candidates, step)
-            moving = share * _largest(step.u) > _MOVING * _largest(u, self.start.u)
+            before, (share, u, responses) = u, self._search(u, residuals, candidates, step)
+            moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
             forces = (1 - share) * candidates.forces + share * step.forces
+            ahead = series.sum(before, candidates, step, share)
+            if ahead is not None:
+                u, forces = ahead
+                responses = self._respond(u)
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
@@ -155,17 +172,17 @@ class Increment:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
         inner = on_parts(self.system, candidates, candidates.forces)
-        external = _norm([part.external(self.load) for part in parts])
-        level = external + _norm(inner)
+        external = norm([part.external(self.load) for part in parts])
+        level = external + norm(inner)
         if external == 0:  # bodies that overlap push each other: stress alone tells how much
-            level += _norm(residuals)
+            level += norm(residuals)
         scale = max(self.start.force_scale, level)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             return 0.0, float(overlap < -self.system.touching), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
         W = candidates.compliance([o.elastic for o in self.system.operators])
-        return scale, _norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
+        return scale, norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -281,13 +298,3 @@ class Increment:
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),
         )
-
-
-def _largest(vectors: Vectors, origin: Vectors | None = None) -> float:
-    """Return the largest change of an unknown from an origin, or from zero."""
-    start = origin or tuple(np.zeros_like(v) for v in vectors)
-    return max(float(np.abs(v - o).max()) for v, o in zip(vectors, start, strict=True))
-
-
-def _norm(vectors: Sequence[NDArray[np.float64]]) -> float:
-    return float(np.sqrt(sum(float(v @ v) for v in vectors)))

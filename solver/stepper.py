@@ -167,6 +167,7 @@ class Stepper:
                     guess=guess,
                     contact=together,
                     elastic_first=guess is None or self._elastic_first,
+                    patient=abs(load - state.load) < 2 * least * (1 - ROUNDING),
                     tolerances=self.control.tolerances,
                 ).solve()
             except IncrementFailed as failure:

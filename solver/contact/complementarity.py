@@ -36,6 +36,9 @@ LEAST_FRICTION = _TOLERANCE
 """Friction of this and less is none. All it carries is within the tolerance of normal forces here,
 a hundredth of the imbalance and a thousandth of the contact violation an increment may leave."""
 _ACCURATE = 1e-6
+_CONSISTENT = 1e-12
+"""Of a least solution, which has rounding or, where there is no solution, what the least friction
+cannot balance."""
 _KNOWN = 1e-8
 
 
@@ -160,8 +163,7 @@ def _forces(
             return None
     if free:
         solution = linalg.lstsq(S, rhs)[0]
-        # what holds nothing must miss nothing: no part of what little friction carries
-        if not _solves(S, solution, rhs, 1e2 * _ROUNDING):
+        if not _solves(S, solution, rhs, _CONSISTENT):
             return None
     solution *= weight
     return P @ solution[:size] + known, solution[size:]
@@ -171,10 +173,10 @@ def _solves(
     S: NDArray[np.float64],
     solution: NDArray[np.float64],
     rhs: NDArray[np.float64],
-    accurate: float = _ACCURATE,
+    tolerance: float = _ACCURATE,
 ) -> bool:
     miss = np.abs(S @ solution - rhs).max(initial=0.0)
-    return bool(miss <= accurate * np.abs(rhs).max(initial=0.0))
+    return bool(miss <= tolerance * np.abs(rhs).max(initial=0.0))
 
 
 def _active_sets(
@@ -251,7 +253,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
         before, bound = bound, problem.bound(N)
-        if np.abs(bound - before).max() < 1e-12 * force:
+        if np.abs(bound - before).max() <= 1e-12 * before.max():
             F = np.where(np.resize(status, len(F)) == OPEN, 0.0, F)
             return ContactSolution(F, q, status, True) if _holds(problem, F, q) else None
     return None

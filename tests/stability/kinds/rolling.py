@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import partial
 from itertools import product
@@ -30,6 +31,13 @@ WIDTHS = 2.5
 
 HEAVY = 4.0
 """Loads from which the contact may spread beyond the fine rim, which must then be told."""
+
+BORNE = 1 / (1 + math.pi / 2)
+"""Most traction over vertical force that a surface without hardening bears: k times a width that
+bears (1 + pi / 2) k beside it (A.P. Green, J. Mech. Phys. Solids 2 (1954) 197-211)."""
+NEAR = 0.75
+"""Of it. A wheel that sinks in leans on what is before it and needs more than its traction tells:
+that there is an equilibrium is certain only well below."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,6 +227,15 @@ def _laws(rolled: Rolled) -> dict[str, Figure]:
 
 
 off_the_rim = tells("contact", "rim|fine track|beyond")
+given_up = tells("(increment|equilibrium) between")
+
+
+def _honest(p: RollingParameters) -> Callable[[str], bool] | None:
+    """Return how a wheel may end without an answer."""
+    ways = [off_the_rim] if p.load_ratio >= HEAVY else []
+    if p.hardening == "none" and abs(p.traction) * p.friction > NEAR * BORNE:
+        ways.append(given_up)
+    return (lambda text: any(way(text) for way in ways)) if ways else None
 
 
 def scenes() -> list[Scene]:
@@ -236,7 +253,7 @@ def scenes() -> list[Scene]:
             run=partial(roll, p),
             judge=judge,
             refusal=off_the_rim if p.load_ratio >= HEAVY else None,
-            honest=off_the_rim if p.load_ratio >= HEAVY else None,
+            honest=_honest(p),
             safe=math.inf if p.hardening != "none" else 0.0,
             in_loads=False,
         )
