@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 
 from solver import Material, Solution
+from solver.outcome import Tolerances
 from tests.stability.closed import STEEL, Column, judge_column, lowered
-from tests.stability.trial import Figure, Scene, brief
+from tests.stability.trial import Figure, Scene, brief, tells
 
 
 def _judge(column: Column, solution: Solution) -> dict[str, Figure]:
@@ -32,7 +33,19 @@ def _judge(column: Column, solution: Solution) -> dict[str, Figure]:
 
 
 def _scene(column: Column) -> Scene:
-    return Scene(what=brief(column), run=column.solve, judge=partial(_judge, column))
+    """Return a column; one whose displacements no float writes finely enough may be given up.
+
+    The last digit of what a stiff block moves with a soft one strains it by a force of eps times
+    the ratio of stiffnesses, which no iterate can be nearer to equilibrium than.
+    """
+    ratio = column.upper.youngs_modulus / column.lower.youngs_modulus
+    coarse = np.finfo(float).eps * ratio > Tolerances().residual
+    return Scene(
+        what=brief(column),
+        run=column.solve,
+        judge=partial(_judge, column),
+        honest=tells("relative out-of-balance force of .*e-0[78]") if coarse else None,
+    )
 
 
 def scenes() -> list[Scene]:
