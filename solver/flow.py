@@ -19,6 +19,8 @@ _FLOWING = 0.02
 """Share of the elastic stiffness below which a late step tells that the structure flows."""
 _MECHANISM = 1e-2
 """The same for bodies that nothing loads."""
+_MOVES = 1e-3
+"""Share of the elastic energy of a step from which on a part moves in it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +80,7 @@ def softer(
 def mechanism(
     parts: Sequence[Part], step: Sequence[NDArray[np.float64]], responses: Sequence[Response]
 ) -> bool:
-    """Whether a step is a plastic mechanism."""
-    tangent, elastic = _forms(parts, step, responses).sum(axis=0)
-    return bool(tangent < _MECHANISM * elastic)
+    """Whether a step is a plastic mechanism of one of the parts that move in it."""
+    tangent, elastic = _forms(parts, step, responses).T
+    moves = elastic > _MOVES * elastic.sum()
+    return bool((tangent < _MECHANISM * elastic)[moves].any())

@@ -30,7 +30,7 @@ from solver.line_search import search
 from solver.linear import Singular
 from solver.outcome import Converged, IncrementFailed, Tolerances, Yielded
 from solver.state import State
-from solver.step import Step, largest, newton_step, norm, on_parts
+from solver.step import Step, apart, largest, newton_step, norm, on_parts
 from solver.threads import one_thread
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
     Vectors = tuple[NDArray[np.float64], ...]
 
-_BLENDS = (0.0, 0.02, 0.1, 0.3, 1.0)
+_BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
 _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
@@ -92,6 +92,7 @@ class Increment:
         self.tolerances = tolerances or Tolerances()
         self._pivoted = 0
         self._blended = 0
+        self._drifted = False
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -121,9 +122,9 @@ class Increment:
             if balanced and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
-            blends = _BLENDS[-1:] if elastic_first else _BLENDS
+            first = len(_BLENDS) - 1 if elastic_first else int(self._drifted)
             try:
-                step = self._step(residuals, responses, candidates, blends)
+                step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
                 if error > _UNBALANCED * tolerances.residual:
                     failure.flow = softest
@@ -203,12 +204,14 @@ class Increment:
                 step = newton_step(self.system, residuals, operators, candidates, self.contact)
             except Singular:
                 continue
-            if step is not None and (blend == blends[-1] or not self._adrift(step, responses)):
+            if step is not None and blend == 0 and self._adrift(step, responses):
+                self._drifted = True
+            elif step is not None:
                 self._pivoted += step.pivoted
                 self._blended += 0 < blend and len(blends) > 1
                 return step
         raise IncrementFailed(
-            "no contact forces were found that balance this load" + self._apart(candidates)
+            "no contact forces were found that balance this load" + apart(self.system, candidates)
         )
 
     def _adrift(self, step: Step, responses: Sequence[Response]) -> bool:
@@ -219,17 +222,6 @@ class Increment:
         """
         loaded = any(part.external(self.load).any() for part in self.system.parts)
         return not loaded and mechanism(self.system.parts, step.u, responses)
-
-    def _apart(self, candidates: Candidates) -> str:
-        """Return which bodies are held by contact alone, where nothing touches yet."""
-        floating = [repr(p.body.name) for p in self.system.parts if p.rigid.shape[1]]
-        if not floating or candidates.forces.any():
-            return ""
-        gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
-        return (
-            f"; body {' and '.join(floating)} is held by contact alone and stands {gap:.3g} mm "
-            "apart: the load must push it towards what holds it"
-        )
 
     # -- 5: line search ------------------------------------------------------------------------
 

@@ -92,3 +92,15 @@ def largest(vectors: Vectors, origin: Vectors | None = None) -> float:
 def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
     """Return the Euclidean norm of all vectors together."""
     return float(np.sqrt(sum(float(v @ v) for v in vectors)))
+
+
+def apart(system: System, candidates: Candidates) -> str:
+    """Return which bodies are held by contact alone, where nothing touches yet."""
+    floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
+    if not floating or candidates.forces.any():
+        return ""
+    gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
+    return (
+        f"; body {' and '.join(floating)} is held by contact alone and stands {gap:.3g} mm "
+        "apart: the load must push it towards what holds it"
+    )
