@@ -15,8 +15,8 @@ setup: $(STAMP) ## make the environment .venv, or bring it up to date
 run: setup ## compute the punch study into out/
 	$(BIN)/residua run data/studies/punch.toml --out out
 
-test: setup ## run the whole test suite
-	$(BIN)/python -m pytest --durations=15
+test: setup ## run the whole test suite on all cores
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --durations=15
 
 serve: setup ## start the HTTP service
 	$(BIN)/residua serve

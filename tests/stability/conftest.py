@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from tests.stability.table import describe, summary
 from tests.stability.trial import Trial, Verdict, attempt
 
 _TRIALS = pytest.StashKey[dict[str, Trial]]()
+_HANDED = pytest.StashKey[list[str]]()
 
 
 @pytest.fixture(scope="session")
@@ -26,14 +28,33 @@ def trial(request: pytest.FixtureRequest) -> Callable[[str], Trial]:
     return of
 
 
+def _lines(config: pytest.Config) -> list[str]:
+    """Return the table, and every scene that did not end as it must or did not converge."""
+    trials = list(config.stash.get(_TRIALS, {}).values())
+    told = [t for t in trials if not t.right or t.verdict is Verdict.HONEST]
+    return summary(trials) + [describe(t) for t in told] if trials else []
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Hand the lines of a worker to the process that prints."""
+    output = getattr(session.config, "workeroutput", None)
+    if output is not None:
+        output["extreme scenes"] = _lines(session.config)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Keep what a worker that had scenes handed over."""
+    lines = getattr(node, "workeroutput", {}).get("extreme scenes", [])
+    node.config.stash.setdefault(_HANDED, []).extend(lines)
+
+
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Print the table, and every scene that did not end as it must or did not converge."""
-    trials = list(config.stash.get(_TRIALS, {}).values())
-    if not trials:
-        return
-    terminalreporter.section("extreme scenes")
-    told = [t for t in trials if not t.right or t.verdict is Verdict.HONEST]
-    for line in summary(trials) + [describe(t) for t in told]:
+    """Print the lines."""
+    lines = _lines(config) + config.stash.get(_HANDED, [])
+    if lines:
+        terminalreporter.section("extreme scenes")
+    for line in lines:
         terminalreporter.write_line(line)
