@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.overlap import largest_overlap
 from solver.surface import extract, shape_derivatives, shape_functions
 from solver.wheel import Wheel
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 5
+_BLOCK = 1000
+"""Points looked at together: each against every edge."""
 _BESIDE = 1e-9
 """Distance over an edge's length by which a line may pass beside it."""
 
@@ -77,6 +80,10 @@ class Surfaces:
             extract(system.full(name), boundary) for name, boundary in (pair.slave, pair.master)
         )
 
+        bodies = [system.model.body(name) for name, _ in (pair.slave, pair.master)]
+        self._overlap = largest_overlap(*bodies)
+        self._thickness = float(np.ptp(bodies[0].mesh.p, axis=1).min())
+
     def _at(self, state: State) -> tuple[Array, Array]:
         (slave, _), (master, _) = self.pair.slave, self.pair.master
         xs, xm = (deformed(self._system, name, state)[0] for name in (slave, master))
@@ -97,10 +104,10 @@ class Surfaces:
             return np.asarray((x[:, nodes] * N).sum(axis=-1))
 
         n = _normals(xs, slave, edges, xi)
-        true = partner = _Partner(xm, master, on_slave(xs), n)
+        true = partner = _Partner(xm, master, on_slave(xs), n, self._thickness / 2)
         if small:  # places and directions are those of the bodies at rest
             n = _normals(slave.X, slave, edges, xi)
-            partner = _Partner(master.X, master, on_slave(slave.X), n)
+            partner = _Partner(master.X, master, on_slave(slave.X), n, self._overlap)
         t = np.stack([-n[1], n[0]])
         apart = partner.of(xm) - on_slave(xs)
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)
@@ -146,7 +153,8 @@ def _points(
     last = len(master.edges) - 1
     corners = np.append(np.arange(len(master.edges)), last)
     ends = np.append(np.full(len(master.edges), -1.0), 1.0)
-    opposite = _Partner(xs, slave, xm[:, master.vertices], _normals(xm, master, corners, ends))
+    outward = _normals(xm, master, corners, ends)
+    opposite = _Partner(xs, slave, xm[:, master.vertices], outward, np.inf)
     cut = opposite.faces > 0
     whole = np.arange(len(slave.edges))
     owner = np.concatenate([whole, whole, opposite.edge[cut]])
@@ -195,27 +203,17 @@ def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) ->
 class _Partner:
     """The places of a surface that lines through points (2, n) along ``way`` meet from outside.
 
-    Of several the nearest. ``faces`` (n,) is 1 where there is one, else 0.
+    Of several the nearest, but none farther behind a point than ``reach`` [mm]. ``faces`` (n,) is 1
+    where there is one, else 0.
     """
 
-    def __init__(self, x: Array, surface: Surface, points: Array, way: Array) -> None:
+    def __init__(self, x: Array, surface: Surface, points: Array, way: Array, reach: float) -> None:
         self.way = way
         corners = x[:, surface.vertices]
-        side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
-        chord = np.diff(corners)
-        beside = _BESIDE * np.linalg.norm(chord, axis=0)
-        first, last = side[:, :-1], side[:, 1:]
-        met = np.minimum(first, last) <= beside
-        met &= np.maximum(first, last) >= -beside
-        met &= _cross(chord[:, None, :], way[:, :, None]) > 0
-        share = first / np.where(first == last, 1.0, first - last)
-        where = corners[:, None, :-1] + share * chord[:, None, :] - points[:, :, None]
-        distance = np.where(met, np.abs((where * way[:, :, None]).sum(axis=0)), np.inf)
-        edge = distance.argmin(axis=1)
-        row = np.arange(len(edge))
-        self.faces = np.isfinite(distance[row, edge]).astype(float)
-        self.edge, self.nodes = edge, surface.edges[edge]
-        start = np.clip(2 * share[row, edge] - 1, -1.0, 1.0)
+        some = [slice(k, k + _BLOCK) for k in range(0, points.shape[1], _BLOCK)]
+        met = [_met(corners, points[:, at], way[:, at], reach) for at in some]
+        self.edge, start, self.faces = (np.concatenate(part) for part in zip(*met, strict=True))
+        self.nodes = surface.edges[self.edge]
         self.eta = _foot(x[:, self.nodes], points, way, start)
         self.shape = shape_functions(self.eta, self.nodes.shape[1])
         self.point = self.of(x)
@@ -231,6 +229,26 @@ class _Partner:
 
 def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[1] - a[1] * b[0])
+
+
+def _met(
+    corners: Array, points: Array, way: Array, reach: float
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return which chord (n,) lines meet from outside, where on it, and 1 where there is one."""
+    side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
+    chord = np.diff(corners)
+    beside = _BESIDE * np.linalg.norm(chord, axis=0)
+    first, last = side[:, :-1], side[:, 1:]
+    met = np.minimum(first, last) <= beside
+    met &= np.maximum(first, last) >= -beside
+    met &= _cross(chord[:, None, :], way[:, :, None]) > 0
+    share = first / np.where(first == last, 1.0, first - last)
+    where = corners[:, None, :-1] + share * chord[:, None, :] - points[:, :, None]
+    ahead = (where * way[:, :, None]).sum(axis=0)
+    distance = np.where(met & (ahead > -reach), np.abs(ahead), np.inf)
+    edge = distance.argmin(axis=1)
+    at = np.arange(len(edge)), edge
+    return edge, np.clip(2 * share[at] - 1, -1.0, 1.0), np.isfinite(distance[at]).astype(float)
 
 
 def _foot(xe: Array, points: Array, way: Array, eta: Array) -> Array:
