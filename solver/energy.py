@@ -29,7 +29,7 @@ class Energy:
     ----------
     stored : elastic energy of the bodies where the path began
     external : of loads, and of what holds a body that is moved
-    plastic : of stress on plastic strain
+    plastic : of stress on plastic strain, by the mean of its stress before and after
     friction : of friction on slip, positive
     contact : against contact where points open or close in an increment: an error of the path
     """
@@ -64,7 +64,10 @@ def _plastic_work(parts: Sequence[Part], before: Converged, now: Converged) -> f
 
 
 def stored_energy(parts: Sequence[Part], responses: Sequence[Response]) -> float:
-    """Return the elastic energy of stress at the points of the parts [N mm]."""
+    """Return the elastic energy of stress at the points of the parts [N mm].
+
+    The audit has its own.
+    """
     energy = 0.0
     for part, response in zip(parts, responses, strict=True):
         s = response.stress

@@ -113,22 +113,39 @@ def extract(part: Discretisation, boundary: str) -> Surface:
         nodes, X, chain = _repeated(part.same[nodes], X, chain)
     measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
     first, last = edges[order[0]], edges[order[-1]]
-    beyond = (_goes_on(part, first[1], first[0]), _goes_on(part, last[0], last[1]))
+    beyond = (_goes_on(part, first, 0), _goes_on(part, last, 1))
     return Surface(nodes, chain, X, measure, (True, True) if part.period else beyond)
 
 
-def _goes_on(part: Discretisation, before: int, end: int) -> bool:
-    """Return whether the boundary of a body goes on where a chain comes from ``before`` to ``end``.
+def _goes_on(part: Discretisation, edge: NDArray[np.int64], at: int) -> bool:
+    """Return whether the boundary of a body goes on beyond the start (0) or end (1) of an edge.
 
-    It does not where it turns by more than `_CORNER`.
+    It does not where it turns by more than `_CORNER`. Tangents decide, since the chords of a
+    coarse curve turn where it does not.
     """
-    mesh = part.body.mesh
-    pairs = part.basis.nodal_dofs[0][mesh.facets[:, mesh.boundary_facets()]].T
-    others = np.concatenate([pairs[pairs[:, k] == end, 1 - k] for k in (0, 1)])
-    onward = part.X[:, others[others != before]] - part.X[:, [end]]
-    along = part.X[:, end] - part.X[:, before]
-    turn = (along @ onward) / (np.linalg.norm(along) * np.linalg.norm(onward, axis=0))
-    return bool((turn > _CORNER).any())
+    mesh, basis = part.body.mesh, part.basis
+    outside = mesh.boundary_facets()
+    pairs = basis.nodal_dofs[0][mesh.facets[:, outside]]
+    middle = basis.facet_dofs[0][outside] if basis.facet_dofs.size else None
+    end, before = edge[at], edge[1 - at]
+    along = -_leaving(part.X, end, before, edge[2] if len(edge) > 2 else None)
+    for k in (0, 1):
+        for facet in np.flatnonzero((pairs[k] == end) & (pairs[1 - k] != before)):
+            between = None if middle is None else middle[facet]
+            onward = _leaving(part.X, end, pairs[1 - k, facet], between)
+            turn = along @ onward / (np.linalg.norm(along) * np.linalg.norm(onward))
+            if turn > _CORNER:
+                return True
+    return False
+
+
+def _leaving(
+    X: NDArray[np.float64], end: int, other: int, middle: int | None
+) -> NDArray[np.float64]:
+    """Return the direction (2,) in which an edge leaves its end."""
+    if middle is None:
+        return np.asarray(X[:, other] - X[:, end])
+    return np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
 
 
 def _repeated(

@@ -79,12 +79,28 @@ Part = Discretisation | Substructure
 
 
 def _surfaces(model: Model) -> dict[tuple[str, str], Surface]:
-    """Return the surfaces of all pairs in the numbering of the whole bodies."""
-    return {
+    """Return the surfaces of all pairs in the numbering of the whole bodies.
+
+    One that goes on as the surface of another pair does not end there.
+    """
+    found = {
         side: surface.extract(model.body(side[0]).discretisation, side[1])
         for contact in model.contacts
         for side in (contact.slave, contact.master)
     }
+    ends = {side: chain.nodes[chain.vertices[[0, -1]]] for side, chain in found.items()}
+
+    def alone(side: tuple[str, str], node: int) -> bool:
+        return not any(node in ends[o] for o in ends if o[0] == side[0] and o != side)
+
+    out = {}
+    for side, chain in found.items():
+        start, end = (
+            on and alone(side, node)
+            for on, node in zip(chain.goes_on, ends[side].tolist(), strict=True)
+        )
+        out[side] = replace(chain, goes_on=(start, end))
+    return out
 
 
 def _part(body: Body, own: list[Surface], linear_solver: str) -> Part:
@@ -117,8 +133,8 @@ def _interface(
         if not reference.area.any():
             raise ModelError(
                 "contacts", (contact.slave, contact.master),
-                "these surfaces do not face each other: at rest no normal of the first meets the "
-                "second from outside",
+                "these surfaces do not face each other: at rest no normal of the slave meets the "
+                "master from outside",
             )  # fmt: skip
     strength = min(part.body.material.shear_yield_stress for part in both)
     return Interface(

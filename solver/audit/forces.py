@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+_LITTLE = 1e-4
+"""Contact force over the force level below which it is compared with that."""
+
+
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
     """Return the nodal forces (n_nodes, 2) of contact on each whole body, in its own frame [N]."""
     state = converged.state
@@ -71,16 +75,17 @@ def action_reaction(
 
     What a body feels is what its stress holds at the nodes of its contact surfaces. Resultant and
     moment are compared on either side of every pair, so that both sides feel one and the same; the
-    figure is over the sum of normal forces (and the length of the contact).
+    figure is over the sum of normal forces of the body's least loaded pair (and the length of the
+    contact).
     """
-    level = sum(float(np.maximum(pair.normal, 0.0).sum()) for pair in pairs)
-    if level == 0.0:
-        return 0.0
+    scale = _LITTLE * converged.state.force_scale
     turning = any(pair.surfaces.pair.sliding == "finite" for pair in pairs)
     worst = 0.0
     for body in bodies:
-        expected, nodes = _of_pairs(body, pairs)
-        if not nodes.any():
+        own = [pair for pair in pairs if body.name in pair.bodies]
+        expected, nodes = _of_pairs(body, own)
+        level = max(scale, min((pair.force for pair in own if pair.force), default=0.0))
+        if not nodes.any() or level == 0.0:
             continue
         x, Q = deformed(system, body.name, converged.state)
         felt = -body.imbalance(converged, np.zeros_like(expected)) @ Q.T
@@ -89,8 +94,8 @@ def action_reaction(
         arm = x[:, nodes].T - x[:, nodes].mean(axis=1)
         size = float(np.abs(arm).max()) or 1.0
         moment = float((arm[:, 0] * miss[:, 1] - arm[:, 1] * miss[:, 0]).sum()) / size
-        worst = max(worst, float(np.abs(miss.sum(axis=0)).max()), abs(moment))
-    return worst / level
+        worst = max(worst, float(np.abs(miss.sum(axis=0)).max()) / level, abs(moment) / level)
+    return worst
 
 
 def reactions(

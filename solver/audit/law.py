@@ -120,8 +120,8 @@ def _step(
     """Return stress, plastic strain and accumulated strain after one step of strain."""
     if kinematics != "plane_stress":
         return _return(strain, plastic, accumulated, material)
-    # the stress out of plane rises with the strain out of plane: false position, the end that
-    # stays weighted down (Illinois)
+    # the stress out of plane rises with the strain out of plane: false position, the value of the
+    # end that stays halved so that it moves too
     largest = np.abs(strain).max(axis=0) + np.abs(plastic).max(axis=0)
     ends = np.stack([-4 * largest, 4 * largest])
     values = np.stack([_return(_with_zz(strain, zz), plastic, accumulated, material)[0][2]

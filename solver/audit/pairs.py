@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_PRESSED = 1e-6
+"""Force below this part of the force level is none."""
+_GAP = 2e-3
+"""Gap allowed, over the elastic approach."""
+_OVERLAP = (0.1, 5e-3)
+"""Overlap allowed, over the elastic approach and over the side of an element."""
 _STILL = 1e-3
 """Slip below this part of the elastic approach is none."""
 
@@ -37,14 +43,16 @@ class AuditedPair:
         self._pair: ContactPair = system.model.contacts[number]
         contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
         self.normal, self.tangential = contact.normal, contact.tangential
+        self._closed = self.normal > _PRESSED * converged.state.force_scale
         self.surfaces = Surfaces(system, self._pair)
         self.touching: Touching = self.surfaces.touching(
             converged.state, converged.start, self.normal, self.tangential
         )
 
     @property
-    def _closed(self) -> NDArray[np.bool_]:
-        return self.normal > 0
+    def bodies(self) -> tuple[str, str]:
+        """Names of slave and master body."""
+        return self._pair.slave[0], self._pair.master[0]
 
     @property
     def approach(self) -> float:
@@ -63,10 +71,17 @@ class AuditedPair:
         return pressure * compliance * float(self.touching.edge[closed].sum())
 
     @property
-    def side(self) -> float:
-        """Mean length of the edges in contact [mm]."""
-        closed = self._closed
-        return float(self.touching.edge[closed].mean()) if closed.any() else 0.0
+    def force(self) -> float:
+        """Sum of the normal forces [N]."""
+        return float(self.normal[self._closed].sum())
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """What gaps and overlaps this pair is allowed [mm]."""
+        edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
+        touching = self._system.touching
+        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
+        return {"audit_closed_gap": max(_GAP * self.approach, touching), "audit_overlap": overlap}
 
     @property
     def _bound(self) -> Array:

@@ -148,7 +148,8 @@ def _points(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return edge, place on it and weight of points (n,) that integrate over the slave.
 
-    The edges are cut opposite the master's vertices, where what is integrated has kinks.
+    The edges are cut opposite the master's vertices, where what is integrated has kinks; where
+    the surfaces touch, which is where it matters, it is the same along either's normals.
     """
     last = len(master.edges) - 1
     corners = np.append(np.arange(len(master.edges)), last)
@@ -213,8 +214,13 @@ class _Partner:
         some = [slice(k, k + _BLOCK) for k in range(0, points.shape[1], _BLOCK)]
         met = [_met(corners, points[:, at], way[:, at], reach) for at in some]
         self.edge, start, self.faces = (np.concatenate(part) for part in zip(*met, strict=True))
-        self.nodes = surface.edges[self.edge]
-        self.eta = _foot(x[:, self.nodes], points, way, start)
+        # a line that meets the chord of one edge may meet the curve of the next
+        eta = _foot(x[:, surface.edges[self.edge]], points, way, start)
+        onward = np.where(eta > 1.0, 1, np.where(eta < -1.0, -1, 0))
+        own = np.clip(self.edge + onward, 0, len(surface.edges) - 1)
+        eta = np.where(own != self.edge, -onward.astype(float), eta)
+        self.edge, self.nodes = own, surface.edges[own]
+        self.eta = np.clip(_foot(x[:, self.nodes], points, way, eta), -1.0, 1.0)
         self.shape = shape_functions(self.eta, self.nodes.shape[1])
         self.point = self.of(x)
 
@@ -252,11 +258,10 @@ def _met(
 
 
 def _foot(xe: Array, points: Array, way: Array, eta: Array) -> Array:
-    """Return where lines meet edges (2, n, k), by Newton's method from ``eta`` (n,)."""
+    """Return where lines meet edges (2, n, k), continued, by Newton's method from ``eta`` (n,)."""
     count = xe.shape[-1]
     for _ in range(_NEWTON_STEPS):
         away = (xe * shape_functions(eta, count)).sum(axis=-1) - points
         slope = _cross(way, (xe * shape_derivatives(eta, count)).sum(axis=-1))
-        eta = eta - _cross(way, away) / np.where(slope == 0, 1.0, slope)
-        eta = np.clip(eta, -1.0, 1.0)
+        eta = np.clip(eta - _cross(way, away) / np.where(slope == 0, 1.0, slope), -2.0, 2.0)
     return eta

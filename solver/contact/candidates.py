@@ -126,7 +126,7 @@ class Candidates:
             normal -= float(force[moved] @ opened[moved]) / 2
             if len(self.motion) > self.n:
                 shear = state.tangential[vertices] + self.forces[self.n :][here]
-                friction -= float(shear @ self.motion[self.n :][here]) / 2
+                friction -= float(shear @ (self.motion[self.n :] + self.apart)[here]) / 2
         return friction, normal
 
     def states(
@@ -213,7 +213,7 @@ def find_candidates(
         apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
         if interface.floating and len(at) and not before.touching.any():
             # nothing but its first point holds a body that comes to rest on it
-            first_point = normal.start + pairing.gap[at].argmin()
+            first_point = normal.start + before.gap[at].argmin()
             apart[first_point] = np.nan_to_num(apart[first_point])
         friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
         apart[normal] = np.nan_to_num(apart[normal])

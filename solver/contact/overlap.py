@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.surface import shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from skfem import Mesh
 
     from solver.body import Body
     from solver.surface import Surface
@@ -23,7 +25,10 @@ _ALLOWED = 0.05
 
 
 def largest_overlap(first: Body, second: Body) -> float:
-    """Return the overlap allowed: a twentieth of the thinner body's narrow side [mm]."""
+    """Return the overlap allowed: a twentieth of the smaller body's narrow side [mm].
+
+    The sides are those of the box around a body.
+    """
     return _ALLOWED * float(min(np.ptp(body.mesh.p, axis=1).min() for body in (first, second)))
 
 
@@ -39,7 +44,7 @@ def check_overlap(slave: Body, master: Body, sides: tuple[Surface, Surface]) -> 
                 "contacts", (body.name, other.name),
                 f"body {body.name!r} overlaps {other.name!r} by {depth.max():.4g} mm at "
                 f"x = {x:.4g}, y = {y:.4g} mm; at most {allowed:.4g} mm, a twentieth of the "
-                "thinner body, can be pushed apart",
+                "smaller body's narrow side, can be pushed apart",
             )  # fmt: skip
 
 
@@ -49,7 +54,7 @@ def _depth(points: NDArray[np.float64], body: Body, allowed: float) -> NDArray[n
     low, high = mesh.p.min(axis=1) + allowed, mesh.p.max(axis=1) - allowed
     within = ((points.T > low) & (points.T < high)).all(axis=1)
     depth = np.zeros(points.shape[1])
-    start, end = (mesh.p[:, nodes] for nodes in mesh.facets[:, mesh.boundary_facets()])
+    start, end = _outline(mesh)
     for i in np.flatnonzero(within):
         point = points[:, i, None]
         # a ray along x crosses the outline an odd number of times from inside
@@ -63,3 +68,15 @@ def _depth(points: NDArray[np.float64], body: Body, allowed: float) -> NDArray[n
             foot = start + np.clip(share, 0.0, 1.0) * along
             depth[i] = np.linalg.norm(point - foot, axis=0).min()
     return depth
+
+
+def _outline(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return starts and ends (2, n) of the chords of a body's outline, four on a curved edge."""
+    outside = mesh.boundary_facets()
+    first, last = (mesh.p[:, nodes] for nodes in mesh.facets[:, outside])
+    if not mesh.dofs.facet_dofs.size:
+        return first, last
+    middle = mesh.doflocs[:, mesh.dofs.facet_dofs[0][outside]]
+    N = shape_functions(np.linspace(-1.0, 1.0, 5), 3)
+    points = np.stack([first, last, middle], axis=-1) @ N.T
+    return points[..., :-1].reshape(2, -1), points[..., 1:].reshape(2, -1)

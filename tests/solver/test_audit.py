@@ -164,3 +164,31 @@ def test_lost_work_is_noticed(solution):
     short = replace(energy, plastic=0.9 * energy.plastic)
     check = judged(solution, replace(solution.loaded, energy=short))
     assert any("audit_energy" in text for text in check.violations)
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6"])
+@pytest.mark.parametrize("friction", [0.05, 0.3])
+def test_work_is_found_again_where_contact_spreads(element, friction):
+    """Vertices of a curved body come into contact, and slip before they touch."""
+
+    def bent(p):
+        return np.stack([p[0], p[1] + p[0] ** 2 / 40 * (1 - p[1] / 3)])
+
+    cells = "tri" if element.startswith("tri") else "quad"
+    mesh = grid(np.linspace(0, 2, 17), np.linspace(0, 3, 8), cells)
+    if cells == "quad":
+        mesh = mapped(mesh, bent)
+    else:
+        mesh = type(mesh)(bent(mesh.p), mesh.t, sort_t=False).with_boundaries(dict(mesh.boundaries))
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3)
+    soft = Material(youngs_modulus=5e4, poisson_ratio=0.3, yield_stress=200.0)
+    fields = {"state": "axisymmetric", "element": element}
+    ball = Body(name="ball", mesh=mesh, material=steel, supports={"left": "x"},
+                pressure={"top": 100.0}, **fields)  # fmt: skip
+    base = block("base", np.linspace(0, 4, 25), np.linspace(-4, 0, 9), material=soft,
+                 supports={"left": "x", "bottom": "y"}, **fields)  # fmt: skip
+    pair = ContactPair(slave=("ball", "bottom"), master=("base", "top"), friction=friction)
+    check = solve(Model(bodies=(ball, base), contacts=(pair,)),
+                  control=PathControl(load_step=0.25)).audit()  # fmt: skip
+    assert check.passed, check.violations
+    assert check.figures["audit_energy"] < 1e-9

@@ -16,8 +16,9 @@ from solver import (
     System,
     solve,
 )
-from solver.mesh import grid
+from solver.mesh import grid, mapped
 from solver.scenes.rolling import ROLLING
+from solver.surface import extract
 from tests.verification.bodies import block
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
@@ -130,3 +131,71 @@ def test_a_sinking_wheel_has_room_for_its_contact(load_ratio):
     """Measured reach ahead of the axle: 2.9 half-widths at a load ratio of 6, 4.3 at 10."""
     margin = ROLLING.parameters(load_ratio=load_ratio, element_size=0.3)
     assert margin.margin / margin.half_width >= max(2.5, 0.6 * load_ratio)
+
+
+@pytest.mark.parametrize("split", ["slave", "master"])
+def test_a_surface_may_go_on_as_that_of_another_pair(split):
+    """One side of two boundaries with different friction, both against the same body."""
+
+    def halves(mesh, y):
+        left = {"near": lambda x: (np.abs(x[1] - y) < 1e-9) & (x[0] < 3.0)}
+        right = {"far": lambda x: (np.abs(x[1] - y) < 1e-9) & (x[0] > 3.0) & (x[0] < 6.0)}
+        return mesh.with_boundaries(dict(named(mesh, **left, **right).boundaries))
+
+    pad = grid(np.linspace(0.0, 6.0, 13), np.linspace(0.0, 3.0, 7))
+    plate = grid(np.linspace(0.0, 6.0, 13), np.linspace(-6.0, 0.0, 7))
+    pad, plate = (halves(pad, 0.0), plate) if split == "slave" else (pad, halves(plate, 0.0))
+    upper = Body(name="pad", mesh=pad, material=STEEL, supports={"left": "x"},
+                 pressure={"top": 10.0})  # fmt: skip
+    lower = Body(name="plate", mesh=plate, material=STEEL, supports=WALL)
+    pairs = tuple(
+        ContactPair(
+            slave=("pad", part if split == "slave" else "bottom"),
+            master=("plate", "top" if split == "slave" else part),
+            friction=friction,
+        )
+        for part, friction in (("near", 0.1), ("far", 0.3))
+    )
+    solution = solve(Model(bodies=(upper, lower), contacts=pairs))
+    total = sum(c.normal.sum() for c in solution.loaded.state.contacts)
+    assert total == pytest.approx(60.0, rel=1e-9)
+
+
+def test_arcs_divided_differently_do_not_overlap():
+    """Curved edges fit each other far better than their chords do."""
+
+    def ring(name, radii, edges, **fields):
+        def to_ring(p):
+            return p[0] * np.stack([np.cos(p[1]), np.sin(p[1])])
+
+        mesh = mapped(grid(np.array(radii), np.linspace(0.0, np.pi, edges + 1)), to_ring)
+        return Body(name=name, mesh=mesh, material=STEEL, **fields)
+
+    inner = ring("inner", (0.8, 1.0), 3, supports={"left": "xy"})
+    outer = ring("outer", (1.0, 1.2), 4, pressure={"right": 1.0}, supports={"top": "xy"})
+    System(pressed(outer, inner, slave="left", master="right"))
+
+
+@pytest.mark.parametrize("edges", [6, 8, 12])
+def test_a_coarse_curve_goes_on_as_a_fine_one_does(edges):
+    """Tangents at an end tell a curve from a corner, chords of 45 degrees do not."""
+
+    def around(p):
+        return p[1] * np.stack([np.sin(p[0]), -np.cos(p[0])])
+
+    ring = mapped(grid(np.linspace(-2.3, 2.3, edges + 1), np.linspace(0.5, 1.0, 3)), around)
+    part = named(ring, piece=lambda x: (np.hypot(*x) > 0.9) & (np.abs(x[0]) < 0.8) & (x[1] < 0))
+    body = Body(name="ring", mesh=part, material=STEEL)
+    assert extract(body.discretisation, "piece").goes_on == (True, True)
+
+
+def test_pairs_that_touch_and_carry_nothing_pass_the_audit():
+    """Two blocks side by side, pressed along the face they share."""
+    y = np.linspace(0.0, 4.0, 5)
+    material = Material(youngs_modulus=2e5, poisson_ratio=0.0)
+    left, right = (
+        block(name, x, y, material=material, supports={"bottom": "xy"}, pressure={"top": 50.0})
+        for name, x in (("left", np.linspace(-4, 0, 5)), ("right", np.linspace(0, 4, 4)))
+    )
+    check = solve(pressed(left, right, slave="right", master="left", friction=0.3)).audit()
+    assert check.passed, check.violations
