@@ -94,7 +94,6 @@ class Trial:
     message: str
     seconds: float
     figures: Figures = field(default_factory=dict)
-    answer: Any = None
 
     @property
     def right(self) -> bool:
@@ -110,7 +109,8 @@ def deadline(seconds: float) -> Iterator[None]:
         raise Hung(f"still running after {seconds:g} s of CPU")
 
     before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    # again and again: what is raised in a destructor is lost
+    signal.setitimer(signal.ITIMER_PROF, seconds, max(seconds, 1.0))
     try:
         yield
     finally:
@@ -143,7 +143,6 @@ def attempt(name: str, scene: Scene, patience: float = PATIENCE) -> Trial:
         message=message,
         seconds=time.process_time() - started,
         figures=figures,
-        answer=answer if verdict is Verdict.ANSWER else None,
     )
 
 
