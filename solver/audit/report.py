@@ -137,6 +137,7 @@ def _violations(
     limits = _LIMITS | {
         "audit_tension": _FORCE * scale,
         "audit_friction_excess": _FORCE * scale,
+        "audit_contact_after_unloading": _FORCE * scale,
     }
     if any(contact.sliding == "finite" for contact in system.model.contacts):
         limits["audit_energy"] = _TURNING
