@@ -139,7 +139,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "change of stress that four steps for one make in the last increment / yield stress"
     ),
     "audit_overlap": Quantity(
-        "largest overlap of the deformed bodies, or mean gap where they press", "mm"
+        "mean overlap of the deformed bodies, or mean gap where they press", "mm"
     ),
     "audit_closed_gap": Quantity("mean gap or overlap where the bodies press", "mm"),
     "audit_slip": Quantity("friction work that slip lacks / friction work"),

@@ -124,7 +124,7 @@ def scenes() -> list[Scene]:
         _pressed(Mouth()),
         _pressed(Mouth(friction=0.3, sliding="finite", above=0.02)),
         # the ceiling, behind the block's bottom, is nearer than the floor
-        _pressed(Mouth(below=0.2, above=0.02, height=0.1)),
+        _pressed(Mouth(below=0.2, above=0.02, height=0.1, pressure=5.0)),
         _pressed(Mouth(upper_leg=False, leg=0.2, pressure=0.5)),
         # the plate's underside is nearer than the gap above it is wide
         _pressed(Mouth(upper_leg=False, leg=0.1, below=0.15, friction=0.2, pressure=0.05)),
