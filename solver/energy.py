@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from solver.constitutive import Response
     from solver.outcome import Converged
     from solver.system import Part
 
@@ -61,19 +60,3 @@ def _plastic_work(parts: Sequence[Part], before: Converged, now: Converged) -> f
         if flow.any():
             work += float(((old.stress + new.stress) * flow).sum(axis=0) @ part.volumes) / 2
     return work
-
-
-def stored_energy(parts: Sequence[Part], responses: Sequence[Response]) -> float:
-    """Return the elastic energy of stress at the points of the parts [N mm].
-
-    The audit has its own.
-    """
-    energy = 0.0
-    for part, response in zip(parts, responses, strict=True):
-        s = response.stress
-        if s.any():
-            material = part.body.material
-            square = (1 + material.poisson_ratio) * (s**2).sum(axis=0)
-            density = square - material.poisson_ratio * s[:3].sum(axis=0) ** 2
-            energy += float(density @ part.volumes) / (2 * material.youngs_modulus)
-    return energy

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.energy import Energy, stored_energy
+from solver.energy import Energy
 from solver.errors import LimitLoad, ModelError, NotConverged
+from solver.fields import elastic_energy
 from solver.increment import Increment
 from solver.outcome import Converged, IncrementFailed, Tolerances
 from solver.state import State
@@ -128,7 +129,8 @@ class Stepper:
     def rest(self, state: State) -> Point:
         """Return the first point of a path: a state without contact forces at load zero."""
         at_rest = Increment(self.system, state, state.load, contact=False).solve()
-        energy = Energy(stored=stored_energy(self.system.parts, at_rest.responses))
+        stresses = zip(self.system.parts, at_rest.responses, strict=True)
+        energy = Energy(stored=sum(elastic_energy(part, r.stress) for part, r in stresses))
         return Point(replace(at_rest, state=state, energy=energy), None, Tally())
 
     def together(self, state: State) -> Point:

@@ -212,8 +212,7 @@ class System:
     @cached_property
     def overlapping(self) -> bool:
         """Whether bodies overlap before loading."""
-        start = self.initial().u
-        return any((i.pairing(start).gap < -self.touching).any() for i in self.interfaces)
+        return any((contact.gap < -self.touching).any() for contact in self.initial().contacts)
 
     @cached_property
     def proportional(self) -> bool:
@@ -225,8 +224,7 @@ class System:
         """
         if self.overlapping or not all(np.isinf(i.shear_strength) for i in self.interfaces):
             return False
-        start = self.initial().u
-        gaps = np.concatenate([np.zeros(0), *(i.pairing(start).gap for i in self.interfaces)])
+        gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
         conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()
         return bool(conforming) or all(i.friction == 0 for i in self.interfaces)
 

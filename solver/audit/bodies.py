@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.audit.law import excess, hooke, increment_error, law_error, of_state
-from solver.audit.plain import PlainBody
-from solver.kinematics import to_tensor
 from solver.substructure import Substructure
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
+    from solver.audit.plain import PlainBody
     from solver.outcome import Converged
     from solver.state import State
     from solver.system import System
@@ -27,53 +25,61 @@ _SAMPLE = 200
 
 
 class AuditedBody:
-    """A body of a system, evaluated plainly."""
+    """A body of a system in a converged increment; what several figures need is evaluated once.
 
-    def __init__(self, system: System, name: str) -> None:
-        self.system = system
-        self.name = name
-        self.plain = PlainBody(system.full(name))
+    ``plain`` is the body itself, shared by its states.
+    """
 
-    @property
-    def _number(self) -> int:
-        return self.system.part(self.name)
+    def __init__(self, system: System, plain: PlainBody, converged: Converged) -> None:
+        self.plain = plain
+        self.name = plain.body.name
+        number = system.part(self.name)
+        self.part = system.parts[number]
+        self._system = system
+        self._converged = converged
+        self._u = converged.state.u[number]
+        self._response = converged.responses[number]
+        self._before = converged.start.plastic[number]
 
     @property
     def meshed(self) -> bool:
         """Whether the increments solved for all of its nodes, and kept its internal variables."""
-        return not isinstance(self.system.parts[self._number], Substructure)
+        return not isinstance(self.part, Substructure)
 
-    def strain(self, state: State) -> Array:
+    def _strain(self, state: State) -> Array:
         """Return strain (4, n_elements, n_points), from the displacements."""
-        return self.plain.strain(self.system.displacement(self.name, state))
+        return self.plain.strain(self._system.displacement(self.name, state))
 
-    def stress(self, converged: Converged) -> Array:
-        """Return stress (4, n_elements, n_points): what the increment gave, or Hooke's."""
+    @cached_property
+    def _reached(self) -> Array:
+        return self._strain(self._converged.state)
+
+    @cached_property
+    def stress(self) -> Array:
+        """Stress (4, n_elements, n_points): what the increment gave, or Hooke's."""
         if self.meshed:
-            return self.plain.stress(converged.responses[self._number].stress)
+            return self.plain.stress(self._response.stress)
         body = self.plain.body
-        return hooke(self.strain(converged.state), body.material, body.state)
+        return hooke(self._reached, body.material, body.state)
 
-    def imbalance(self, converged: Converged, contact: Array) -> Array:
-        """Return external plus contact less internal forces (n_nodes, 2) [N]."""
+    @cached_property
+    def lacking(self) -> Array:
+        """Nodal forces (n_nodes, 2) that contact and supports must add to the loads [N]."""
         whole = self.plain.part
-        external = whole.external(converged.state.load) if self._loaded else np.zeros(whole.n)
-        return external.reshape(-1, 2) + contact - self.plain.forces(self.stress(converged))
+        wheel = self.plain.body.axle is not None  # its load acts on the hub
+        external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.load)
+        return self.plain.forces(self.stress) - external.reshape(-1, 2)
 
-    def applied(self, load: float) -> Array:
-        """Return the resultant of the loads (2,) at a load factor or time [N]."""
-        travelling = self.plain.body.travelling
+    def applied(self) -> Array:
+        """Return the resultant of the loads (2,) [N]."""
+        load, travelling = self._converged.state.load, self.plain.body.travelling
         if travelling is None:
             return self.plain.applied(load)
         share, _, ratio = travelling.now(load)
         whole = np.pi / 2 * travelling.half_width * travelling.peak * share
         return whole * self.plain.body.thickness * np.array([ratio, -1.0])
 
-    @property
-    def _loaded(self) -> bool:
-        return self.plain.body.axle is None
-
-    @property
+    @cached_property
     def held(self) -> NDArray[np.bool_]:
         """Which displacements (n_nodes, 2) supports hold."""
         held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
@@ -90,52 +96,42 @@ class AuditedBody:
         own = part.same == np.arange(len(part.same))
         return np.asarray(~self.held & own[:, None])
 
-    def stored(self, converged: Converged) -> float:
+    def stored(self) -> float:
         """Return the elastic energy [N mm]; of a condensed body that of its kept unknowns."""
-        part, u = self.system.parts[self._number], converged.state.u[self._number]
         if self.meshed:
-            return self.plain.elastic_energy(self.stress(converged))
-        return part.stiffness_along(u, converged.responses[self._number])[1] / 2
+            return self.plain.elastic_energy(self.stress)
+        return self.part.stiffness_along(self._u, self._response)[1] / 2
 
-    def law(self, states: Sequence[Converged]) -> tuple[float, float]:
-        """Return how far increments are from their law, and stress beyond yield, relative.
+    @property
+    def strength(self) -> float:
+        """The yield stress, or the largest stress of a body that cannot yield [MPa]."""
+        material = self.plain.body.material
+        return float(np.abs(self.stress).max()) if material.elastic else material.yield_stress
 
-        To the yield stress, or the largest stress of a body that cannot yield.
-        """
+    def law(self) -> tuple[float, float]:
+        """Return how far the increment is from its law, and its stress beyond yield [MPa]."""
         if not self.meshed:
             return 0.0, 0.0
-        body, broken, beyond, largest = self.plain.body, 0.0, 0.0, 1e-300
-        for converged in states:
-            response = converged.responses[self._number]
-            before = of_state(converged.start.plastic[self._number])
-            after = of_state(response.state)
-            stress = to_tensor(response.stress)
-            strain = self.strain(converged.state).reshape(4, -1)
-            here = law_error(strain, stress, before, after, body.material, body.state)
-            broken = float(np.maximum(broken, here))
-            largest = max(largest, float(np.abs(stress).max(initial=0.0)))
-            if not body.material.elastic:
-                f = excess(stress, *after, body.material).max(initial=0.0)
-                beyond = float(np.maximum(beyond, f))
-        strength = largest if body.material.elastic else body.material.yield_stress
-        return broken / strength, beyond / strength
+        body, after = self.plain.body, of_state(self._response.state)
+        stress, strain = self.stress.reshape(4, -1), self._reached.reshape(4, -1)
+        before = of_state(self._before)
+        broken = law_error(strain, stress, before, after, body.material, body.state)
+        if body.material.elastic:
+            return broken, 0.0
+        return broken, float(excess(stress, *after, body.material).max(initial=0.0))
 
-    def increment_error(self, converged: Converged) -> float:
+    def increment_error(self) -> float:
         """Return the change of stress that smaller steps make where it flows, over yield stress."""
         body = self.plain.body
         if not self.meshed or body.material.elastic:
             return 0.0
-        response = converged.responses[self._number]
-        start = converged.start.plastic[self._number]
-        flowing = np.flatnonzero(response.state.accumulated > start.accumulated)
+        flowing = np.flatnonzero(self._response.state.accumulated > self._before.accumulated)
         if not len(flowing):
             return 0.0
         some = flowing[:: max(1, len(flowing) // _SAMPLE)]
-        strains = tuple(
-            self.strain(state).reshape(4, -1)[:, some]
-            for state in (converged.start, converged.state)
-        )
-        plastic, accumulated = of_state(start)
+        first = self._strain(self._converged.start).reshape(4, -1)[:, some]
+        last = self._reached.reshape(4, -1)[:, some]
+        plastic, accumulated = of_state(self._before)
         before = (plastic[:, some], accumulated[some])
-        stress = to_tensor(response.stress[:, some])
-        return increment_error((strains[0], strains[1]), stress, before, body.material, body.state)
+        stress = self.stress.reshape(4, -1)[:, some]
+        return increment_error((first, last), stress, before, body.material, body.state)

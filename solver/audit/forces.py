@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-
 _LITTLE = 1e-4
 """Contact force over the force level below which it is compared with that."""
 
@@ -45,7 +44,7 @@ def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converge
     contact = _on_bodies(system, converged)
     square = 0.0
     for body in bodies:
-        left = body.imbalance(converged, contact[body.name])
+        left = contact[body.name] - body.lacking
         square += float((left[body.free] ** 2).sum())
     return float(np.sqrt(square)) / (converged.state.force_scale or 1.0)
 
@@ -88,7 +87,7 @@ def action_reaction(
         if not nodes.any() or level == 0.0:
             continue
         x, Q = deformed(system, body.name, converged.state)
-        felt = -body.imbalance(converged, np.zeros_like(expected)) @ Q.T
+        felt = body.lacking @ Q.T
         miss = np.where(body.held, 0.0, felt - expected)[nodes]
         x = x if turning else body.plain.part.X
         arm = x[:, nodes].T - x[:, nodes].mean(axis=1)
@@ -99,28 +98,24 @@ def action_reaction(
 
 
 def reactions(
-    system: System,
-    bodies: Sequence[AuditedBody],
-    pairs: Sequence[AuditedPair],
-    converged: Converged,
+    bodies: Sequence[AuditedBody], pairs: Sequence[AuditedPair], converged: Converged
 ) -> float:
     """Return how far loads, contact and reactions of a body are from balance, over the force level.
 
     Pressures count by the shape of their boundary, the load of a wheel by its program; reactions
     are what the stress exerts where supports hold.
     """
-    load = converged.state.load
     worst = 0.0
     for body in bodies:
-        part = system.parts[system.part(body.name)]
         contact, _ = _of_pairs(body, pairs)
         total = contact.sum(axis=0)
-        if isinstance(part, Wheel):
+        if isinstance(body.part, Wheel):
             # the advance is prescribed: what it takes along x is not known beforehand
-            total = np.array([0.0, total[1] - part.program.at(load, "force")])
+            force = body.part.program.at(converged.state.load, "force")
+            total = np.array([0.0, total[1] - force])
         else:
-            left = body.imbalance(converged, contact)
-            total = total + body.applied(load)[:2] - np.where(body.held, left, 0.0).sum(axis=0)
+            held = np.where(body.held, contact - body.lacking, 0.0)
+            total = total + body.applied() - held.sum(axis=0)
             if body.plain.body.state == "axisymmetric":
                 total[0] = 0.0  # radial forces balance round the axis
         worst = max(worst, float(np.abs(total).max()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,7 +65,7 @@ class AuditedPair:
         if not closed.any():
             return 0.0
         compliance = 0.0
-        for name, _ in (self._pair.slave, self._pair.master):
+        for name in self.bodies:
             material = self._system.model.body(name).material
             compliance += (1 - material.poisson_ratio**2) / material.youngs_modulus
         pressure = float((self.normal[closed] / area[closed]).max())
@@ -87,16 +88,16 @@ class AuditedPair:
     def _bound(self) -> Array:
         mu = effective_friction(self._pair.friction)
         strength = min(
-            self._system.model.body(name).material.shear_yield_stress
-            for name, _ in (self._pair.slave, self._pair.master)
+            self._system.model.body(name).material.shear_yield_stress for name in self.bodies
         )
         limit = np.full(len(self.normal), np.inf)
         if np.isfinite(self._pair.shear_limit):
             limit = self._pair.shear_limit * strength * self.touching.area
         return np.minimum(mu * np.maximum(self.normal, 0.0), limit)
 
+    @cached_property
     def figures(self) -> dict[str, float]:
-        """Return the figures of the pair; lengths in mm, forces in N."""
+        """The figures of the pair; lengths in mm, forces in N."""
         gap, true = np.nan_to_num(self.touching.gap), np.nan_to_num(self.touching.true_gap)
         pressed = np.where(self._closed, self.normal, 0.0)
         pressed /= max(float(pressed.sum()), 1e-300)

@@ -10,6 +10,7 @@ import numpy as np
 from solver.audit.bodies import AuditedBody
 from solver.audit.forces import action_reaction, imbalance, reactions
 from solver.audit.pairs import AuditedPair
+from solver.audit.plain import PlainBody
 from solver.contact.pressure import contact_pressure
 from solver.fields import error_estimate
 
@@ -59,20 +60,24 @@ def audit(
 ) -> Audit:
     """Check one run: its state under load and after unloading."""
     states = (loaded, unloaded)
-    bodies = [AuditedBody(system, body.name) for body in system.model.bodies]
+    plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
+    bodies, released = (
+        [AuditedBody(system, body, converged) for body in plain] for converged in states
+    )
     pairs = [AuditedPair(system, k, loaded) for k in range(len(system.interfaces))]
-    laws = [body.law(states) for body in bodies]
-    touch = [pair.figures() for pair in pairs]
+    broken, beyond = _laws(bodies, released)
     names = ("audit_overlap", "audit_closed_gap", "audit_tension", "audit_friction_excess",
              "audit_slip")  # fmt: skip
     figures = {
-        "audit_residual": _largest(*(imbalance(system, bodies, state) for state in states)),
-        "audit_reactions": reactions(system, bodies, pairs, loaded),
+        "audit_residual": _largest(
+            imbalance(system, bodies, loaded), imbalance(system, released, unloaded)
+        ),
+        "audit_reactions": reactions(bodies, pairs, loaded),
         "audit_action_reaction": action_reaction(system, bodies, pairs, loaded),
-        "audit_law": _largest(*(broken for broken, _ in laws)),
-        "audit_yield": _largest(*(beyond for _, beyond in laws)),
-        "audit_increment_error": _largest(*(body.increment_error(loaded) for body in bodies)),
-        **{name: _largest(0.0, *(figure[name] for figure in touch)) for name in names},
+        "audit_law": broken,
+        "audit_yield": beyond,
+        "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
+        **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_energy": _energy_error(bodies, loaded),
         "audit_dissipation": least_dissipation,
         "audit_contact_after_unloading": float(
@@ -85,11 +90,22 @@ def audit(
     return Audit(figures, violations, _warnings(figures, unloaded))
 
 
+def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tuple[float, float]:
+    """Return how far either state is from the law, and beyond yield, over the strength."""
+    broken, beyond = 0.0, 0.0
+    for both in zip(bodies, released, strict=True):
+        strength = max(*(body.strength for body in both), 1e-300)
+        for off, over in (body.law() for body in both):
+            broken = _largest(broken, off / strength)
+            beyond = _largest(beyond, over / strength)
+    return broken, beyond
+
+
 def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
     """Return the work of the loads that is not found again, over the largest of all works."""
     work = loaded.energy
     terms = np.array([
-        sum(body.stored(loaded) for body in bodies), -work.stored, work.plastic, work.friction,
+        sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
         work.contact, -work.external,
     ])  # fmt: skip
     level = float(np.abs(terms).max())
@@ -145,8 +161,7 @@ def _violations(
         limits["audit_reactions"] = _TRAVELLING
     judged = [(name, figures[name], limit) for name, limit in limits.items()]
     for pair in pairs:
-        own = pair.figures()
-        judged += [(name, own[name], limit) for name, limit in pair.limits.items()]
+        judged += [(name, pair.figures[name], limit) for name, limit in pair.limits.items()]
     broken = [
         f"{name} = {figure:.2e} exceeds {limit:.2e}"
         for name, figure, limit in judged

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -18,6 +18,9 @@ from solver.motion import Axle, AxleProgram, TravellingPressure
 from solver.passes import Schedule
 from solver.scenes.parameters import ContactParameters, Friction, Length, described
 from solver.scenes.settling import HALVINGS
+
+if TYPE_CHECKING:
+    from skfem import Mesh
 
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
 _SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
@@ -102,9 +105,8 @@ class RollingParameters(ContactParameters):
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
         if self.shear_limit and self.load == "hertz":
-            raise ModelError(
-                "shear_limit", self.shear_limit, "must be 0: load = hertz prescribes the shear"
-            )
+            allowed = "must be 0: load = hertz prescribes the shear"
+            raise ModelError("shear_limit", self.shear_limit, allowed)
         if prescribed and self.traction:
             raise ModelError("traction", self.traction, "must be 0 where creepage is given")
         if self.given_creepage and not prescribed:
@@ -202,6 +204,13 @@ class RollingParameters(ContactParameters):
         )
 
 
+def _with_middle(mesh: Mesh, name: str, half: float) -> Mesh:
+    """Return a grid with a name for its top where the first coordinate is within ``half``."""
+    top = np.asarray(mesh.boundaries["top"])
+    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
+    return mesh.with_boundaries({name: top[np.abs(middle) < half]})
+
+
 def _half_space(parameters: RollingParameters) -> Body:
     a, h = parameters.half_width, parameters.element_size
     periodic = parameters.periodic
@@ -227,12 +236,9 @@ def _half_space(parameters: RollingParameters) -> Body:
             position=knots["position"],
             shear_ratio=ratio * ways,
         )
-    mesh = grid(x, y)
-    top = np.asarray(mesh.boundaries["top"])
-    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
     return Body(
         name="half_space",
-        mesh=mesh.with_boundaries({"track": top[np.abs(middle) < fine]}),
+        mesh=_with_middle(grid(x, y), "track", fine),
         material=parameters.material(),
         supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
@@ -247,10 +253,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     beyond = reach + graded(math.pi * R - reach, h, 1.5, 0.3 * R)[1:]
     angle = np.concatenate([-beyond[::-1], rim, beyond]) / R
     radius = R - graded((1 - _HUB) * R, h, 1.3, 0.2 * R)[::-1]
-    ring = grid(angle, radius)
-    top = np.asarray(ring.boundaries["top"])
-    middle = ring.p[0, ring.facets[:, top]].mean(axis=0)
-    ring = ring.with_boundaries({"rim": top[np.abs(middle) < reach / R]})
+    ring = _with_middle(grid(angle, radius), "rim", reach / R)
     turned = parameters.wheel_turned
 
     def around(p: np.ndarray) -> np.ndarray:
