@@ -30,7 +30,7 @@ def draw(path: Path, query: MapQuery) -> bytes:
     StudyError
         If the run has no such field, or the field no such component.
     """
-    from studies.plots.maps import map_figure  # matplotlib takes a second to import
+    from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
 
     picture = io.BytesIO()
     with DRAWING, open_netcdf(path) as run:

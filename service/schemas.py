@@ -8,7 +8,7 @@ from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.jobs import State
-from studies.sweep import Axes
+from studies.definition.sweep import Axes
 
 ContentId = Annotated[
     str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")

@@ -6,18 +6,18 @@ with plasticity outside and contact inside, and releases it; a `Solution` or, fo
 `SCENES`, a `Record` is what remains. Numbers are in N, mm, MPa; tension is positive; y is up.
 """
 
-from solver.audit import Audit
-from solver.body import Body
+from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
-from solver.material import Material
-from solver.model import ContactPair, Model
-from solver.outcome import Tolerances
-from solver.path import Branch, Path
-from solver.record import Record, Status
+from solver.loading.outcome import Tolerances
+from solver.loading.path import Branch, Path
+from solver.loading.stepper import PathControl
+from solver.materials.material import Material
+from solver.model.body import Body
+from solver.model.model import ContactPair, Model
+from solver.results.audit import Audit
+from solver.results.record import Record, Status
+from solver.results.solution import Solution, solve
 from solver.scenes import SCENES, Scene
-from solver.solution import Solution, solve
-from solver.stepper import PathControl
-from solver.system import System
 
 __version__ = "0.1.0"
 

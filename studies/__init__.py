@@ -11,24 +11,24 @@ from typing import TYPE_CHECKING, Any
 from studies.errors import GridLost, StoreBusy, StudyError
 
 if TYPE_CHECKING:
-    from studies.design import Case, Path
-    from studies.parameters import scene_schema
-    from studies.reading import open_netcdf, open_study
-    from studies.run import StudyEvent, StudyOutcome, run_study
-    from studies.store import Store
-    from studies.study import Study
+    from studies.definition.design import Case, Path
+    from studies.definition.parameters import scene_schema
+    from studies.definition.study import Study
+    from studies.execution.run import StudyEvent, StudyOutcome, run_study
+    from studies.storage.store import Store
+    from studies.views.reading import open_netcdf, open_study
 
 _HOMES = {
-    "Case": "design",
-    "Path": "design",
-    "Store": "store",
-    "Study": "study",
-    "StudyEvent": "run",
-    "StudyOutcome": "run",
-    "open_netcdf": "reading",
-    "open_study": "reading",
-    "run_study": "run",
-    "scene_schema": "parameters",
+    "Case": "definition.design",
+    "Path": "definition.design",
+    "Store": "storage.store",
+    "Study": "definition.study",
+    "StudyEvent": "execution.run",
+    "StudyOutcome": "execution.run",
+    "open_netcdf": "views.reading",
+    "open_study": "views.reading",
+    "run_study": "execution.run",
+    "scene_schema": "definition.parameters",
 }
 
 __all__ = [

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.quantities import QUANTITIES
+from solver.results.quantities import QUANTITIES
 from tests.architecture.sources import PACKAGES, ROOT
 
 PAGES = [
@@ -32,7 +32,7 @@ BLOCK = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
-COMMAND = "import sys; from studies.cli import main; sys.exit(main())"
+COMMAND = "import sys; from studies.command.cli import main; sys.exit(main())"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

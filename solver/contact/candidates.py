@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.complementarity import OPEN
+from solver.contact.problem import OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.geometry import Pairing
-    from solver.operators import Operator
-    from solver.state import ContactState, State
-    from solver.system import System
+    from solver.contact.state import ContactState, State
+    from solver.contact.system import System
+    from solver.fem.operators import Operator
 
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""

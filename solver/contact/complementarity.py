@@ -1,105 +1,35 @@
 """The frictional contact problem on the contact points, solved exactly.
 
-Unknowns are the normal forces N >= 0 and tangential forces T at n points and the free rigid
-motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction ``F = N``)::
-
-    (gap, slip) = offset + W F + A q        0 = balance + A' F
-    N >= 0, gap >= 0, N gap = 0
-    |T| <= s,  slip = 0 where below,  T = -s sign(slip) where equal,  s = min(mu N, limit)
-
-Active sets by semismooth Newton solve nearly every instance in a few dense solves. Where the
-sets cycle, the friction bound is lagged: each pass is a convex problem, solved by Lemke's
-method, and gives the active sets a better start. (Lemke's method on the whole frictional
-problem in A. Klarbring's form, Ingenieur-Archiv 56 (1986) 529-541, ends in a ray for most
-instances: its matrix is not copositive.)
+`solver.contact.problem` states it. Active sets by semismooth Newton solve nearly every instance in
+a few dense solves. Where the sets cycle, the friction bound is lagged: each pass is a convex
+problem, solved by Lemke's method, and gives the active sets a better start. (Lemke's method on the
+whole frictional problem in A. Klarbring's form, Ingenieur-Archiv 56 (1986) 529-541, ends in a ray
+for most instances: its matrix is not copositive.)
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
 from solver.contact.given_bound import given_bound
+from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem, ContactSolution
+from solver.model.model import LEAST_FRICTION
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 _MAX_SETS = 40
 _MAX_PASSES = 20
-_TOLERANCE = 1e-10
+_TOLERANCE = LEAST_FRICTION
 _ROUNDING = 1e-14
-LEAST_FRICTION = _TOLERANCE
-"""Friction of this and less is none. All it carries is within the tolerance of normal forces here,
-a hundredth of the imbalance and a thousandth of the contact violation an increment may leave."""
 _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
 """Of a least solution, which has rounding or, where there is no solution, what the least friction
 cannot balance."""
 _KNOWN = 1e-8
-
-
-@dataclass(frozen=True, slots=True)
-class ContactProblem:
-    """One instance.
-
-    Attributes
-    ----------
-    W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without
-    offset : (m,) gap and slip at zero force [mm]
-    friction : (n,) coefficient at each point; zero holds the tangential force at zero
-    A : (m, k) gap and slip of the free rigid motions
-    balance : (k,) resultants of all other forces on those motions [N]
-    limit : (n,) largest tangential force whatever the normal one [N]; inf, or None for all, is none
-    """
-
-    W: NDArray[np.float64]
-    offset: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    A: NDArray[np.float64]
-    balance: NDArray[np.float64]
-    limit: NDArray[np.float64] | None = None
-
-    @property
-    def n(self) -> int:
-        """Number of contact points."""
-        return len(self.friction)
-
-    @property
-    def frictional(self) -> bool:
-        """Whether tangential unknowns exist."""
-        return len(self.offset) > self.n
-
-    @property
-    def scales(self) -> tuple[float, float]:
-        """A force [N] and a length [mm] that tolerances refer to."""
-        compliance = np.abs(np.diag(self.W)).max()
-        length = np.abs(self.offset[: self.n]).max()
-        force = np.abs(self.balance).sum()
-        length = max(length, force * compliance * 1e-3, 1e-30)
-        return max(force, length / compliance), length
-
-    @property
-    def limits(self) -> NDArray[np.float64]:
-        """The limit of every point (n,) [N]."""
-        return np.full(self.n, np.inf) if self.limit is None else self.limit
-
-    def bound(self, N: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest tangential forces (n,) under normal forces N [N]."""
-        return np.minimum(self.friction * np.maximum(N, 0), self.limits)
-
-
-@dataclass(frozen=True, slots=True)
-class ContactSolution:
-    """Forces (m,), rigid motions (k,), the status of each point, and how it was found."""
-
-    forces: NDArray[np.float64]
-    rigid: NDArray[np.float64]
-    status: NDArray[np.int64]
-    pivoted: bool
 
 
 def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.candidates import Candidates
-    from solver.system import Interface, System
+    from solver.contact.system import Interface, System
 
 _COVERED = 1 - 1e-6
 

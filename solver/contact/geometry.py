@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.surface import shape_derivatives, shape_functions
+from solver.mesh.shapes import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.surface import Surface
+    from solver.fem.surface import Surface
 
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6

@@ -10,7 +10,7 @@ from scipy import linalg
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.contact.complementarity import ContactProblem
+    from solver.contact.problem import ContactProblem
 
 _PIVOTS_PER_UNKNOWN = 20
 

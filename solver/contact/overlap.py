@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.surface import shape_functions
+from solver.mesh.shapes import shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from skfem import Mesh
 
-    from solver.body import Body
-    from solver.surface import Surface
+    from solver.fem.surface import Surface
+    from solver.model.body import Body
 
 _ALLOWED = 0.05
 

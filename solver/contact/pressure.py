@@ -9,8 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.state import State
-    from solver.system import System
+    from solver.contact.state import State
+    from solver.contact.system import System
 
 
 def contact_pressure(

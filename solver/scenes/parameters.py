@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
 
 from solver.errors import ModelError
-from solver.material import Hardening, Material
-from solver.model import ContactPair, effective_friction
+from solver.materials.material import Hardening, Material
+from solver.model.model import ContactPair, effective_friction
 
 
 def described(default: Any, description: str) -> Any:

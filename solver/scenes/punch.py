@@ -21,20 +21,20 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from annotated_types import Interval, Unit
 
-from solver.audit import cut_force
-from solver.body import Body
-from solver.elements import element_type
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.errors import ModelError
+from solver.loading.path import Path
+from solver.loading.stepper import PathControl
 from solver.mesh import graded, grid
-from solver.model import Model
-from solver.outcome import Converged
-from solver.path import Path
-from solver.record import Record
-from solver.scenes.harvest import End, Harvest, Layout
+from solver.mesh.elements import element_type
+from solver.model.body import Body
+from solver.model.model import Model
+from solver.results.audit import cut_force
+from solver.results.harvest import End, Harvest, Layout
+from solver.results.record import Record
 from solver.scenes.parameters import ContactParameters, Length, Ratio, described
 from solver.scenes.scene import Monitor, Scene
-from solver.stepper import PathControl
-from solver.system import System
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -193,10 +193,10 @@ def path(
     expected = ratios[-1] / control.load_step + len(ratios) * (control.unload_steps + 1)
     done = 0
 
-    def report(load: float, message: str) -> None:
+    def report() -> None:
         nonlocal done
         done += 1
-        monitor(min(done / expected, 0.99), message)
+        monitor(min(done / expected, 0.99))
 
     for ratio, branch in zip(ratios, Path(system, control, report).branches(ratios), strict=True):
         loaded, unloaded = branch.loaded, branch.unloaded
@@ -205,7 +205,7 @@ def path(
             stages = ((loaded, 0.0), (unloaded, 0.0))
             end = replace(end, stages=stages, scalars=_figures(harvest, unloaded))
         yield harvest.record(replace(parameters, load_ratio=ratio), end)
-    monitor(1.0, "done")
+    monitor(1.0)
 
 
 PUNCH = Scene(

@@ -20,18 +20,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.contact.system import System
 from solver.errors import LimitLoad
-from solver.passes import PassResult
-from solver.record import Record
-from solver.scenes.free_surface import FreeSurface
-from solver.scenes.harvest import End, Harvest, Layout
+from solver.fem.wheel import Wheel
+from solver.loading.passes import PassResult
+from solver.loading.stepper import Tally
+from solver.results.free_surface import FreeSurface
+from solver.results.harvest import End, Harvest, Layout
+from solver.results.record import Record
+from solver.results.trace import Trace, fields, shakedown
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Monitor, Scene
 from solver.scenes.settling import Settling
-from solver.scenes.trace import Trace, fields, shakedown
-from solver.stepper import Tally
-from solver.system import System
-from solver.wheel import Wheel
 
 
 def layout(parameters: RollingParameters) -> Layout:
@@ -131,10 +131,10 @@ def path(
     increments = 2 * schedule.half_steps + schedule.press + schedule.release
     expected, done = increments * schedule.n, 0
 
-    def report(load: float, message: str) -> None:
+    def report() -> None:
         nonlocal done
         done += 1
-        monitor(min(done / expected, 0.99), message)
+        monitor(min(done / expected, 0.99))
 
     tolerance = parameters.advance_tolerance * parameters.yield_stress
     rolled = Settling(harvest, schedule, tolerance, report)
@@ -146,7 +146,7 @@ def path(
             if n == result.number + 1 or (result.unloaded is None and n > result.number):
                 here = replace(parameters, passes=n)
                 yield _record(harvest, here, result, traces, rolled)
-    monitor(1.0, "done")
+    monitor(1.0)
 
 
 def _record(

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from annotated_types import Interval, Unit
 
-from solver.body import Body
 from solver.errors import ModelError
-from solver.material import Material
+from solver.loading.passes import Schedule
+from solver.materials.material import Material
 from solver.mesh import graded, grid, mapped, merged
-from solver.model import Model
-from solver.motion import Axle, AxleProgram, TravellingPressure
-from solver.passes import Schedule
+from solver.model.body import Body
+from solver.model.model import Model
+from solver.model.motion import Axle, AxleProgram, TravellingPressure
 from solver.scenes.parameters import ContactParameters, Friction, Length, described
 from solver.scenes.settling import HALVINGS
 

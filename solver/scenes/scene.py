@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from solver.record import Record
+from solver.results.record import Record
 
-Monitor = Callable[[float, str], None]
-"""Called after every increment with the fraction of the path done (0-1) and a line of text.
+Monitor = Callable[[float], None]
+"""Called after every increment with the fraction of the path done (0-1).
 An exception it raises stops the path and reaches the caller unchanged."""
 
 

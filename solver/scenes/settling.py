@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import LimitLoad
-from solver.passes import Passes, PassResult
-from solver.stepper import PathControl, Tally
+from solver.loading.passes import Passes, PassResult
+from solver.loading.stepper import PathControl, Tally
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from solver.passes import Schedule
-    from solver.scenes.harvest import Harvest
-    from solver.stepper import Report
+    from solver.loading.passes import Schedule
+    from solver.loading.stepper import Report
+    from solver.results.harvest import Harvest
 
 HALVINGS = 6
 

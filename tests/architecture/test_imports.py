@@ -37,7 +37,7 @@ def test_one_module_of_studies_imports_dask() -> None:
 
 def test_what_draws_is_in_its_folders() -> None:
     users = {Path(m).parent for m, names in imports("studies").items() if "matplotlib" in names}
-    assert users == {Path("studies/plots"), Path("studies/comparison")}
+    assert users == {Path("studies/views/plots"), Path("studies/views/comparison")}
 
 
 @pytest.mark.parametrize(

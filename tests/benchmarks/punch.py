@@ -16,7 +16,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver import SCENES, Record, Status, pardiso
+from solver import SCENES, Record, Status
+from solver.linear import pardiso
 from solver.scenes.punch import PunchParameters
 from tests.benchmarks.measure import Point, timed
 
@@ -177,7 +178,7 @@ def _run(parameters: PunchParameters, linear_solver: str, repeats: int) -> Point
 
 
 def _walk(parameters: PunchParameters) -> Record:
-    (record,) = SCENES["punch"].path(parameters, [parameters.load_ratio], lambda share, text: None)
+    (record,) = SCENES["punch"].path(parameters, [parameters.load_ratio], lambda share: None)
     if record.status is not Status.OK:
         raise RuntimeError(f"{record.status.name}: {record.message} ({parameters})")
     return record

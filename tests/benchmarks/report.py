@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from solver import __version__, pardiso
+from solver import __version__
+from solver.linear import pardiso
 from tests.benchmarks.measure import Point
 
 

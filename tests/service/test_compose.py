@@ -25,7 +25,11 @@ SERVICES: dict[str, Any] = COMPOSE["services"]
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
 
 PROGRAMS = {
-    "residua": [sys.executable, "-c", "import sys; from studies.cli import main; sys.exit(main())"],
+    "residua": [
+        sys.executable,
+        "-c",
+        "import sys; from studies.command.cli import main; sys.exit(main())",
+    ],
     "dask": [sys.executable, "-m", "dask"],
     "python": [sys.executable],
 }
@@ -87,7 +91,7 @@ def test_who_needs_the_scheduler_waits_for_its_health() -> None:
 
 CONFIGURATION = """
 import json, dask, distributed
-from studies.grid import _CONFIGURATION as own
+from studies.execution.grid import _CONFIGURATION as own
 names = [name for name in own if name.startswith("distributed.scheduler.")]
 known = dask.config.merge(*dask.config.defaults)
 print(json.dumps({name: [own[name], dask.config.get(name)] for name in names

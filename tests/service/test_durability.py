@@ -17,7 +17,7 @@ from service.jobs import Jobs
 from service.settings import Settings
 from solver.scenes import SCENES
 from studies import Store, Study, open_netcdf
-from studies.dataset import broken_dataset
+from studies.storage.dataset import broken_dataset
 from tests.architecture.sources import ROOT
 from tests.service.servers import (
     COARSE_PUNCH,

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver.acceleration import Series
+from solver.loading.acceleration import Series
 
 
 def steps_needed(M, *, mixed=True, most=300):

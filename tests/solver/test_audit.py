@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, PathControl, solve
-from solver.audit import audit
-from solver.audit.law import increment_error, law_error, of_state
-from solver.constitutive import PlasticState, respond
-from solver.kinematics import to_tensor
+from solver.materials import PlasticState, respond
 from solver.mesh import grid, mapped
+from solver.results.audit import audit
+from solver.results.audit.law import increment_error, law_error, of_state
 from solver.scenes.punch import PunchParameters, model
+from solver.tensors import to_tensor
 from tests.verification.bodies import block
 
 

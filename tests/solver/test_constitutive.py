@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.constitutive import PlasticState, respond
-from solver.constitutive.mises import radial_return, yield_function
-from solver.material import Material
+from solver.materials import PlasticState, respond
+from solver.materials.material import Material
+from solver.materials.von_mises import radial_return, yield_function
 
 HARDENING = ["none", "isotropic", "kinematic", "mixed"]
 KINEMATICS = ["plane_strain", "plane_stress"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, NotConverged, System, solve
-from solver.contact.complementarity import STICK
-from solver.increment import Increment
+from solver.contact.problem import STICK
+from solver.loading.increment import Increment
 from solver.mesh import grid
 from tests.verification.flat_punches import press
 

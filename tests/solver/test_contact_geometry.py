@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError, System
+from solver.fem.discretisation import Discretisation
+from solver.fem.surface import extract
 from solver.mesh import grid, mapped
-from solver.surface import extract
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 ELEMENTS = ["quad8", "quad4"]
@@ -160,6 +161,6 @@ def test_thin_elements_along_a_curve_have_their_body_on_the_right_side():
         lambda p: np.stack([p[0], p[1] + p[0] ** 2 / 200]),
     )
     bent = Body(name="bent", mesh=curve, material=STEEL, pressure={"bottom": 100.0})
-    assert bent.discretisation.load[1::2].sum() == pytest.approx(100.0 * 20.0)
-    chain = extract(bent.discretisation, "bottom")
+    assert Discretisation(bent).load[1::2].sum() == pytest.approx(100.0 * 20.0)
+    chain = extract(Discretisation(bent), "bottom")
     assert chain.X[0, chain.vertices] == pytest.approx([0.0, 10.0, 20.0])

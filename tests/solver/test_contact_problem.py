@@ -7,15 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.contact.complementarity import (
-    BACKWARD,
-    FORWARD,
-    OPEN,
-    STICK,
-    ContactProblem,
-    solve_contact,
-)
+from solver.contact.complementarity import solve_contact
 from solver.contact.lemke import lemke
+from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem
 
 
 def half_plane_compliance(n, coupling, seed):

@@ -16,9 +16,10 @@ from solver import (
     System,
     solve,
 )
+from solver.fem.discretisation import Discretisation
+from solver.fem.surface import extract
 from solver.mesh import grid, mapped
 from solver.scenes.rolling import ROLLING
-from solver.surface import extract
 from tests.verification.bodies import block
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
@@ -186,7 +187,7 @@ def test_a_coarse_curve_goes_on_as_a_fine_one_does(edges):
     ring = mapped(grid(np.linspace(-2.3, 2.3, edges + 1), np.linspace(0.5, 1.0, 3)), around)
     part = named(ring, piece=lambda x: (np.hypot(*x) > 0.9) & (np.abs(x[0]) < 0.8) & (x[1] < 0))
     body = Body(name="ring", mesh=part, material=STEEL)
-    assert extract(body.discretisation, "piece").goes_on == (True, True)
+    assert extract(Discretisation(body), "piece").goes_on == (True, True)
 
 
 def test_pairs_that_touch_and_carry_nothing_pass_the_audit():

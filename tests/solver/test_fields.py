@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from solver import Body, Material
-from solver.fields import Sampler, error_estimate, recovery, von_mises
-from solver.kinematics import SQRT2, to_tensor
+from solver.fem.discretisation import Discretisation
+from solver.fem.fields import Sampler, error_estimate, recovery
 from solver.mesh import graded, grid, mapped
+from solver.tensors import SQRT2, to_tensor, von_mises
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 ELEMENTS = ["quad8", "quad9", "quad4", "tri6", "tri3"]
@@ -19,7 +20,7 @@ def square(element="quad8", n=5, curved=False, **fields):
     mesh = grid(graded(2.0, 1.5 / n, 1.2, 1.0), np.linspace(-1.0, 0.0, n + 1), cells)
     if curved:
         mesh = mapped(mesh, lambda p: np.stack([p[0] + 0.1 * p[1] ** 2, p[1] + 0.05 * p[0] ** 2]))
-    return Body(name="square", mesh=mesh, material=STEEL, element=element, **fields).discretisation
+    return Discretisation(Body(name="square", mesh=mesh, material=STEEL, element=element, **fields))
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -112,7 +113,7 @@ def test_error_estimate_falls_with_the_square_of_the_element():
 
     def share(n):
         mesh = grid(np.linspace(0.0, 2.0, 2 * n + 1), np.linspace(-1.0, 0.0, n + 1))
-        part = Body(name="square", mesh=mesh, material=STEEL).discretisation
+        part = Discretisation(Body(name="square", mesh=mesh, material=STEEL))
         stress = np.zeros((4, part.weights.size))
         stress[0] = np.sin(np.pi * part.points.reshape(2, -1)[0])
         error, energy = error_estimate(part, stress)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solver import linear, pardiso
 from solver.errors import ModelError
+from solver.linear import pardiso
+from solver.linear import solvers as linear
 
 NAMES = ["superlu", *(["pardiso"] if pardiso.library() else [])]
 

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from solver import ModelError, Status, System
-from solver.contact.complementarity import LEAST_FRICTION, OPEN, ContactProblem, solve_contact
+from solver.contact.complementarity import solve_contact
+from solver.contact.problem import OPEN, ContactProblem
+from solver.model.model import LEAST_FRICTION
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_model import RollingParameters, model
 from tests.solver.test_contact_problem import instance

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError
+from solver.fem.discretisation import Discretisation
 from solver.mesh import grid
-from solver.motion import TravellingPressure
+from solver.model.motion import TravellingPressure
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 KNOTS = np.zeros(1)
@@ -56,7 +57,7 @@ def test_contact_inside_a_body_is_refused(side):
 
 
 def test_supports_may_hold_a_body_inside():
-    held = plate(supports={"seam": "xy"}).discretisation
+    held = Discretisation(plate(supports={"seam": "xy"}))
     assert held.rigid.shape[1] == 0
     assert held.n - len(held.active) == 18
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from solver.errors import ModelError
-from solver.passes import Schedule
+from solver.loading.passes import Schedule
 
 
 def schedule(**fields):

@@ -21,9 +21,9 @@ from solver import (
     Tolerances,
     solve,
 )
-from solver import pardiso as mkl
-from solver.fields import Sampler
-from solver.increment import Increment
+from solver.fem.fields import Sampler
+from solver.linear import pardiso as mkl
+from solver.loading.increment import Increment
 from solver.mesh import grid
 from solver.scenes.punch import PunchParameters, model
 
@@ -189,7 +189,7 @@ def test_the_monitor_may_stop_a_path(system):
     class StopHere(Exception):
         pass
 
-    def report(load, message):
+    def report():
         raise StopHere
 
     with pytest.raises(StopHere):

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError, solve
+from solver.fem.discretisation import Discretisation
+from solver.fem.surface import extract
 from solver.mesh import grid
-from solver.motion import TravellingPressure
-from solver.surface import extract
+from solver.model.motion import TravellingPressure
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 
@@ -44,7 +45,7 @@ def test_uniform_pressure_strains_a_periodic_strip_in_one_direction(element):
 
 
 def test_both_sides_of_the_seam_move_alike():
-    part = strip().discretisation
+    part = Discretisation(strip())
     u = solve(Model(bodies=(strip(pressure={"top": 1.0}),))).displacement("strip", "loaded")
     for near in part.boundary_nodes("left"):
         far = np.abs(part.X.T - part.X[:, near] - [4.0, 0.0]).sum(axis=1).argmin()
@@ -52,7 +53,7 @@ def test_both_sides_of_the_seam_move_alike():
 
 
 def test_contact_surface_goes_on_for_half_a_period_at_either_end():
-    chain = extract(strip().discretisation, "top")
+    chain = extract(Discretisation(strip()), "top")
     x = chain.X[0, chain.vertices]
     assert np.abs(np.diff(np.sort(x))).max() < 1.3
     assert x.min() < -1.9
@@ -75,7 +76,7 @@ def test_contact_surface_goes_on_for_half_a_period_at_either_end():
 )
 def test_what_cannot_repeat_itself_is_refused(fields, field):
     with pytest.raises(ModelError) as caught:
-        _ = strip(**fields).discretisation
+        _ = Discretisation(strip(**fields))
     assert caught.value.field == field
 
 
@@ -86,14 +87,14 @@ def test_a_travelling_pressure_wider_than_the_period_is_refused():
         shear_ratio=knots,
     )  # fmt: skip
     with pytest.raises(ModelError, match="travelling"):
-        _ = strip(pressure={}, travelling=load).discretisation
+        _ = Discretisation(strip(pressure={}, travelling=load))
 
 
 def test_a_contact_surface_across_the_period_is_refused():
     mesh = strip().mesh
     patch = mesh.with_boundaries({"patch": lambda x: (x[1] == 0) & (x[0] > 0.7) & (x[0] < 3.1)})
     with pytest.raises(ModelError, match="whole period"):
-        extract(strip(mesh=patch).discretisation, "patch")
+        extract(Discretisation(strip(mesh=patch)), "patch")
 
 
 @pytest.mark.parametrize("solver", ["auto", "superlu"])

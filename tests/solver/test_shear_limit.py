@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError, NotConverged, solve
-from solver.contact.complementarity import STICK
+from solver.contact.problem import STICK
 from solver.mesh import grid
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch import model as punch_model
@@ -123,7 +123,7 @@ def locked_wheel(shear_limit, element_size):
         unload_steps=1,
         shear_limit=shear_limit,
     )
-    (record,) = ROLLING.path(parameters, [1], lambda share, text: None)
+    (record,) = ROLLING.path(parameters, [1], lambda share: None)
     return record.scalars["surface_plastic_strain"]
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.elements import element_type
+from solver.mesh.elements import element_type
 from tests.stability.closed import passed
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver import ContactPair, Solution, System
-    from solver.outcome import Converged
+    from solver.contact.state import Converged
 
     Array = NDArray[np.float64]
 

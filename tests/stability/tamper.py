@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver import Solution
-from solver.outcome import Converged
+from solver.contact.state import Converged
 from tests.stability.kinds import reopening, rolling
 
 Tamper = Callable[[Converged], Converged]

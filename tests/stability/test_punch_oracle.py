@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver import Branch, Path, PathControl, System
-from solver.outcome import Converged
+from solver.contact.state import Converged
 from solver.scenes.punch import PunchParameters, model
 from tests.stability.kinds.punch_oracle import LIMITS, judge
 

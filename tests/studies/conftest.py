@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from studies import Store, Study
-from studies.combine import combine
-from studies.identity import solver_hash
-from studies.task import PathTask, walk
+from studies.definition.identity import solver_hash
+from studies.execution.task import PathTask, walk
+from studies.storage.combine import combine
 from tests.studies.fakes import FAKE
 
 AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.4]}

@@ -14,7 +14,7 @@ import numpy as np
 from annotated_types import Gt, Interval, Unit
 
 from solver.errors import ModelError
-from solver.record import Record, Status
+from solver.results.record import Record, Status
 from solver.scenes import SCENES, Monitor, Scene
 
 INCREMENTS = 10
@@ -55,7 +55,7 @@ def path(parameters: FakeParameters, values: Sequence[float], monitor: Monitor) 
         for step in range(INCREMENTS):
             time.sleep(parameters.seconds / INCREMENTS / len(values))
             done = (number + (step + 1) / INCREMENTS) / len(values)
-            monitor(done, f"load ratio {load_ratio}, increment {step + 1}")
+            monitor(done)
         if load_ratio >= 0.8 and parameters.trouble != "none":
             if parameters.trouble == "short":
                 return

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.dataset import OK, STATUSES
+from studies.definition.vocabulary import OK, STATUSES
 
 DEPTH = np.concatenate([np.linspace(0.0, 25.0, 126), np.linspace(25.5, 50.0, 30)])
 PEAK = 3.0

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from studies.catalogue import Catalogue
+from studies.storage.catalogue import Catalogue
 
 KILLED_WRITER = """
 import os, sqlite3, sys

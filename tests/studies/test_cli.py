@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from solver.shakedown import State as Shakedown
+from solver.results.shakedown import State as Shakedown
 from studies import Store, Study, StudyEvent, open_netcdf
-from studies.cli import main
-from studies.dataset import attributes_of
-from studies.progress import Progress
+from studies.command.cli import main
+from studies.command.progress import Progress
+from studies.storage.dataset import attributes_of
 from tests.studies.conftest import compute_here, fake_study
 
 StudyFile = Callable[..., Path]

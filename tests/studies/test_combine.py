@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from studies import Store, Study, StudyError, open_study
-from studies.combine import combine
-from studies.dataset import STATUSES
-from studies.reading import one_run
+from studies.definition.vocabulary import STATUSES
+from studies.storage.combine import combine
+from studies.views.reading import one_run
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import record
 

@@ -8,10 +8,11 @@ import netCDF4
 import numpy as np
 import pytest
 
-from solver.record import Record, Status
+from solver.results.quantities import QUANTITIES
+from solver.results.record import Record, Status
 from studies import Store, Study, open_netcdf
-from studies.dataset import STATUSES, run_dataset
-from studies.quantities import QUANTITIES
+from studies.definition.vocabulary import STATUSES
+from studies.storage.dataset import run_dataset
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from solver.results.quantities import QUANTITIES
 from studies import Store, Study, StudyError, open_netcdf, open_study
-from studies.cli import main
-from studies.dataset import LABEL_ATTRIBUTES, STATUSES
-from studies.plots.lines import line_figure
-from studies.plots.maps import map_figure
-from studies.quantities import QUANTITIES
-from studies.reading import one_run
-from studies.tables import runs_table
+from studies.command.cli import main
+from studies.definition.vocabulary import LABEL_ATTRIBUTES, STATUSES
+from studies.views.plots.lines import line_figure
+from studies.views.plots.maps import map_figure
+from studies.views.reading import one_run
+from studies.views.tables import runs_table
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import record
 from tests.studies.plots.test_maps import texts_of

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from studies import Store, Study, StudyEvent, StudyOutcome, open_study, run_study
-from studies.dataset import STATUSES
-from studies.identity import solver_hash
-from studies.task import PathTask, walk
+from studies.definition.identity import solver_hash
+from studies.definition.vocabulary import STATUSES
+from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, INCREMENTS
 
@@ -77,7 +77,9 @@ def test_events_tell_every_run_once_and_progress_ends_at_one(troubled: Troubled)
     assert progress == sorted(progress)
     assert progress[-1] == pytest.approx(1.0)
     healthy = runs[0].path
-    fractions = [event.fraction for event in events if event.path == healthy and event.text]
+    fractions = [
+        event.fraction for event in events if event.path == healthy and event.kind == "path"
+    ]
     assert fractions == sorted(fractions)
     assert len(fractions) >= 2 * INCREMENTS
     assert {event.path for event in events} == {path.id for path in study.paths()}
@@ -134,7 +136,7 @@ def test_a_record_that_cannot_be_written_breaks_its_own_run_only(store: Store) -
 def test_runs_left_over_without_a_wish_to_stop_are_no_stop(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.run._Work.compute", lambda *arguments: None)
+    monkeypatch.setattr("studies.execution.run._Work.compute", lambda *arguments: None)
     outcome = run_study(fake_study(), store, workers=1)
     assert outcome.counts == {"missing": 4}
     assert not outcome.stopped

@@ -10,10 +10,10 @@ import pytest
 import xarray as xr
 
 from solver import SCENES, Record
+from solver.results.quantities import QUANTITIES
 from studies import Store, Study, open_study, run_study
-from studies.dataset import LABEL_ATTRIBUTES
-from studies.quantities import QUANTITIES
-from studies.tables import runs_table
+from studies.definition.vocabulary import LABEL_ATTRIBUTES
+from studies.views.tables import runs_table
 
 COARSE = {"smallest_element": 0.05, "growth": 2.5, "load_step": 0.15, "hardening": "isotropic"}
 
@@ -44,7 +44,7 @@ def records() -> list[Record]:
     found = []
     for name, (parameters, value) in coarse.items():
         scene = SCENES[name]
-        found += scene.path(scene.parameters(**parameters), [value], lambda fraction, text: None)
+        found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)
     return found
 
 

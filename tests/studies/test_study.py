@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import subprocess
 import sys
 import time
@@ -12,10 +13,10 @@ from typing import Any
 
 import pytest
 
-import studies.identity
+import studies.definition.identity
 from solver.scenes import SCENES
 from studies import Study, StudyError, scene_schema
-from studies.sweep import MAXIMUM_RUNS
+from studies.definition.sweep import MAXIMUM_RUNS
 from tests.studies.conftest import fake_study
 
 ROOT = Path(__file__).parents[2]
@@ -132,7 +133,7 @@ def test_a_run_has_the_same_id_in_every_study() -> None:
 def test_a_changed_solver_makes_new_ids(monkeypatch: pytest.MonkeyPatch) -> None:
     before = Study.from_dict(GOOD)
     ids = before.id, next(before.cases()).id
-    monkeypatch.setattr(studies.identity, "solver_hash", lambda: "0" * 32)
+    monkeypatch.setattr(studies.definition.identity, "solver_hash", lambda: "0" * 32)
     after = Study.from_dict(GOOD)
     assert after.id != ids[0]
     assert next(after.cases()).id != ids[1]
@@ -146,7 +147,7 @@ def test_the_solver_hash_covers_every_source_and_its_place(
     (package / "__init__.py").write_text("")
     (package / "inner" / "law.py").write_text("E = 1")
     monkeypatch.setattr("solver.__file__", str(package / "__init__.py"))
-    source = studies.identity.solver_hash.__wrapped__
+    source = studies.definition.identity.solver_hash.__wrapped__
     first = source()
     (package / "inner" / "law.py").write_text("E = 2")
     second = source()
@@ -154,17 +155,17 @@ def test_the_solver_hash_covers_every_source_and_its_place(
     assert len({first, second, source()}) == 3
 
 
-@pytest.mark.parametrize("name", ["dataset", "quantities", "design", "parameters"])
+@pytest.mark.parametrize("name", studies.definition.identity.FORM)
 def test_the_solver_hash_covers_what_gives_a_file_its_form(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = Path(studies.identity.__file__).parent
-    for source in here.glob("*.py"):
-        (tmp_path / source.name).write_bytes(source.read_bytes())
-    monkeypatch.setattr("studies.identity.__file__", str(tmp_path / "identity.py"))
-    digest = studies.identity.solver_hash.__wrapped__
+    here = Path(studies.definition.identity.__file__).parents[1]
+    shutil.copytree(here, tmp_path / "studies")
+    copied = tmp_path / "studies" / "definition" / "identity.py"
+    monkeypatch.setattr("studies.definition.identity.__file__", str(copied))
+    digest = studies.definition.identity.solver_hash.__wrapped__
     before = digest()
-    with (tmp_path / f"{name}.py").open("a") as module:
+    with (tmp_path / "studies" / name).open("a") as module:
         module.write("# changed\n")
     assert digest() != before
 

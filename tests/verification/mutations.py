@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-import solver.increment
-import solver.step
-import solver.stepper
-import solver.system
-from solver import discretisation, kinematics, substructure
-from solver.constitutive import PlasticState
+import solver.contact.system
+import solver.loading.increment
+import solver.loading.step
+import solver.loading.stepper
 from solver.contact import candidates, complementarity
-from solver.contact.complementarity import OPEN, STICK, ContactSolution
-from solver.discretisation import Discretisation
-from solver.model import effective_friction
-from solver.outcome import Tolerances
-from solver.wheel import Wheel
+from solver.contact.problem import OPEN, STICK, ContactSolution
+from solver.fem import discretisation, kinematics, substructure
+from solver.fem.discretisation import Discretisation
+from solver.fem.wheel import Wheel
+from solver.loading.outcome import Tolerances
+from solver.materials import PlasticState
+from solver.model.model import effective_friction
 
 Patch = pytest.MonkeyPatch
 Fault = Callable[[Patch], None]
@@ -53,7 +53,7 @@ class Mutation:
 def friction_times(factor: float) -> Fault:
     def fault(patch: Patch) -> None:
         patch.setattr(
-            solver.system, "effective_friction", lambda mu: factor * effective_friction(mu)
+            solver.contact.system, "effective_friction", lambda mu: factor * effective_friction(mu)
         )
 
     return fault
@@ -68,19 +68,19 @@ def motion_offset(gap: float = 0.0, slip: float = 0.0) -> Fault:
         return replace(found, motion=found.motion + offset)
 
     def fault(patch: Patch) -> None:
-        patch.setattr(solver.increment, "find_candidates", shifted)
+        patch.setattr(solver.loading.increment, "find_candidates", shifted)
 
     return fault
 
 
 def half_tangential_rows(patch: Patch) -> None:
-    pair = solver.system.pair
+    pair = solver.contact.system.pair
 
     def halved(*args: Any) -> Any:
         found = pair(*args)
         return replace(found, tangent=tuple(side / 2 for side in found.tangent))
 
-    patch.setattr(solver.system, "pair", halved)
+    patch.setattr(solver.contact.system, "pair", halved)
 
 
 def less_on_the_master(normal: float, tangential: float) -> Fault:
@@ -114,7 +114,7 @@ def glue(patch: Patch) -> None:
         forces = complementarity._forces(problem, status, np.zeros(problem.n, dtype=bool))
         return None if forces is None else ContactSolution(*forces, status, False)
 
-    patch.setattr(solver.step, "solve_contact", glued)
+    patch.setattr(solver.loading.step, "solve_contact", glued)
     patch.setattr(candidates.Candidates, "violation", lambda self, stiffness: 0.0)
 
 
@@ -128,19 +128,21 @@ def overlooked_contact(patch: Patch) -> None:
 
     patch.setattr(candidates, "_near", some)
     patch.setattr(
-        solver.increment, "find_candidates", lambda *args: replace(find(*args), beyond=np.inf)
+        solver.loading.increment,
+        "find_candidates",
+        lambda *args: replace(find(*args), beyond=np.inf),
     )
 
 
 def master_stands_still(patch: Patch) -> None:
     """Gaps do not see the master move."""
-    pairing = solver.system.Interface.pairing
+    pairing = solver.contact.system.Interface.pairing
 
     def still(self: Any, u: Any) -> Any:
         number = self.sides[1][0]
         return pairing(self, tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u)))
 
-    patch.setattr(solver.system.Interface, "pairing", still)
+    patch.setattr(solver.contact.system.Interface, "pairing", still)
 
 
 # -- the law -----------------------------------------------------------------------------------
@@ -172,7 +174,7 @@ def more_flow(patch: Patch) -> None:
 
 def forgotten_flow(patch: Patch) -> None:
     """One increment begins as if nothing had yielded before."""
-    advance = solver.stepper.Stepper.advance
+    advance = solver.loading.stepper.Stepper.advance
 
     def forgetful(self: Any, point: Any, target: float, **options: Any) -> Any:
         point = advance(self, point, target, **options)
@@ -182,7 +184,7 @@ def forgotten_flow(patch: Patch) -> None:
         virgin = tuple(PlasticState.virgin(p.accumulated.size) for p in state.plastic)
         return replace(point, now=replace(point.now, state=replace(state, plastic=virgin)))
 
-    patch.setattr(solver.stepper.Stepper, "advance", forgetful)
+    patch.setattr(solver.loading.stepper.Stepper, "advance", forgetful)
 
 
 def no_hoop_strain(patch: Patch) -> None:
@@ -242,14 +244,14 @@ def soft_condensation(patch: Patch) -> None:
 
 def hasty_release(patch: Patch) -> None:
     """The last increment is taken as converged as soon as it is begun."""
-    build = solver.increment.Increment.__init__
+    build = solver.loading.increment.Increment.__init__
 
     def hasty(self: Any, *args: Any, **options: Any) -> None:
         build(self, *args, **options)
         if not self.contact and self.start.force_scale > 0:
             self.tolerances = Tolerances(residual=1.0)
 
-    patch.setattr(solver.increment.Increment, "__init__", hasty)
+    patch.setattr(solver.loading.increment.Increment, "__init__", hasty)
 
 
 MUTATIONS: dict[str, Mutation] = {

@@ -33,7 +33,7 @@ def passes(case):
     """The records of a case after its first pass, its second, ..."""
     parameters = RollingParameters(**CASES[case], **(LOCKED if case == "T4" else MESH))
     wanted = range(1, parameters.passes + 1)
-    return list(SCENES["rolling"].path(parameters, wanted, lambda share, text: None))
+    return list(SCENES["rolling"].path(parameters, wanted, lambda share: None))
 
 
 def after(case, number=1):

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from solver import Model, PathControl, solve
-from solver.fields import recovery
-from solver.kinematics import to_tensor
+from solver.fem.discretisation import Discretisation
+from solver.fem.fields import recovery
 from solver.mesh import grid
-from solver.scenes.free_surface import FreeSurface
+from solver.results.free_surface import FreeSurface
+from solver.tensors import to_tensor
 from tests.verification.bodies import NU, E, block, cells, sector, steel
 from tests.verification.closed_forms import ThickCylinder, ThickSphere
 
@@ -34,7 +35,7 @@ def bent(element, state, turned):
         block("bar", np.arange(2.0), np.arange(2.0), element, state=state),
         mesh=replace(mesh, doflocs=turn @ mesh.doflocs),
     )
-    part = body.discretisation
+    part = Discretisation(body)
     x, y = turn.T @ part.X
     u = np.stack([k * x * (y + y0), -k * x**2 / 2 - m * k * (y**2 / 2 + y0 * y)])
     u = (turn @ u).T.ravel()
@@ -87,7 +88,7 @@ def strained_layer(thickness, n):
         "layer", np.linspace(0.0, 2.0, 3), np.linspace(-thickness, 0.0, n + 1),
         supports={"left": "x", "right": "x", "bottom": "y"},
     )  # fmt: skip
-    part = body.discretisation
+    part = Discretisation(body)
     y = part.points.reshape(2, -1)[1]
     plastic = np.stack([2e-3 * np.exp(y), -3e-3 * np.exp(y), 1e-3 * np.exp(y), 0.0 * y])
     stiffness = part.elastic_matrix()[part.active][:, part.active]

@@ -16,7 +16,7 @@ def run(scene: str, **changes: Any) -> Record:
     """Return the one record of a coarse run."""
     found = SCENES[scene]
     parameters = found.parameters(**(BASE[scene] | changes))
-    (record,) = found.path(parameters, [getattr(parameters, found.branch)], lambda done, text: None)
+    (record,) = found.path(parameters, [getattr(parameters, found.branch)], lambda done: None)
     return record
 
 

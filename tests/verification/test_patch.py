@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver import ContactPair, Model, solve
-from solver.kinematics import to_tensor
 from solver.mesh import grid, mapped
+from solver.tensors import to_tensor
 from tests.verification.bodies import NU, block, cells, steel
 
 P = 100.0

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from solver import SCENES, PathControl, Status, solve
-from solver.fields import Sampler
+from solver.fem.fields import Sampler
 from solver.scenes.punch import PunchParameters, model
 
 PLATEAU = 1 / 0.5714
@@ -271,7 +271,7 @@ def test_the_scene_records_what_the_solution_holds():
     parameters = PunchParameters(
         friction=0.4, hardening="isotropic", smallest_element=4e-3, half_plane_size=16.0
     )
-    (record,) = SCENES["punch"].path(parameters, [0.5714], lambda share, message: None)
+    (record,) = SCENES["punch"].path(parameters, [0.5714], lambda share: None)
     run = press(friction=0.4, hardening="isotropic", smallest_element=4e-3)
     assert record.status is Status.OK
     assert record.scalars["residual_x_half_plane"] == pytest.approx(run.half_plane, rel=1e-6)

@@ -9,7 +9,7 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.errors import NotConverged
-from solver.passes import PassResult
+from solver.loading.passes import PassResult
 from solver.scenes.rolling_model import RollingParameters
 from solver.scenes.settling import Settling
 
@@ -20,7 +20,7 @@ COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
 def roll(**fields):
     """The record of one run."""
     parameters = RollingParameters(**fields)
-    (record,) = SCENES["rolling"].path(parameters, [parameters.passes], lambda share, text: None)
+    (record,) = SCENES["rolling"].path(parameters, [parameters.passes], lambda share: None)
     assert record.status is Status.OK, record.message
     return record
 

@@ -62,7 +62,7 @@ def rolled(steps, *, per_half_width=5, widths=3.2, stiffness=1.0, **fields):
         track=a * widths,
         **fields,
     )
-    (record,) = SCENES["rolling"].path(parameters, [1], lambda share, text: None)
+    (record,) = SCENES["rolling"].path(parameters, [1], lambda share: None)
     assert record.status is Status.OK, record.message
     assert record.scalars["max_plastic_strain"] == 0.0
     at = list(record.coordinates["stage"]).index("loaded")

@@ -30,7 +30,7 @@ def scalars(element_size, traction=0.0):
         element_size=element_size, growth=1.15**element_size, advance_step=2.0, track=20.0,
         traction=traction,
     )  # fmt: skip
-    (record,) = SCENES["rolling"].path(parameters, [1], lambda share, text: None)
+    (record,) = SCENES["rolling"].path(parameters, [1], lambda share: None)
     assert record.status is Status.OK, record.message
     return record.scalars
 

@@ -13,16 +13,14 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Status
-from solver.scenes.rolling_model import RollingParameters
-from solver.shakedown import (
-    Limit,
-    State,
-    classify,
+from solver.results.shakedown import Limit, State, classify
+from solver.results.sliding_limits import (
     johnson_limit,
     largest_shear,
     melan_limit,
     sliding_contact,
 )
+from solver.scenes.rolling_model import RollingParameters
 
 YIELD_STRAIN = 502.0 / 2e5
 
@@ -46,7 +44,7 @@ def rolled(pressure, passes, *, half_width=8.0, status=Status.OK, **fields):
         | fields
     )
     assert parameters.half_width == pytest.approx(half_width)
-    (record,) = SCENES["rolling"].path(parameters, [passes], lambda share, text: None)
+    (record,) = SCENES["rolling"].path(parameters, [passes], lambda share: None)
     assert record.status is status, record.message
     return record
 

@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.record import Record, Status
+from solver.results.record import Record, Status
 
 LOG = "FAKE_SCENE_LOG"
 """Environment variable: file that gets a line for each record computed, its parameters."""
@@ -54,7 +54,7 @@ def path(parameters: FakeParameters, values: Sequence[float], monitor: object) -
         for increment in range(INCREMENTS):
             time.sleep(parameters.seconds / INCREMENTS)
             done = (position + (increment + 1) / INCREMENTS) / len(values)
-            monitor(done, f"load ratio {load_ratio}")
+            monitor(done)
         yield record(replace(parameters, load_ratio=load_ratio))
 
 

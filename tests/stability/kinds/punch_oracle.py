@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.elements import element_type
+from solver.mesh.elements import element_type
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver import Branch, System
-    from solver.outcome import Converged
+    from solver.contact.state import Converged
     from solver.scenes.punch import PunchParameters
 
     Array = NDArray[np.float64]

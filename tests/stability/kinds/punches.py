@@ -103,9 +103,7 @@ def press(parameters: PunchParameters) -> Pressed:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(punch, "Path", Watched)
-        (record,) = SCENES["punch"].path(
-            parameters, [parameters.load_ratio], lambda share, message: None
-        )
+        (record,) = SCENES["punch"].path(parameters, [parameters.load_ratio], lambda share: None)
     ((system, branch),) = seen
     if branch.error is not None:
         raise branch.error

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from solver import Body, ContactPair, Material, Model, PathControl, Solution, System, solve
+from solver.contact.state import Converged
+from solver.loading.stepper import Stepper, Stopped
 from solver.mesh import grid
-from solver.outcome import Converged
-from solver.stepper import Stepper, Stopped
 from tests.stability.balance import mean_gaps
 from tests.stability.closed import QUICK, STEEL, passed
 from tests.stability.trial import Figure, Scene

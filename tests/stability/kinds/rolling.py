@@ -11,12 +11,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from solver import SCENES, LimitLoad, NotConverged, Record, Status, System, passes
+from solver import SCENES, LimitLoad, NotConverged, Record, Status, System
+from solver.contact.state import State
+from solver.loading import passes
+from solver.loading.stepper import Point, Stepper, Stopped
+from solver.results.harvest import End, Harvest
 from solver.scenes import rolling
-from solver.scenes.harvest import End, Harvest
 from solver.scenes.rolling_model import RollingParameters
-from solver.state import State
-from solver.stepper import Point, Stepper, Stopped
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure, Scene, tells
 
@@ -105,7 +106,7 @@ def roll(parameters: RollingParameters) -> Rolled:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rolling, "Harvest", Watched)
         patch.setattr(passes, "Stepper", Stepping)
-        (record,) = SCENES["rolling"].path(parameters, [1], lambda share, message: None)
+        (record,) = SCENES["rolling"].path(parameters, [1], lambda share: None)
     ((system, end),) = seen
     if end.error is not None:
         raise _judged(parameters, system, end.error, last[-1])

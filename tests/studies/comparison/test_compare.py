@@ -10,19 +10,25 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.record import Record, Status
+from solver.results.record import Record, Status
 from solver.scenes import SCENES
 from studies import Store, Study
-from studies.cli import main
-from studies.combine import combine
-from studies.comparison.compare import Comparison, _line, compare
-from studies.comparison.problem import REFINING, differences, other_problem
-from studies.comparison.profiles import Computed, Profile, read_profiles
-from studies.comparison.reference import Published, published_cases, read_reference, reference_of
-from studies.comparison.table import comparison_table
-from studies.dataset import STATUSES, run_dataset
+from studies.command.cli import main
+from studies.definition.parameters import parameters_of
+from studies.definition.vocabulary import STATUSES
 from studies.errors import StudyError
-from studies.parameters import parameters_of
+from studies.storage.combine import combine
+from studies.storage.dataset import run_dataset
+from studies.views.comparison.compare import Comparison, _line, compare
+from studies.views.comparison.problem import REFINING, differences, other_problem
+from studies.views.comparison.profiles import Computed, Profile, read_profiles
+from studies.views.comparison.reference import (
+    Published,
+    published_cases,
+    read_reference,
+    reference_of,
+)
+from studies.views.comparison.table import comparison_table
 from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
 
 ROOT = Path(__file__).parents[3]

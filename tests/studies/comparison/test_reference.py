@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from studies.comparison.reference import read_reference, reference_of
 from studies.errors import StudyError
+from studies.views.comparison.reference import read_reference, reference_of
 
 
 def table(path: Path, *rows: str) -> Path:

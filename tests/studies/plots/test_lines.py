@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies import Store, Study, StudyError, open_study
-from studies.cli import main
-from studies.plots.lines import line_figure
-from studies.plots.picture import picture
+from studies.command.cli import main
+from studies.views.plots.lines import line_figure
+from studies.views.plots.picture import picture
 from tests.studies.plots.test_maps import grid_map, texts_of
 from tests.studies.rolled import data_set, written
 

@@ -12,9 +12,9 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from studies import Store, Study, StudyError, open_netcdf, open_study
-from studies.plots.captions import setting
-from studies.plots.maps import map_figure, whole
-from studies.plots.picture import picture
+from studies.views.plots.captions import setting
+from studies.views.plots.maps import map_figure, whole
+from studies.views.plots.picture import picture
 from tests.studies.conftest import compute_here, fake_study
 
 ComputedStudy = tuple[Study, Store]

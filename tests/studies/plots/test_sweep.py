@@ -13,12 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
-from solver.shakedown import johnson_limit, melan_limit
+from solver.results.sliding_limits import johnson_limit, melan_limit
 from studies import Store, Study, StudyError, open_study
-from studies.cli import main
-from studies.dataset import STATUSES, attributes_of
-from studies.plots.fields import sweep_fields
-from studies.plots.sweep import sweep_figure
+from studies.command.cli import main
+from studies.definition.vocabulary import STATUSES
+from studies.storage.dataset import attributes_of
+from studies.views.plots.fields import sweep_fields
+from studies.views.plots.sweep import sweep_figure
 from tests.studies.conftest import compute_here, fake_study
 
 ROOT = Path(__file__).parents[3]

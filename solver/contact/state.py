@@ -1,0 +1,117 @@
+"""What an increment starts from and what it gives when it has converged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.problem import OPEN, STICK
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.state import PlasticState, Response
+
+
+@dataclass(frozen=True, slots=True)
+class ContactState:
+    """What a contact pair carries from one increment to the next, a value a slave vertex.
+
+    ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
+    surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` tells
+    whether the vertex had contact, so that its friction has a history. ``approach`` (3, n) is
+    the gap [mm], and the rates of gap and slip with the load in the last increment, NaN where
+    not known; ``gap`` (n,) is the gap whether near contact or not, inf where nothing faces.
+    """
+
+    normal: NDArray[np.float64]
+    tangential: NDArray[np.float64]
+    status: NDArray[np.int64]
+    touching: NDArray[np.bool_]
+    approach: NDArray[np.float64]
+    gap: NDArray[np.float64]
+
+    @classmethod
+    def at_rest(cls, gap: NDArray[np.float64], touching: NDArray[np.bool_]) -> ContactState:
+        """Return the state of vertices without forces, those that touch sticking."""
+        n = len(touching)
+        status = np.where(touching, STICK, OPEN)
+        approach = np.stack([gap, np.full(n, np.nan), np.full(n, np.nan)])
+        return cls(np.zeros(n), np.zeros(n), status, touching, approach, gap)
+
+    def halted(self) -> ContactState:
+        """Return the state where another motion begins: rates so far mean nothing."""
+        approach = self.approach.copy()
+        approach[1:] = np.nan
+        return replace(self, approach=approach)
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A converged state of the whole system; never changed, only replaced.
+
+    ``load`` is the load factor, ``force_scale`` the largest force level met so far, to which
+    tolerances refer [N].
+    """
+
+    load: float
+    u: tuple[NDArray[np.float64], ...]
+    plastic: tuple[PlasticState, ...]
+    contacts: tuple[ContactState, ...]
+    force_scale: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Energy:
+    """Work along a path [N mm].
+
+    Attributes
+    ----------
+    stored : elastic energy of the bodies where the path began
+    external : of loads, and of what holds a body that is moved
+    plastic : of stress on plastic strain, by the mean of its stress before and after
+    friction : of friction on slip, positive
+    contact : against contact where points open or close in an increment: an error of the path
+    """
+
+    stored: float = 0.0
+    external: float = 0.0
+    plastic: float = 0.0
+    friction: float = 0.0
+    contact: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Converged:
+    """A converged increment, from ``start`` to ``state``.
+
+    Attributes
+    ----------
+    forces : on each part, in balance with contact: loads, and what supports and prescribed
+        motions exert [N]
+    responses : of each part at its points
+    iterations : of Newton
+    elastic : whether no point yielded
+    plastic_work : of the increment [N mm]
+    dissipation : least at a point [N mm/mm3]
+    contact_work : work of friction, and against contact, in the increment [N mm]
+    pivoted, blended : iterations whose inner problem needed the fallback or a blended tangent
+    strayed : where contact has come to the end of a surface that goes on; empty where it has not
+    energy : work along the path so far
+    """
+
+    start: State
+    state: State
+    forces: tuple[NDArray[np.float64], ...]
+    contact_work: tuple[float, float]
+    responses: tuple[Response, ...]
+    iterations: int
+    elastic: bool
+    plastic_work: float
+    dissipation: float
+    pivoted: int
+    blended: int
+    strayed: str = ""
+    energy: Energy = field(default_factory=Energy)

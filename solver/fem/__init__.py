@@ -1,0 +1,1 @@
+"""Bodies discretised: unknowns, strains, forces, stiffness, surfaces, fields."""

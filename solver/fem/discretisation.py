@@ -1,0 +1,226 @@
+"""The operators of a body: strain, internal force, tangent, loads, rigid motions."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg, sparse
+
+from solver.fem import kinematics
+from solver.fem.nodes import Nodes
+from solver.fem.operators import Operators
+from solver.fem.part import Part
+from solver.fem.surface import pressure_forces, travelling_forces
+from solver.materials import PlasticState, Response, elastic_stiffness, respond
+from solver.mesh.elements import element_type
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.surface import Surface
+    from solver.model.body import Body
+
+
+def choose_pins(rigid: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the unknowns of ``free`` less as many as hold the rigid motions (n, n_rigid)."""
+    if not rigid.shape[1]:
+        return free
+    pivots = linalg.qr(rigid[free].T, mode="r", pivoting=True)[1]
+    return np.setdiff1d(free, free[pivots[: rigid.shape[1]]])
+
+
+class Discretisation(Nodes, Part):
+    """Unknowns, quadrature and constant operators of one body.
+
+    Attributes
+    ----------
+    dofs : (n_elements, 2 n_element_nodes)
+    B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
+    weights : (n_elements, n_points) volume of the points, thickness or 2 pi r in it [mm3]
+    load : (n,) nodal forces at load factor one [N]
+    active : unknowns that are neither supported nor pinned
+    rigid : (n, n_rigid) rigid motions the supports leave free
+    """
+
+    def __init__(self, body: Body) -> None:
+        super().__init__(body)
+        kind = element_type(body.element)
+        nodes = self.same[self.basis.element_dofs]
+        self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
+        self.dofs = self.dofs.reshape(nodes.shape[1], -1)
+        values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
+                           for b in self.basis.basis])  # fmt: skip
+        gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
+        self.weights = self.basis.dx * self.measure(self.points)
+        self.B = kinematics.strain_operator(values, gradients, self.points[0], body.state)
+        if kind.mean_dilatation and body.state != "plane_stress":
+            self.B = kinematics.mean_dilatation(self.B, self.weights)
+        self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
+        self.load = np.zeros(self.n)
+        for boundary, pressure in body.pressure.items():
+            self.load += pressure_forces(self, boundary, pressure)
+        self._hold()
+
+    def _hold(self) -> None:
+        """Find supported unknowns, the rigid motions left, and as many pins to hold them."""
+        fixed = np.zeros(self.n, dtype=bool)
+        for boundary, axes in self.body.supports.items():
+            nodes = self.boundary_nodes(boundary)
+            for axis in axes:
+                fixed[2 * nodes + "xy".index(axis)] = True
+        fixed[self.copied[fixed]] = True
+        motions = kinematics.rigid_motions(self.X, self.body.state)
+        copies = self.copied != np.arange(self.n)
+        free = np.flatnonzero(~fixed & ~copies)
+        held = np.vstack([motions[fixed], (motions - motions[self.copied])[copies]])
+        if len(held):
+            motions = motions @ linalg.null_space(held, rcond=1e-9)
+        self.rigid = motions
+        self.free = free
+        self.active = choose_pins(motions, free)
+
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
+        """Return the operators of this part, whose contact surfaces are given."""
+        contact = [surface.dofs for surface in surfaces]
+        return Operators(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
+
+    @property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volume of the points (n_points,) [mm3]."""
+        return self.weights.ravel()
+
+    def external(self, load: float) -> NDArray[np.float64]:
+        """Return the external nodal forces (n,) at a load factor or time [N]."""
+        if self.body.travelling is None:
+            return load * self.load
+        return travelling_forces(self, self.body.travelling, load)
+
+    def grows(self, before: float, after: float) -> bool:
+        """Whether the external load grows from one load factor or time to another."""
+        travelling = self.body.travelling
+        if travelling is None:
+            return super().grows(before, after)
+        return travelling.now(after)[0] > travelling.now(before)[0]
+
+    # -- the law at all points ---------------------------------------------------------------
+
+    def virgin(self) -> PlasticState:
+        """Return the state of the body before any load."""
+        return PlasticState.virgin(self.weights.size)
+
+    def strain(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Mandel strain (4, n_points) for displacements (n,)."""
+        flat = np.matmul(self._flat_B, u[self.dofs][:, :, None])
+        return np.asarray(flat.reshape(-1, 4).T)
+
+    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+        """Return stress, tangent and new state at all points."""
+        return respond(self.strain(u), state, self.body.material, self.body.state)
+
+    def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
+        weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)
+        forces = np.matmul(weighted, self._flat_B)[:, 0]
+        nodal = np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
+        return np.asarray(nodal, dtype=float)
+
+    def residual(
+        self, load: float, u: NDArray[np.float64], response: Response
+    ) -> NDArray[np.float64]:
+        """Return external minus internal forces (n,), contact forces left out [N]."""
+        del u
+        return self.external(load) - self.internal_force(response.stress)
+
+    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+        strain, weight = self.strain(step), self.weights.ravel()
+        C = elastic_stiffness(self.body.material, self.body.state)
+        tangent = np.einsum("ap,abp,bp->p", strain, response.tangent, strain) @ weight
+        elastic = (strain * (C @ strain)).sum(axis=0) @ weight
+        return float(tangent), float(elastic)
+
+    def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
+        """Return the point that a step strains most [mm]."""
+        at = int((self.strain(step) ** 2).sum(axis=0).argmax())
+        x, y = self.points.reshape(2, -1)[:, at]
+        return float(x), float(y)
+
+    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+        """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
+        flow = response.state.plastic_strain - before.plastic_strain
+        back = 2 / 3 * self.body.material.kinematic_modulus * response.state.plastic_strain
+        work = (response.stress * flow).sum(axis=0) @ self.weights.ravel()
+        return float(work), float(((response.stress - back) * flow).sum(axis=0).min())
+
+    # -- stiffness ---------------------------------------------------------------------------
+
+    def _element_stiffness(
+        self, elements: NDArray[np.int64] | slice, tangent: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        B = self.B[elements]
+        DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
+        flat = B.reshape(len(B), -1, B.shape[-1])
+        return np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape))
+
+    @cached_property
+    def _pattern(self) -> tuple[sparse.csr_array, NDArray[np.int64]]:
+        """Upper triangle on the active unknowns, and where each element entry goes in it."""
+        number = np.full(self.n, -1)
+        number[self.active] = np.arange(len(self.active))
+        local = number[self.dofs]
+        rows = np.broadcast_to(local[:, :, None], (*local.shape, local.shape[1])).ravel()
+        columns = np.broadcast_to(local[:, None, :], (*local.shape, local.shape[1])).ravel()
+        kept = (rows >= 0) & (columns >= rows)
+        key = rows.astype(np.int64) * len(self.active) + columns
+        unique, slot = np.unique(key[kept], return_inverse=True)
+        m = len(self.active)
+        indptr = np.searchsorted(unique, np.arange(m + 1, dtype=np.int64) * m)
+        upper = sparse.csr_array((np.zeros(len(unique)), unique % m, indptr), shape=(m, m))
+        place = np.full(len(key), len(unique))
+        place[kept] = slot
+        return upper, place.reshape(len(local), -1)
+
+    def _scatter(
+        self, elements: NDArray[np.int64] | slice, matrices: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        upper, place = self._pattern
+        size = upper.nnz + 1
+        data = np.bincount(place[elements].ravel(), weights=matrices.ravel(), minlength=size)
+        return np.asarray(data[:-1], dtype=float)
+
+    @property
+    def pattern(self) -> sparse.csr_array:
+        """Upper triangle of the stiffness on the active unknowns, values not set."""
+        return self._pattern[0]
+
+    @cached_property
+    def _elastic_elements(self) -> NDArray[np.float64]:
+        C = elastic_stiffness(self.body.material, self.body.state)
+        return self._element_stiffness(slice(None), np.broadcast_to(C, (1, 1, 4, 4)))
+
+    @cached_property
+    def elastic_data(self) -> NDArray[np.float64]:
+        """Values of the elastic stiffness on `pattern`."""
+        return self._scatter(slice(None), self._elastic_elements)
+
+    def elastic_matrix(self) -> sparse.csr_array:
+        """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
+        rows = np.broadcast_to(self.dofs[:, :, None], self._elastic_elements.shape)
+        columns = np.broadcast_to(self.dofs[:, None, :], rows.shape)
+        entries = (self._elastic_elements.ravel(), (rows.ravel(), columns.ravel()))
+        return sparse.csr_array(entries, shape=(self.n, self.n))
+
+    def tangent_data(self, response: Response) -> NDArray[np.float64]:
+        """Return the values of the consistent tangent on `pattern`.
+
+        Only elements with a yielding point are integrated; the rest keep their elastic matrix.
+        """
+        shape = self.weights.shape
+        elements = np.flatnonzero(response.yielding.reshape(shape).any(axis=1))
+        if len(elements) == 0:
+            return self.elastic_data
+        tangent = response.tangent.reshape(4, 4, *shape)[:, :, elements].transpose(2, 3, 0, 1)
+        change = self._element_stiffness(elements, tangent) - self._elastic_elements[elements]
+        return self.elastic_data + self._scatter(elements, change)

@@ -1,0 +1,146 @@
+"""From quadrature points to nodes, lines and grids."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.part import Part
+
+_INSIDE = 1e-7
+_NEWTON_STEPS = 6
+_CHUNK = 2_000_000
+
+
+def _monomials(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the first ``count`` of 1, x, y, xy at points (2, n) as (n, count)."""
+    return np.stack([np.ones_like(x[0]), x[0], x[1], x[0] * x[1]][:count], axis=-1)
+
+
+def recovery(part: Discretisation) -> sparse.csr_array:
+    """Return the operator (n_nodes, n_points) that recovers nodal values from point values.
+
+    In each element a (bi)linear field is fitted to the points by least squares and evaluated
+    at the nodes; at a node the elements around it are averaged by volume.
+    """
+    cells = part.basis.mesh.t.shape[0]
+    n_elements, n_points = part.weights.shape
+    count = 4 if cells == 4 and n_points >= 4 else 3 if n_points >= 3 else 1
+    fit = np.linalg.pinv(_monomials(np.asarray(part.basis.X), count))
+    at_nodes = _monomials(np.asarray(part.basis.elem.doflocs, dtype=float).T, count) @ fit
+    nodes = part.same[part.basis.element_dofs]
+    volume = part.weights.sum(axis=1)
+    n_nodes = part.X.shape[1]
+    shares = np.broadcast_to(volume, nodes.shape).ravel()
+    total = np.bincount(nodes.ravel(), weights=shares, minlength=n_nodes)
+    share = volume / total[nodes]
+    data = share[:, :, None] * at_nodes[:, None, :]
+    rows = np.broadcast_to(nodes[:, :, None], data.shape)
+    columns = np.arange(n_elements * n_points).reshape(n_elements, n_points)
+    operator = sparse.csr_array(
+        (data.ravel(), (rows.ravel(), np.broadcast_to(columns, data.shape).ravel())),
+        shape=(n_nodes, n_elements * n_points),
+    )
+    return sparse.csr_array(operator[part.same])
+
+
+class Sampler:
+    """Interpolates nodal fields of a body at given positions; NaN outside the body.
+
+    Parameters
+    ----------
+    x : (2, n) positions before deformation [mm]
+    """
+
+    def __init__(self, part: Discretisation, x: NDArray[np.float64]) -> None:
+        element, point, local = _locate(part, np.asarray(x, dtype=float))
+        shape = part.basis.elem.lbasis
+        nodes = part.basis.element_dofs[:, element]
+        values = np.array([shape(local, i)[0] for i in range(len(nodes))])
+        self.inside = np.zeros(x.shape[1], dtype=bool)
+        self.inside[point] = True
+        self._matrix = sparse.csr_array(
+            (values.ravel(), (np.broadcast_to(point, nodes.shape).ravel(), nodes.ravel())),
+            shape=(x.shape[1], part.X.shape[1]),
+        )
+
+    def __call__(self, nodal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values (..., n) of nodal fields (..., n_nodes)."""
+        flat = np.atleast_2d(nodal).reshape(-1, nodal.shape[-1])
+        out = (self._matrix @ flat.T).T
+        out[:, ~self.inside] = np.nan
+        return np.asarray(out.reshape(*nodal.shape[:-1], len(self.inside)))
+
+
+def _locate(
+    part: Discretisation, x: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return element, point number and reference coordinates of the points inside."""
+    corners = part.X[:, part.basis.element_dofs]
+    slack = 1e-9 + 0.05 * (corners.max(axis=1) - corners.min(axis=1))
+    low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
+    pairs = []
+    step = max(1, _CHUNK // max(1, x.shape[1]))
+    for first in range(0, low.shape[1], step):
+        some = slice(first, first + step)
+        hit = np.logical_and.reduce(
+            [(x[k] >= low[k, some, None]) & (x[k] <= high[k, some, None]) for k in (0, 1)]
+        )
+        element, point = np.nonzero(hit)
+        pairs.append((element + first, point))
+    element = np.concatenate([p[0] for p in pairs])
+    point = np.concatenate([p[1] for p in pairs])
+    if not len(element):
+        return element, point, np.zeros((2, 0))
+    local = _reference(part, element, x[:, point])
+    if part.basis.mesh.t.shape[0] == 4:
+        miss = np.abs(local - 0.5).max(axis=0) - 0.5
+    else:
+        miss = np.maximum(-local.min(axis=0), local.sum(axis=0) - 1.0)
+    order = np.lexsort((miss, point))
+    order = order[miss[order] < _INSIDE]
+    _, first_of = np.unique(point[order], return_index=True)
+    best = order[first_of]
+    return element[best], point[best], np.clip(local[:, best], 0.0, 1.0)
+
+
+def _reference(
+    part: Discretisation, element: NDArray[np.int64], x: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return reference coordinates (2, n) of points in given elements by Newton's method."""
+    mapping = part.basis.mapping
+    local = np.full((2, len(element), 1), 0.5 if part.basis.mesh.t.shape[0] == 4 else 1 / 3)
+    for _ in range(_NEWTON_STEPS):
+        miss = x[:, :, None] - np.asarray(mapping.F(local, tind=element))
+        (a, b), (c, d) = np.asarray(mapping.DF(local, tind=element))
+        step = np.stack([d * miss[0] - b * miss[1], a * miss[1] - c * miss[0]]) / (a * d - b * c)
+        local = np.clip(local + step, -2.0, 3.0)
+    return np.asarray(local[:, :, 0])
+
+
+def error_estimate(part: Discretisation, stress: NDArray[np.float64]) -> tuple[float, float]:
+    """Return twice the energy [N mm] of recovered minus computed stress, and of the stress.
+
+    O.C. Zienkiewicz, J.Z. Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337-357: the square root of
+    their ratio estimates the relative discretisation error in the energy norm.
+    """
+    smooth = recovery(part) @ stress.T
+    nodes = part.basis.element_dofs
+    shapes = np.array(
+        [np.broadcast_to(np.asarray(b[0]), part.weights.shape) for b in part.basis.basis]
+    )
+    back = np.einsum("iep,iec->cep", shapes, smooth[nodes]).reshape(len(stress), -1)
+    return 2 * elastic_energy(part, back - stress), 2 * elastic_energy(part, stress)
+
+
+def elastic_energy(part: Part, stress: NDArray[np.float64]) -> float:
+    """Return the elastic energy of a Mandel stress (4, n_points) at a part's points [N mm]."""
+    nu, E = part.body.material.poisson_ratio, part.body.material.youngs_modulus
+    density = (1 + nu) * (stress**2).sum(axis=0) - nu * stress[:3].sum(axis=0) ** 2
+    return float(density @ part.volumes) / (2 * E)

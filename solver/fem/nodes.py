@@ -1,0 +1,78 @@
+"""The nodes of a body, its quadrature, and which nodes repeat others."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from skfem import CellBasis
+
+from solver.errors import ModelError
+from solver.mesh.elements import element_type
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.model.body import Body
+
+
+class Nodes:
+    """Where the unknowns and the points of one body are.
+
+    Unknowns are numbered node by node: ``2 * node`` is x, ``2 * node + 1`` is y. Points are
+    numbered element by element. Nodes on the far side of a periodic body repeat those on the near
+    side: their unknowns are copies.
+
+    Attributes
+    ----------
+    basis : elements and quadrature, of scikit-fem
+    X : (2, n_nodes) node positions [mm]
+    n : number of unknowns
+    same : (n_nodes,) the node whose unknowns a node has: itself, unless it is a copy
+    copied : (n,) the same for unknowns
+    period : length after which a periodic body repeats itself, else 0 [mm]
+    points : (2, n_elements, n_points) positions of the points [mm]
+    """
+
+    def __init__(self, body: Body) -> None:
+        self.body = body
+        kind = element_type(body.element)
+        self.basis = CellBasis(
+            body.mesh,
+            kind.element,
+            intorder=kind.full_order if body.full_integration else kind.order,
+        )
+        self.X = self.basis.doflocs
+        self.n = 2 * self.X.shape[1]
+        self.same, self.period = self._copies()
+        self.copied = np.stack([2 * self.same, 2 * self.same + 1], axis=1).ravel()
+        self.points = np.asarray(self.basis.global_coordinates())
+
+    def measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
+        """Return the depth a plane point stands for [mm]: thickness or 2 pi r."""
+        if self.body.state == "axisymmetric":
+            return np.asarray(2 * np.pi * x[0])
+        return self.body.thickness
+
+    def boundary_nodes(self, boundary: str) -> NDArray[np.int64]:
+        """Return the nodes on a named boundary."""
+        return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
+
+    def _copies(self) -> tuple[NDArray[np.int64], float]:
+        """Return the node whose unknowns each node has, and the period."""
+        same = np.arange(self.X.shape[1])
+        if self.body.periodic is None:
+            return same, 0.0
+        near, far = (self.boundary_nodes(name) for name in self.body.periodic)
+        near, far = (nodes[np.argsort(self.X[1, nodes])] for nodes in (near, far))
+        apart = self.X[:, far] - self.X[:, near] if len(far) == len(near) else np.ones((2, 1))
+        period = float(apart[0].mean())
+        if not (np.abs(apart - [[period], [0.0]]) < 1e-9 * abs(period)).all() or period <= 0:
+            allowed = "the second must be a copy of the first, one period along +x"
+            raise ModelError("periodic", self.body.periodic, allowed)
+        travelling = self.body.travelling
+        if travelling is not None and 2 * travelling.half_width > period:
+            allowed = f"half_width must be at most half the period, {period / 2:g} mm"
+            raise ModelError("travelling", travelling.half_width, allowed)
+        same[far] = near
+        return same, period

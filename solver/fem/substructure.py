@@ -1,0 +1,167 @@
+"""An elastic body reduced to its contact surfaces and its rigid motion, exactly.
+
+The stiffness of the kept unknowns k, with the inner ones i eliminated, is the Schur complement
+``S = Kkk - Kki Kii^-1 Kik``, and its load ``fk - Kki Kii^-1 fi``. `expand` gives the inner
+displacements back. Supports of kept nodes stay supports; rigid motions stay rigid motions
+(``S R = 0``), so a body held by contact alone is treated like any other.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import replace
+from hashlib import sha256
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from solver.fem.discretisation import choose_pins
+from solver.fem.operators import Dense, Fixed
+from solver.fem.part import Part
+from solver.fem.surface import Surface
+from solver.linear import solvers as linear
+from solver.materials import PlasticState, Response
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.model.body import Body
+
+_KEPT_IN_MEMORY = 8
+_BLOCK = 64
+_CACHE: OrderedDict[str, _Condensed] = OrderedDict()
+
+
+class _Condensed:
+    """The condensation of one body to a set of nodes."""
+
+    def __init__(self, part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> None:
+        self.nodes = nodes
+        kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+        self.kept = kept
+        self.inner = np.setdiff1d(part.free, kept)
+        K = part.elastic_matrix()
+        self._couple = K[self.inner][:, kept]
+        upper = sparse.csr_array(sparse.triu(K[self.inner][:, self.inner], format="csr"))
+        self._solver = linear.analyse(upper, linear_solver) if len(self.inner) else None
+        if self._solver is not None:
+            self._solver.factorise(upper.data)
+        self._load = part.load[self.inner]
+        self.load = part.load[kept] - self._couple.T @ self._inside(self._load)
+        self.stiffness = K[kept][:, kept].toarray()
+        for first in range(0, len(kept), _BLOCK):
+            some = slice(first, first + _BLOCK)
+            follow = self._inside(self._couple[:, some].toarray())
+            self.stiffness[:, some] -= self._couple.T @ follow
+        self.stiffness = 0.5 * (self.stiffness + self.stiffness.T)
+
+    def _inside(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return inner displacements for inner forces, the kept unknowns held."""
+        return force if self._solver is None else self._solver.solve(force)
+
+    def expand(self, u: NDArray[np.float64], load: float, size: int) -> NDArray[np.float64]:
+        """Return all displacements (size,) from those kept."""
+        full = np.zeros(size)
+        full[self.kept] = u
+        full[self.inner] = self._inside(load * self._load - self._couple @ u)
+        return full
+
+
+class Substructure(Part):
+    """A part with the unknowns of its contact surfaces alone.
+
+    It offers what a `Discretisation` offers to an increment; ``whole`` is the meshed body.
+    """
+
+    def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
+        self.whole = whole
+        self.body = whole.body
+        nodes = np.unique(np.concatenate([surface.nodes for surface in surfaces]))
+        self._condensed = _condense(whole, nodes, linear_solver)
+        kept = self._condensed.kept
+        self.n = len(kept)
+        self.load = self._condensed.load
+        self.rigid = whole.rigid[kept]
+        self.free = np.flatnonzero(np.isin(kept, whole.free))
+        self.active = choose_pins(self.rigid, self.free)
+
+    def surface(self, surface: Surface) -> Surface:
+        """Return a surface of the whole body in this part's numbering."""
+        nodes = np.searchsorted(self._condensed.nodes, surface.nodes)
+        return replace(surface, nodes=nodes)
+
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
+        """Return the one operator an elastic part has."""
+        del surfaces, linear_solver
+        S = self._condensed.stiffness[np.ix_(self.active, self.active)]
+        return Fixed(Dense(S, self.active, self.n))
+
+    def virgin(self) -> PlasticState:
+        """Return the empty state: nothing here can yield."""
+        return PlasticState.virgin(0)
+
+    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+        """Return the empty response."""
+        del u
+        return Response(np.zeros((4, 0)), np.zeros((4, 4, 0)), state, np.zeros(0, dtype=bool))
+
+    def residual(
+        self, load: float, u: NDArray[np.float64], response: Response
+    ) -> NDArray[np.float64]:
+        """Return external minus internal forces (n,) [N]."""
+        del response
+        return self.external(load) - self._condensed.stiffness @ u
+
+    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+        del response
+        energy = float(step @ self._condensed.stiffness @ step)
+        return energy, energy
+
+    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+        """Return zero work and zero least dissipation."""
+        del before, response
+        return 0.0, 0.0
+
+    def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the nodal forces (n,) of the whole body for those of this part [N]."""
+        whole = np.zeros(self.whole.n)
+        whole[self._condensed.kept] = force[: len(self._condensed.kept)]
+        return whole
+
+    def expand(self, u: NDArray[np.float64], load: float) -> NDArray[np.float64]:
+        """Return the displacements of the whole body [mm]."""
+        return self._condensed.expand(u, load, self.whole.n)[self.whole.copied]
+
+
+def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:
+    """Return a content key: equal bodies share their condensation."""
+    digest = sha256()
+    for array in (body.mesh.doflocs, body.mesh.t, nodes):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    material = body.material
+    digest.update(
+        repr((
+            linear_solver, material.youngs_modulus, material.poisson_ratio,
+            body.state, body.element,
+            body.full_integration, body.thickness, body.periodic,
+            sorted((name, held, body.facets(name).tobytes())
+                   for name, held in body.supports.items()),
+            sorted((name, value, body.facets(name).tobytes())
+                   for name, value in body.pressure.items()),
+        )).encode()
+    )  # fmt: skip
+    return digest.hexdigest()
+
+
+def _condense(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> _Condensed:
+    key = _key(part.body, nodes, linear_solver)
+    if key in _CACHE:
+        _CACHE.move_to_end(key)
+    else:
+        _CACHE[key] = _Condensed(part, nodes, linear_solver)
+        while len(_CACHE) > _KEPT_IN_MEMORY:
+            _CACHE.popitem(last=False)
+    return _CACHE[key]

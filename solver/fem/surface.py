@@ -1,0 +1,187 @@
+"""The contact surface of a body: an ordered chain of edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.mesh.shapes import shape_derivatives, shape_functions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from solver.fem.nodes import Nodes
+    from solver.model.motion import TravellingPressure
+
+
+_CORNER = float(np.cos(np.radians(30.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A chain of edges with the body on its left: the outward normal is ``(t_y, -t_x)``.
+
+    Attributes
+    ----------
+    nodes : (n_nodes,) node numbers in the body
+    edges : (n_edges, 2 or 3) positions in ``nodes``: start, end (, middle)
+    X : (2, n_nodes) reference positions [mm]
+    measure : (n_nodes,) thickness, or 2 pi r, at the nodes [mm]
+    goes_on : whether the boundary of the body goes on smoothly beyond the start and the end
+    """
+
+    nodes: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    X: NDArray[np.float64]
+    measure: NDArray[np.float64]
+    goes_on: tuple[bool, bool] = (False, False)
+
+    @property
+    def vertices(self) -> NDArray[np.int64]:
+        """(n_edges + 1,) positions in ``nodes`` of the edge ends, along the chain."""
+        return np.append(self.edges[:, 0], self.edges[-1, 1])
+
+    @property
+    def dofs(self) -> NDArray[np.int64]:
+        """(2 n_nodes,) unknowns of the body, node by node."""
+        return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()
+
+
+def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:
+    """Return the edges (n_edges, 2 or 3) of a boundary: start, end (, middle) node.
+
+    Each has the body on its left. Facet bases are not used for it: they invert the element
+    mapping to a tolerance that elements 1e-5 of the body's size cannot meet.
+    """
+    mesh, basis = part.body.mesh, part.basis
+    facets = part.body.facets(boundary)
+    ends = basis.nodal_dofs[0][mesh.facets[:, facets]].T
+    start, end = part.X[:, ends[:, 0]], part.X[:, ends[:, 1]]
+    corners = mesh.t[:, mesh.f2t[0, facets]]
+    on_edge = (corners[:, None, :] == mesh.facets[None, :, facets]).any(axis=1)
+    position = part.X[:, basis.nodal_dofs[0][corners]]
+    inside = np.where(on_edge, 0.0, position).sum(axis=1) / (~on_edge).sum(axis=0)
+    along, inward = end - start, inside - (start + end) / 2
+    reverse = along[0] * inward[1] - along[1] * inward[0] < 0
+    ends[reverse] = ends[reverse, ::-1]
+    if not basis.facet_dofs.size:
+        return np.asarray(ends)
+    return np.hstack([ends, basis.facet_dofs[0][facets][:, None]])
+
+
+def extract(part: Nodes, boundary: str) -> Surface:
+    """Return the surface of a named boundary, which must be one open chain.
+
+    That of a periodic body goes on for half a period beyond either end.
+    """
+    edges = edges_of(part, boundary)
+    following = {int(start): i for i, start in enumerate(edges[:, 0])}
+    heads = set(edges[:, 0].tolist()) - set(edges[:, 1].tolist())
+    order = []
+    at = heads.pop() if len(heads) == 1 else -1
+    while at in following:
+        order.append(following.pop(at))
+        at = int(edges[order[-1], 1])
+    if len(order) != len(edges):
+        raise ModelError("boundary", boundary, "a contact surface must be one open chain of edges")
+    nodes, local = np.unique(edges[order], return_inverse=True)
+    X, chain = part.X[:, nodes], local.reshape(edges.shape)
+    if part.period:
+        length = abs(X[0, chain[-1, 1]] - X[0, chain[0, 0]])
+        if not np.isclose(length, part.period):
+            allowed = "a contact surface of a periodic body must run over the whole period"
+            raise ModelError("boundary", boundary, allowed)
+        nodes, X, chain = _repeated(part.same[nodes], X, chain)
+    measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
+    first, last = edges[order[0]], edges[order[-1]]
+    beyond = (_goes_on(part, first, 0), _goes_on(part, last, 1))
+    return Surface(nodes, chain, X, measure, (True, True) if part.period else beyond)
+
+
+def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:
+    """Return whether the boundary of a body goes on beyond the start (0) or end (1) of an edge.
+
+    It does not where it turns by more than `_CORNER`. Tangents decide, since the chords of a
+    coarse curve turn where it does not.
+    """
+    mesh, basis = part.body.mesh, part.basis
+    outside = mesh.boundary_facets()
+    pairs = basis.nodal_dofs[0][mesh.facets[:, outside]]
+    middle = basis.facet_dofs[0][outside] if basis.facet_dofs.size else None
+    end, before = edge[at], edge[1 - at]
+    along = -_leaving(part.X, end, before, edge[2] if len(edge) > 2 else None)
+    for k in (0, 1):
+        for facet in np.flatnonzero((pairs[k] == end) & (pairs[1 - k] != before)):
+            between = None if middle is None else middle[facet]
+            onward = _leaving(part.X, end, pairs[1 - k, facet], between)
+            turn = along @ onward / (np.linalg.norm(along) * np.linalg.norm(onward))
+            if turn > _CORNER:
+                return True
+    return False
+
+
+def _leaving(
+    X: NDArray[np.float64], end: int, other: int, middle: int | None
+) -> NDArray[np.float64]:
+    """Return the direction (2,) in which an edge leaves its end."""
+    if middle is None:
+        return np.asarray(X[:, other] - X[:, end])
+    return np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
+
+
+def _repeated(
+    nodes: NDArray[np.int64], X: NDArray[np.float64], chain: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return nodes, positions and edges of a chain with half a copy of it at either end."""
+    start, end = chain[0, 0], chain[-1, 1]
+    shift = X[0, end] - X[0, start]
+    half = len(chain) // 2
+    size = len(nodes)
+    before, after = chain[half:] + size, chain[:half] + 2 * size
+    before[-1, 1], after[0, 0] = start, end
+    edges = np.vstack([before, chain, after])
+    across = np.array([[shift], [0.0]])
+    everywhere = np.hstack([X, X - across, X + across])
+    used, local = np.unique(edges, return_inverse=True)
+    return np.tile(nodes, 3)[used], everywhere[:, used], local.reshape(edges.shape)
+
+
+def pressure_forces(part: Nodes, boundary: str, pressure: float) -> NDArray[np.float64]:
+    """Return the nodal forces (n,) of a pressure on a boundary, positive when pushing [N]."""
+    return _tractions(part, boundary, lambda x: (np.full(x.shape[1], pressure), 0.0), 4)
+
+
+def travelling_forces(
+    part: Nodes, travelling: TravellingPressure, time: float
+) -> NDArray[np.float64]:
+    """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
+    return _tractions(
+        part, travelling.boundary, lambda x: travelling.at(time, x[0], part.period), 8
+    )
+
+
+def _tractions(
+    part: Nodes,
+    boundary: str,
+    traction: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], float]],
+    points: int,
+) -> NDArray[np.float64]:
+    """Integrate a pressure and a shear, a multiple of it against the edges' direction."""
+    edges = edges_of(part, boundary)
+    X, edges = part.X[:, edges], part.same[edges]
+    force = np.zeros((2, part.X.shape[1]))
+    for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
+        N = shape_functions(np.array(xi), edges.shape[1])
+        t = X @ shape_derivatives(np.array(xi), edges.shape[1])
+        pressure, ratio = traction(X @ N)
+        direction = np.stack([-t[1], t[0]]) - ratio * t
+        push = weight * pressure * direction * part.measure(X @ N)
+        for k, value in enumerate(N):
+            for component in (0, 1):
+                np.add.at(force[component], edges[:, k], push[component] * value)
+    return np.asarray(force.T.ravel())

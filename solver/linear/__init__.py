@@ -1,0 +1,1 @@
+"""Sparse symmetric systems: analysed once, factorised and solved many times."""

@@ -1,0 +1,141 @@
+"""Symmetric sparse systems behind one interface: analyse once, factorise, solve many.
+
+A matrix is given by its upper triangle in CSR form, with the unknowns ``kept`` on which
+compliances will be asked. `analyse` chooses MKL PARDISO where it is
+installed and SuperLU elsewhere; ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) decides
+otherwise.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from solver.errors import ModelError
+from solver.linear import pardiso
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SOLVERS = ("auto", "pardiso", "superlu")
+
+
+class Singular(ArithmeticError):
+    """The matrix has no factor."""
+
+
+class LinearSolver(Protocol):
+    """An analysed pattern; after `factorise`, a factor."""
+
+    def factorise(self, data: NDArray[np.float64]) -> None:
+        """Take these values of the upper triangle; raise `Singular` when there is no factor."""
+
+    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the solution for ``b`` (n,) or (n, k)."""
+
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return ``rows A^-1 rows'`` for ``rows`` (k, m) on the m unknowns kept."""
+
+
+class SuperLU:
+    """The factorisation every machine has."""
+
+    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
+        self._upper = upper.copy()
+        self._kept = kept
+
+    def factorise(self, data: NDArray[np.float64]) -> None:
+        """See `LinearSolver`."""
+        self._upper.data = np.asarray(data, dtype=float)
+        full = self._upper + sparse.triu(self._upper, 1, format="csr").T
+        try:
+            self._factor = splu(
+                full.tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise Singular(str(error)) from error
+
+    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `LinearSolver`."""
+        return np.asarray(self._factor.solve(np.ascontiguousarray(b)))
+
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `LinearSolver`."""
+        return _compliance(self, rows, self._upper.shape[0], self._kept)
+
+
+class PardisoSolver:
+    """MKL PARDISO: Cholesky, and LDL' when a pivot is not positive."""
+
+    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
+        self._upper = upper
+        self._kept = kept
+        self._definite = pardiso.Pardiso(upper, kept)
+        self._indefinite: pardiso.Pardiso | None = None
+        self._current = self._definite
+
+    def factorise(self, data: NDArray[np.float64]) -> None:
+        """See `LinearSolver`."""
+        if not np.isfinite(data).all():
+            raise Singular("the matrix is not finite")
+        try:
+            self._definite.factorise(data)
+            self._current = self._definite
+        except pardiso.PardisoError as failure:
+            if failure.code != pardiso.NOT_POSITIVE:
+                raise Singular(str(failure)) from failure
+            if self._indefinite is None:
+                self._indefinite = pardiso.Pardiso(self._upper, kind=pardiso.INDEFINITE)
+            try:
+                self._indefinite.factorise(data)
+            except pardiso.PardisoError as error:
+                raise Singular(str(error)) from error
+            self._current = self._indefinite
+
+    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `LinearSolver`."""
+        return self._current.solve(b)
+
+    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `LinearSolver`."""
+        if self._current is self._definite:
+            return self._definite.compliance(rows)
+        return _compliance(self, rows, self._upper.shape[0], self._kept)
+
+
+def _compliance(
+    solver: LinearSolver, rows: NDArray[np.float64], n: int, kept: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return ``rows A^-1 rows'`` from a solution for each row."""
+    columns = np.zeros((n, len(rows)))
+    columns[kept] = rows.T
+    W = rows @ solver.solve(columns)[kept]
+    return 0.5 * (W + W.T)
+
+
+def analyse(
+    upper: sparse.csr_array, name: str = "auto", kept: NDArray[np.int64] | None = None
+) -> LinearSolver:
+    """Return a solver for matrices with the pattern of ``upper``.
+
+    ``kept`` (m,), increasing, are the unknowns on which `LinearSolver.compliance` will be asked.
+
+    Raises
+    ------
+    ModelError : the solver named is unknown or not installed
+    """
+    name = os.environ.get("RESIDUA_LINEAR_SOLVER", name) if name == "auto" else name
+    if name not in SOLVERS:
+        raise ModelError("linear_solver", name, "must be one of " + ", ".join(SOLVERS))
+    available = pardiso.library() is not None
+    if name == "pardiso" and not available:
+        raise ModelError("linear_solver", name, "needs MKL: pip install 'residua[mkl]'")
+    kept = np.zeros(0, dtype=np.int64) if kept is None else kept
+    return PardisoSolver(upper, kept) if available and name != "superlu" else SuperLU(upper, kept)

@@ -1,0 +1,1 @@
+"""Loading walked in increments: each one solved, cut where it fails, repeated to the end."""

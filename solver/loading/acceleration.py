@@ -1,0 +1,79 @@
+"""Sums the series of steps that a tangent which lacks something makes.
+
+The tangent has no derivative of the contact's normals and of the friction bound along a surface,
+and may be blended with the elastic stiffness. Newton's method then converges like a geometric
+series, at times with a ratio of 0.9. Anderson's mixing combines the last iterates so that the
+step left is least, which for a constant lack is Newton's method with the missing part measured.
+
+D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011)
+1715-1735, algorithm 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.candidates import Candidates
+    from solver.loading.step import Step
+
+    Vectors = tuple[NDArray[np.float64], ...]
+
+_SLOW = 0.6
+"""Size of a step over that of the one before above which the tangent lacks something."""
+_PATIENCE = 5
+"""Slow steps in a row before they count as a series: where points change sides there are a few."""
+_WINDING = 3.0
+"""Growth of a step above which it is no part of a series."""
+_ALONG = 0.7
+"""Cosine of the angle between steps above which they go in one direction."""
+_DEPTH = 5
+
+
+@dataclass(slots=True)
+class Series:
+    """Steps in a row between the same contact states that are no smaller than before, or hardly.
+
+    They may swing to and fro and wind about the solution. Steps that grow in one direction may be
+    a body that flows, and are left alone.
+    """
+
+    _key: bytes = b""
+    _slow: int = 0
+    _places: list[NDArray[np.float64]] = field(default_factory=list)
+    _steps: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def sum(
+        self, u: Vectors, candidates: Candidates, step: Step, share: float
+    ) -> tuple[Vectors, NDArray[np.float64]] | None:
+        """Return displacements and contact forces to go on from after a step, or None.
+
+        None where the whole step is as good, which is nearly always.
+        """
+        place = np.concatenate([*u, candidates.forces])
+        now = np.concatenate([*step.u, step.forces - candidates.forces])
+        cut = np.cumsum([len(ui) for ui in u])
+        n = int(cut[-1])
+        key = b"".join(v.tobytes() for v in (*candidates.vertices, step.status))
+        size = np.linalg.norm(now[:n])
+        last = np.linalg.norm(self._steps[-1][:n]) if self._steps else 0.0
+        along = now[:n] @ self._steps[-1][:n] if self._steps else 0.0
+        flows = size > last and along > _ALONG * size * last
+        if key != self._key or size > _WINDING * last or flows:
+            self._key, self._slow, self._places, self._steps = key, 0, [], []
+        elif self._slow < _PATIENCE:
+            self._slow = self._slow + 1 if size > _SLOW * last else 0
+        self._places = [*self._places[-_DEPTH:], place]
+        self._steps = [*self._steps[-_DEPTH:], now]
+        if self._slow < _PATIENCE or share < 1:
+            return None
+        moved = np.diff(self._places, axis=0)
+        changed = np.diff(self._steps, axis=0)
+        weight = np.linalg.lstsq(changed[:, :n].T, now[:n])[0]
+        *ahead, forces = np.split(place + now - weight @ (moved + changed), cut)
+        return tuple(ahead), forces

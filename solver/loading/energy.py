@@ -1,0 +1,45 @@
+"""Where the work of the loads goes: stored, dissipated by flow, rubbed away.
+
+Each term is integrated by the trapezoidal rule over increments. Virtual work then makes
+
+    external work = change of stored energy + plastic work + work of friction and against contact
+
+exact where contact keeps its directions (small sliding); where these turn, what is missing is the
+error of the path.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from solver.contact.state import Energy
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from solver.contact.state import Converged
+    from solver.contact.system import Part
+
+
+def worked(parts: Sequence[Part], before: Converged, now: Converged) -> Energy:
+    """Return the work along a path when an increment has gone from ``before`` to ``now``."""
+    moves = zip(before.state.u, now.state.u, before.forces, now.forces, strict=True)
+    work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
+    so_far = before.energy
+    return Energy(
+        stored=so_far.stored,
+        external=so_far.external + work,
+        plastic=so_far.plastic + _plastic_work(parts, before, now),
+        friction=so_far.friction + now.contact_work[0],
+        contact=so_far.contact + now.contact_work[1],
+    )
+
+
+def _plastic_work(parts: Sequence[Part], before: Converged, now: Converged) -> float:
+    each = zip(parts, now.start.plastic, before.responses, now.responses, strict=True)
+    work = 0.0
+    for part, plastic, old, new in each:
+        flow = new.state.plastic_strain - plastic.plastic_strain
+        if flow.any():
+            work += float(((old.stress + new.stress) * flow).sum(axis=0) @ part.volumes) / 2
+    return work

@@ -1,0 +1,86 @@
+"""How soft a step is: what tells a plastic mechanism from everything else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.system import Part
+    from solver.materials import Response
+
+_FLOWING = 0.02
+"""Share of the elastic stiffness below which a late step tells that the structure flows."""
+_MECHANISM = 1e-2
+"""The same for bodies that nothing loads."""
+_MOVES = 1e-3
+"""Share of the elastic energy of a step from which on a part moves in it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flow:
+    """Where a step met the least resistance.
+
+    ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
+    ``place`` (x, y) [mm] say what strained most there, ``hardens`` whether its material does.
+    """
+
+    stiffness: float = 1.0
+    body: str = ""
+    place: tuple[float, float] = (0.0, 0.0)
+    hardens: bool = True
+
+    @property
+    def limit(self) -> bool:
+        """Whether the step was a plastic mechanism that no hardening resists."""
+        return self.stiffness < _FLOWING and not self.hardens
+
+    def __str__(self) -> str:
+        x, y = self.place
+        return (
+            f"body {self.body!r} flows around x = {x:.4g}, y = {y:.4g} mm with "
+            f"{self.stiffness:.1%} of its elastic stiffness"
+        )
+
+
+def _forms(
+    parts: Sequence[Part], step: Sequence[NDArray[np.float64]], responses: Sequence[Response]
+) -> NDArray[np.float64]:
+    """Return the tangent and the elastic quadratic form of a step, part by part (n, 2)."""
+    each = zip(parts, step, responses, strict=True)
+    return np.array([part.stiffness_along(du, response) for part, du, response in each])
+
+
+def softer(
+    than: Flow,
+    parts: Sequence[Part],
+    step: Sequence[NDArray[np.float64]],
+    responses: Sequence[Response],
+) -> Flow:
+    """Return the softer one of a flow and a step, given as displacements of each part."""
+    forms = _forms(parts, step, responses)
+    tangent, elastic = forms.sum(axis=0)
+    if not elastic > 0 or tangent / elastic >= than.stiffness:
+        return than
+    most = int((forms[:, 1] - forms[:, 0]).argmax())
+    return Flow(
+        stiffness=max(float(tangent / elastic), 0.0),  # below it is rounding
+        body=parts[most].body.name,
+        place=parts[most].most_strained(step[most]),
+        hardens=parts[most].body.material.plastic_modulus > 0,
+    )
+
+
+def mechanism(
+    parts: Sequence[Part], step: Sequence[NDArray[np.float64]], responses: Sequence[Response]
+) -> bool:
+    """Whether a step is a plastic mechanism of one of the parts that move in it."""
+    tangent, elastic = _forms(parts, step, responses).T
+    moves = elastic > _MOVES * elastic.sum()
+    return bool((tangent < _MECHANISM * elastic)[moves].any())

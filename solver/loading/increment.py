@@ -1,0 +1,292 @@
+"""One load increment: plasticity outside, contact inside.
+
+From the last converged state, at the current displacements:
+
+1. constitutive update: internal force and consistent tangent K of every part; friction is not
+   in K, which stays symmetric
+2. contact geometry: gap, slip and their derivative rows H at the candidate vertices
+3. compliance of the contact points ``W = H K^-1 H'``
+4. the frictional contact problem on W, exactly; the free rigid motions of parts held by contact
+   alone are extra unknowns with exact balance equations, as in FETI. Where the problem has no
+   solution the tangent is too soft, and is blended with the elastic stiffness
+5. line search on the plastic residual, contact forces interpolated
+6. converged when the residual, contact forces included, and the contact conditions vanish
+
+Without an extrapolated guess the first iteration uses the elastic operator: after a reversal of
+load a plastic tangent of the step before would diverge.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.candidates import Candidates, find_candidates, no_candidates
+from solver.contact.ends import strayed
+from solver.contact.state import Converged, State
+from solver.linear.solvers import Singular
+from solver.linear.threads import one_thread
+from solver.loading.acceleration import Series
+from solver.loading.flow import Flow, mechanism, softer
+from solver.loading.line_search import search
+from solver.loading.outcome import IncrementFailed, Tolerances, Yielded
+from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.state import ContactState
+    from solver.contact.system import System
+    from solver.materials import Response
+
+    Vectors = tuple[NDArray[np.float64], ...]
+
+_BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
+_PATIENCE = 15
+"""Iterations without a smaller residual before an increment is given up."""
+_DIVERGED = 1e4
+_UNBALANCED = 100.0
+_MOVING = 0.01
+"""Share of an increment's displacements in its last step above which it has not come to rest."""
+_LATE = 1
+"""Iterations after which a step without stiffness tells that the structure flows."""
+
+
+class Increment:
+    """One increment of ``system`` from the state ``start`` to the load factor ``load``.
+
+    Parameters
+    ----------
+    guess : state to iterate from, usually extrapolated; ``start`` when absent
+    contact : False takes the bodies apart
+    elastic_only : raise `Yielded` as soon as a point yields
+    patient : where every body hardens, so that there is an equilibrium, iterate as often as the
+        tolerances allow: in bodies that hardly do the residual comes and goes as the energy falls
+    """
+
+    def __init__(
+        self,
+        system: System,
+        start: State,
+        load: float,
+        *,
+        guess: State | None = None,
+        contact: bool = True,
+        elastic_first: bool = True,
+        elastic_only: bool = False,
+        patient: bool = False,
+        tolerances: Tolerances | None = None,
+    ) -> None:
+        self.system = system
+        self.start = start
+        self.load = load
+        self.guess = guess
+        self.contact = contact
+        self.elastic_first = elastic_first
+        self.elastic_only = elastic_only
+        materials = [part.body.material for part in system.parts]
+        self.patient = patient and all(m.elastic or m.plastic_modulus > 0 for m in materials)
+        self.tolerances = tolerances or Tolerances()
+        self._pivoted = 0
+        self._blended = 0
+        self._drifted = False
+
+    def solve(self) -> Converged:
+        """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
+        with one_thread():
+            return self._iterate()
+
+    def _iterate(self) -> Converged:
+        tolerances = self.tolerances
+        origin = self.guess or self.start
+        u, contacts = origin.u, origin.contacts
+        responses = self._respond(u)
+        best, since_best, softest, moving = np.inf, 0, Flow(), False
+        series = Series()
+        for iteration in range(tolerances.iterations + 1):
+            candidates = self._candidates(u, contacts)
+            residuals = self._residuals(u, responses)
+            scale, error, violation = self._errors(residuals, candidates)
+            since_best = 0 if error < best else since_best + 1
+            # bodies that overlap can be balanced as they are: what follows must not be measured
+            # against nothing
+            best = max(min(best, error), tolerances.residual)
+            hopeless = since_best > _PATIENCE and not self.patient
+            hopeless |= error > _DIVERGED * best
+            if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
+                break
+            balanced = error < tolerances.residual and violation < tolerances.contact
+            if balanced and candidates.beyond >= 0:
+                return self._commit(u, responses, residuals, candidates, scale, iteration)
+            elastic_first = iteration == 0 and self.elastic_first
+            first = len(_BLENDS) - 1 if elastic_first else int(self._drifted)
+            try:
+                step = self._step(residuals, responses, candidates, _BLENDS[first:])
+            except IncrementFailed as failure:
+                if error > _UNBALANCED * tolerances.residual:
+                    failure.flow = softest
+                raise
+            if iteration >= _LATE:
+                softest = softer(softest, self.system.parts, step.u, responses)
+            before, (share, u, responses) = u, self._search(u, residuals, candidates, step)
+            moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
+            forces = (1 - share) * candidates.forces + share * step.forces
+            ahead = series.sum(before, candidates, step, share)
+            if ahead is not None:
+                u, forces = ahead
+                responses = self._respond(u)
+            contacts = candidates.states(contacts, forces, step.status)
+            if self.elastic_only and any(r.yielding.any() for r in responses):
+                raise Yielded
+        raise IncrementFailed(
+            f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
+            f"and a contact violation of {violation:.1e}",
+            # what stops at rounding does not flow; what flows on without resistance is in balance
+            softest if moving or best > _UNBALANCED * tolerances.residual else None,
+        )
+
+    # -- 1, 2: where we are ------------------------------------------------------------------
+
+    def _respond(self, u: Vectors) -> tuple[Response, ...]:
+        return tuple(
+            part.respond(ui, plastic)
+            for part, ui, plastic in zip(self.system.parts, u, self.start.plastic, strict=True)
+        )
+
+    def _residuals(self, u: Vectors, responses: Sequence[Response]) -> Vectors:
+        """Return external minus internal forces of each part, contact forces left out."""
+        return tuple(
+            part.residual(self.load, ui, response)
+            for part, ui, response in zip(self.system.parts, u, responses, strict=True)
+        )
+
+    def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
+        if not self.contact:
+            return no_candidates(self.system)
+        span = self.load - self.start.load
+        return find_candidates(self.system, self.start, u, contacts, span)
+
+    def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
+        """Return the force level [N], the relative residual and relative contact violation."""
+        parts = self.system.parts
+        inner = on_parts(self.system, candidates, candidates.forces)
+        external = norm([part.external(self.load) for part in parts])
+        level = external + norm(inner)
+        if external == 0:  # bodies that overlap push each other: stress alone tells how much
+            level += norm(residuals)
+        scale = max(self.start.force_scale, level)
+        if scale == 0:
+            overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
+            return 0.0, float(overlap < -self.system.touching), 0.0
+        out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
+        W = candidates.compliance([o.elastic for o in self.system.operators])
+        return scale, norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
+
+    # -- 3, 4: the step ------------------------------------------------------------------------
+
+    def _step(
+        self,
+        residuals: Vectors,
+        responses: Sequence[Response],
+        candidates: Candidates,
+        blends: Sequence[float],
+    ) -> Step:
+        """Return the step of the softest tangent that has one; a lone blend is no choice."""
+        for blend in blends:
+            try:
+                operators = [
+                    o.tangent(response, blend)
+                    for o, response in zip(self.system.operators, responses, strict=True)
+                ]
+                step = newton_step(self.system, residuals, operators, candidates, self.contact)
+            except Singular:
+                continue
+            if step is not None and blend == 0 and self._adrift(step, responses):
+                self._drifted = True
+            elif step is not None:
+                self._pivoted += step.pivoted
+                self._blended += 0 < blend and len(blends) > 1
+                return step
+        raise IncrementFailed(
+            "no contact forces were found that balance this load" + apart(self.system, candidates)
+        )
+
+    def _adrift(self, step: Step, responses: Sequence[Response]) -> bool:
+        """Whether a step is a plastic mechanism though nothing loads the bodies.
+
+        They push each other apart by a given distance then, which plastic flow alone can do in many
+        ways: the step would be any of them, and as large as rounding makes it.
+        """
+        loaded = any(part.external(self.load).any() for part in self.system.parts)
+        return not loaded and mechanism(self.system.parts, step.u, responses)
+
+    # -- 5: line search ------------------------------------------------------------------------
+
+    def _search(
+        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: Step
+    ) -> tuple[float, Vectors, tuple[Response, ...]]:
+        trial: tuple[Vectors, tuple[Response, ...]]
+
+        # where vertices change sides the forces before the step may oppose it; those after it never
+        # do: with them its slope is the tangent's quadratic form
+        before = candidates.forces
+        if self._slope(step, residuals, candidates, before) <= 0:
+            before = step.forces
+
+        def along(share: float, residual: Vectors) -> float:
+            forces = (1 - share) * before + share * step.forces
+            return self._slope(step, residual, candidates, forces)
+
+        def slope(share: float) -> float:
+            nonlocal trial
+            moved = tuple(ui + share * du for ui, du in zip(u, step.u, strict=True))
+            trial = moved, self._respond(moved)
+            return along(share, self._residuals(*trial))
+
+        share = search(slope, along(0.0, residuals))
+        return share, *trial
+
+    def _slope(
+        self, step: Step, residual: Vectors, candidates: Candidates, forces: NDArray[np.float64]
+    ) -> float:
+        """Return minus the derivative of the energy along a step under given contact forces."""
+        terms = zip(step.u, residual, on_parts(self.system, candidates, forces), strict=True)
+        return sum(float(du @ (r + c)) for du, r, c in terms)
+
+    # -- 6: the end ----------------------------------------------------------------------------
+
+    def _commit(
+        self,
+        u: Vectors,
+        responses: tuple[Response, ...],
+        residuals: Vectors,
+        candidates: Candidates,
+        scale: float,
+        iterations: int,
+    ) -> Converged:
+        contacts = candidates.kept(self.start.contacts, self.load - self.start.load)
+        spent = [
+            part.plastic_work(before, response)
+            for part, before, response in zip(
+                self.system.parts, self.start.plastic, responses, strict=True
+            )
+        ]
+        inner = on_parts(self.system, candidates, candidates.forces)
+        held = zip(self.system.parts, residuals, inner, strict=True)
+        return Converged(
+            start=self.start,
+            forces=tuple(part.external(self.load) - r - c for part, r, c in held),
+            contact_work=candidates.work(self.start.contacts),
+            plastic_work=sum(work for work, _ in spent),
+            dissipation=float(np.min([0.0, *(least for _, least in spent)])),
+            state=State(self.load, u, tuple(r.state for r in responses), contacts, scale),
+            responses=responses,
+            iterations=iterations,
+            elastic=not any(r.yielding.any() for r in responses),
+            pivoted=self._pivoted,
+            blended=self._blended,
+            strayed=strayed(self.system, u, candidates),
+        )

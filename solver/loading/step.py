@@ -1,0 +1,107 @@
+"""One Newton step: all parts at once, condensed to the contact points and solved there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.complementarity import solve_contact
+from solver.contact.problem import ContactProblem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.candidates import Candidates
+    from solver.contact.system import System
+    from solver.fem.operators import Operator
+
+    Vectors = tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Displacements of each part, contact forces and statuses, and whether these were pivoted."""
+
+    u: Vectors
+    forces: NDArray[np.float64]
+    status: NDArray[np.int64]
+    pivoted: bool
+
+
+def on_parts(system: System, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
+    """Return the nodal forces that contact forces exert on each part [N]."""
+    return tuple(candidates.on_part(i, forces, part.n) for i, part in enumerate(system.parts))
+
+
+def newton_step(
+    system: System,
+    residuals: Vectors,
+    operators: Sequence[Operator],
+    candidates: Candidates,
+    contact: bool,
+) -> Step | None:
+    """Return the step under given tangents, or None where no contact forces balance the load.
+
+    Parameters
+    ----------
+    residuals : external minus internal forces of each part, contact forces left out [N]
+    contact : False leaves floating bodies where they are
+    """
+    # all large forces balance first: what is left to solve for is small, and rounding of
+    # the factor, about 1e-16 (size of the body / smallest element)^2, acts on that alone
+    held = on_parts(system, candidates, candidates.forces)
+    balanced = [r + c for r, c in zip(residuals, held, strict=True)]
+    W = candidates.compliance(operators)
+    motion = candidates.motion - W @ candidates.forces
+    for i, (operator, r) in enumerate(zip(operators, balanced, strict=True)):
+        motion += candidates.of_part(i, operator.solve(r))
+    floating = [part.rigid if contact else part.rigid[:, :0] for part in system.parts]
+    solution = solve_contact(
+        ContactProblem(
+            W=W,
+            offset=motion,
+            friction=candidates.friction,
+            limit=candidates.limit,
+            A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
+            balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
+        ),
+        candidates.status,
+    )
+    if solution is None:
+        return None
+    change = on_parts(system, candidates, solution.forces - candidates.forces)
+    rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
+    u = tuple(
+        operator.solve(r + c) + R @ q
+        for operator, r, c, R, q in zip(operators, balanced, change, floating, rigid, strict=True)
+    )
+    if not all(np.isfinite(du).all() for du in u):
+        return None
+    return Step(u, solution.forces, solution.status, solution.pivoted)
+
+
+def largest(vectors: Vectors, origin: Vectors | None = None) -> float:
+    """Return the largest change of an unknown from an origin, or from zero."""
+    start = origin or tuple(np.zeros_like(v) for v in vectors)
+    return max(float(np.abs(v - o).max()) for v, o in zip(vectors, start, strict=True))
+
+
+def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
+    """Return the Euclidean norm of all vectors together."""
+    return float(np.sqrt(sum(float(v @ v) for v in vectors)))
+
+
+def apart(system: System, candidates: Candidates) -> str:
+    """Return which bodies are held by contact alone, where nothing touches yet."""
+    floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
+    if not floating or candidates.forces.any():
+        return ""
+    gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
+    return (
+        f"; body {' and '.join(floating)} is held by contact alone and stands {gap:.3g} mm "
+        "apart: the load must push it towards what holds it"
+    )

@@ -1,0 +1,7 @@
+"""Meshes: graded grids, the elements that cells may be, and which meshes are refused."""
+
+from __future__ import annotations
+
+from solver.mesh.grids import graded, grid, mapped, merged
+
+__all__ = ["graded", "grid", "mapped", "merged"]

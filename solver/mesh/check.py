@@ -1,0 +1,196 @@
+"""What a mesh must be for its answers to mean anything; refused with `ModelError` where it is not.
+
+Unfolded: the Jacobian of an element keeps one sign, and neighbours lie on opposite sides of the
+edge they share. Whole: one piece, without cracks and hinges. Lengths are compared with edges
+nearby and with the rounding of coordinates, so that neither unit, grading nor origin matters.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from skfem.quadrature import get_quadrature
+
+from solver.errors import ModelError
+from solver.mesh.shapes import shape_derivatives, shape_functions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from skfem import Mesh
+
+    from solver.mesh.elements import ElementType
+
+# Least / greatest Jacobian of a folded element, and sine of the angle between the shortest and the
+# longest side of a flat one. Rectangles and right triangles of any shape pass.
+_FOLDED = 1e-6
+# Distance / shortest edge at a node. Nodes that ought to be one agree far better; a notch whose
+# flanks are nearer than this would close, and nothing here would notice.
+_CLOSED = 1e-3
+_ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
+
+
+def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
+    """Raise `ModelError` unless the mesh of body ``name`` is unfolded and whole.
+
+    Elements and nodes go by their numbers in the mesh.
+    """
+    where = f'of body "{name}"'
+    _check_nodes(mesh, where)
+    _check_neighbours(mesh, where, _check_elements(mesh, where, kind))
+    _check_cracks(mesh, where)
+    _check_connected(mesh, where)
+
+
+def _refuse(what: str, where: str, allowed: str) -> NoReturn:
+    raise ModelError("mesh", f"{what} {where}", allowed)
+
+
+def _at(mesh: Mesh, node: int) -> str:
+    x, y = mesh.p[:, node]
+    return f"({x:.6g}, {y:.6g})"
+
+
+def _check_nodes(mesh: Mesh, where: str) -> None:
+    if len(mesh.p) != 2:
+        _refuse("node 0", where, f"has {len(mesh.p)} coordinates; nodes must have two, x and y")
+    used, n = mesh.dofs.element_dofs, mesh.p.shape[1]
+    for element in np.flatnonzero(((used < 0) | (used >= n)).any(axis=0))[:1]:
+        nodes = ", ".join(map(str, used[:, element]))
+        _refuse(f"element {element}", where, f"has nodes {nodes}; they must be in 0 to {n - 1}")
+    for node in np.flatnonzero(~np.isfinite(mesh.p).all(axis=0))[:1]:
+        _refuse(f"node {node}", where, f"is at {_at(mesh, node)}; coordinates must be finite")
+    for node in np.flatnonzero(np.bincount(used.ravel(), minlength=n) == 0)[:1]:
+        _refuse(f"node {node}", where, f"at {_at(mesh, node)} belongs to no element: leave it out")
+
+
+def _jacobians(mesh: Mesh, kind: ElementType) -> NDArray[np.float64]:
+    """Return signed Jacobians (n_elements, n_points), at nodes and integration points.
+
+    That of a straight element is linear: its extremes are at the corners.
+    """
+    element, nodes = mesh.elem(), mesh.dofs.element_dofs
+    points = [element.doflocs.T]
+    if len(nodes) > len(mesh.t):
+        points += [get_quadrature(element, order)[0] for order in {kind.order, kind.full_order}]
+    slopes = [element.lbasis(np.hstack(points), i)[1] for i in range(len(nodes))]
+    X = mesh.p[:, nodes] - mesh.p[:, None, nodes[0]]  # exact: a distant origin costs nothing
+    J = np.einsum("ine,njq->ijeq", X, np.array(slopes), optimize=True)
+    return np.asarray(J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0])
+
+
+def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> NDArray[np.float64]:
+    """Return the sense of every element: 1 counterclockwise, -1 clockwise."""
+    jacobian = _jacobians(mesh, kind)
+    low, high = jacobian.min(axis=1), jacobian.max(axis=1)
+    sense = np.where(high >= -low, 1.0, -1.0)
+    greatest = np.maximum(high, -low)
+    corners = mesh.p[:, mesh.t]
+    sides = np.hypot(*(np.roll(corners, -1, axis=1) - corners))
+    height = _FOLDED * sides.min(axis=0) + _ROUNDING * np.abs(corners).max(axis=(0, 1))
+    for element in np.flatnonzero(greatest <= height * sides.max(axis=0))[:1]:
+        _refuse(f"element {element}", where, "is flat: its corners must not lie on one line")
+    for element in np.flatnonzero(np.minimum(sense * low, sense * high) <= _FOLDED * greatest)[:1]:
+        allowed = (
+            f"is folded: its Jacobian goes from {low[element]:.3g} to {high[element]:.3g} and must "
+            "keep one sign; number its corners around the element, keep its angles below 180 "
+            "degrees and the nodes within its sides near their middle"
+        )
+        _refuse(f"element {element}", where, allowed)
+    return sense
+
+
+def _check_neighbours(mesh: Mesh, where: str, sense: NDArray[np.float64]) -> None:
+    """Refuse elements that overlap at an edge.
+
+    An element walked round counterclockwise is on the left of its edges: two neighbours on opposite
+    sides of their edge walk it in opposite directions.
+    """
+    walked = np.where(mesh.t < np.roll(mesh.t, -1, axis=0), sense, -sense)
+    count = np.bincount(mesh.t2f.ravel())
+    both = np.bincount(mesh.t2f.ravel(), weights=walked.ravel())
+    for facet in np.flatnonzero((count > 2) | ((count == 2) & (both != 0)))[:1]:
+        elements = np.flatnonzero((mesh.t2f == facet).any(axis=0))
+        a, b = mesh.facets[:, facet]
+        allowed = (
+            f"overlap at the edge they share, between nodes {a} and {b}: an edge must have at most "
+            "one element on either side"
+        )
+        _refuse("elements " + " and ".join(map(str, elements)), where, allowed)
+
+
+def _check_cracks(mesh: Mesh, where: str) -> None:
+    """Refuse boundary nodes that lie on another one, or on an edge between its ends."""
+    start, end = mesh.p[:, mesh.facets[0]], mesh.p[:, mesh.facets[1]]
+    length = np.hypot(*(end - start))
+    shortest = np.full(mesh.p.shape[1], length.max())
+    for ends in mesh.facets:  # one by one: numpy 2.4 warns of nothing where it broadcasts here
+        np.minimum.at(shortest, ends, length)
+    nodes = np.unique(mesh.facets[:, mesh.boundary_facets()])
+    tree = cKDTree(mesh.p[:, nodes].T)
+    distance, found = tree.query(tree.data, k=2)
+    nearest = np.where(found[:, 0] == np.arange(len(nodes)), found[:, 1], found[:, 0])
+    apart = "; what touches itself on purpose must be two bodies and a contact pair"
+    one, other = nodes, nodes[nearest]
+    close = _close(mesh, one, np.minimum(shortest[one], shortest[other]))
+    for i in np.flatnonzero(distance[:, 1] <= close)[:1]:
+        allowed = f"lie on one another at {_at(mesh, one[i])}: merge them{apart}"
+        _refuse(f"nodes {one[i]} and {other[i]}", where, allowed)
+    for node, facet in _hanging(mesh, nodes, tree, shortest)[:1]:
+        a, b = mesh.facets[:, facet]
+        allowed = f"lies on the edge from node {a} to node {b}: divide the element there{apart}"
+        _refuse(f"node {node}", where, allowed)
+
+
+def _close(mesh: Mesh, nodes: NDArray[np.int64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance below which nodes with edges of these lengths lie on something."""
+    return np.asarray(_CLOSED * edges + _ROUNDING * np.abs(mesh.p[:, nodes]).max(axis=0))
+
+
+def _hanging(
+    mesh: Mesh, nodes: NDArray[np.int64], tree: cKDTree, shortest: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return (n, 2): boundary nodes on a boundary facet between its ends, and that facet."""
+    facets = mesh.boundary_facets()
+    X = mesh.p[:, mesh.facets[:, facets]]
+    centre, half = X.mean(axis=1), np.hypot(*(X[:, 1] - X[:, 0])) / 2
+    curved = len(mesh.dofs.facet_dofs) > 0
+    middle = mesh.p[:, mesh.dofs.facet_dofs[0, facets]] if curved else centre
+    near = tree.query_ball_point(centre.T, half + np.hypot(*(middle - centre)))
+    edge = np.repeat(np.arange(len(facets)), [len(found) for found in near])
+    node = nodes[np.concatenate(near).astype(int)]
+    inner = (mesh.facets[:, facets[edge]] != node).all(axis=0)
+    edge, node = edge[inner], node[inner]
+    X = np.concatenate([X, middle[:, None]], axis=1)[:, :, edge]
+    xi = np.zeros(len(edge))
+    for _ in range(8):  # Gauss-Newton for the nearest point: at once where the edge is straight
+        t = (X * shape_derivatives(xi, 3).T).sum(axis=1)
+        miss = mesh.p[:, node] - (X * shape_functions(xi, 3).T).sum(axis=1)
+        xi = np.clip(xi + (miss * t).sum(axis=0) / (t**2).sum(axis=0), -1, 1)
+    lies = np.hypot(*miss) <= _close(mesh, node, np.minimum(shortest[node], 2 * half[edge]))
+    return np.stack([node, facets[edge]], axis=1)[lies & (np.abs(xi) < 1)]
+
+
+def _check_connected(mesh: Mesh, where: str) -> None:
+    """Refuse a mesh of several parts, and parts that meet at a node only."""
+    pairs, n = mesh.f2t[:, mesh.f2t[1] >= 0], mesh.nelements
+    joined = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(n, n))
+    parts, part = connected_components(joined, directed=False)
+    if parts > 1:
+        sizes = np.bincount(part)
+        size = sizes.min()
+        allowed = (
+            f"belongs to a part of {size} elements that shares no edge with the other {n - size}; "
+            "a body must be one piece: merge the nodes of its parts, or make them several bodies"
+        )
+        _refuse(f"element {np.argmax(part == sizes.argmin())}", where, allowed)
+    edges = np.bincount(mesh.facets[:, mesh.boundary_facets()].ravel())
+    for node in np.flatnonzero(edges > 2)[:1]:
+        allowed = (
+            f"at {_at(mesh, node)} is a hinge, a point that parts of the body share; they must "
+            "share an edge, or nothing"
+        )
+        _refuse(f"node {node}", where, allowed)

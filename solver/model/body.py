@@ -1,0 +1,132 @@
+"""Body = mesh + element + kinematics + material + supports + loads, as the user declares it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.mesh.check import check_mesh
+from solver.mesh.elements import element_type
+from solver.model.kinematics import STATES, State
+
+if TYPE_CHECKING:
+    from skfem import Mesh
+
+    from solver.materials.material import Material
+    from solver.model.motion import Axle, TravellingPressure
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Body:
+    """A deformable body.
+
+    Attributes
+    ----------
+    name : unique in its model
+    mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
+    material : its law
+    state : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
+    element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
+    full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
+    thickness : of plane bodies [mm]
+    supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
+    pressure : boundary name -> pressure at load factor one, positive when pushing [MPa]
+    condense : reduce the body to its contact surfaces where its material is elastic
+    axle : makes an elastic body a wheel; its supports then hold it to the hub
+    travelling : a pressure that moves along a boundary; load factors then are times
+    periodic : two straight boundaries, the second a copy of the first one period along x; the
+        body repeats itself beyond them
+    """
+
+    name: str
+    mesh: Mesh
+    material: Material
+    state: State = "plane_strain"
+    element: str = "quad8"
+    full_integration: bool = False
+    thickness: float = 1.0
+    supports: Mapping[str, str] = field(default_factory=dict)
+    pressure: Mapping[str, float] = field(default_factory=dict)
+    condense: bool = True
+    axle: Axle | None = None
+    travelling: TravellingPressure | None = None
+    periodic: tuple[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.state not in STATES:
+            raise ModelError("state", self.state, "must be one of " + ", ".join(STATES))
+        if not (np.isfinite(self.thickness) and self.thickness > 0):
+            raise ModelError("thickness", self.thickness, "must be positive [mm]")
+        element = element_type(self.element)
+        corners = 4 if element.cells == "quad" else 3
+        if self.mesh.t.shape[0] != corners:
+            raise ModelError(
+                "element", self.element, f"needs cells of {corners} corners; the mesh of body "
+                f"{self.name!r} has {self.mesh.t.shape[0]}",
+            )  # fmt: skip
+        # a wheel is cut from hub to rim, far from where it rolls
+        check_mesh(self.mesh, self.name, element)
+        if self.state == "axisymmetric" and self.mesh.p[0].min() < 0:
+            raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
+        for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
+            for boundary in names:
+                self.facets(boundary, kind, outer=kind == "pressure")
+        for boundary, held in self.supports.items():
+            if held not in ("x", "y", "xy"):
+                raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
+        if self.axle is not None and not self.material.elastic:
+            raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
+        if self.travelling is not None:
+            self.facets(self.travelling.boundary, "travelling", outer=True)
+            if self.material.elastic and self.condense:
+                raise ModelError("travelling", self.name, "needs condense=False on elastic bodies")
+        if self.periodic is not None:
+            self._check_periodic(self.periodic)
+        moved = self.axle is not None or self.travelling is not None
+        if moved and self.pressure:
+            allowed = "must be empty on a body with an axle or a travelling pressure"
+            raise ModelError("pressure", dict(self.pressure), allowed)
+        for boundary, value in self.pressure.items():
+            if not np.isfinite(value):
+                raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")
+
+    def _check_periodic(self, sides: tuple[str, str]) -> None:
+        if not isinstance(sides, tuple) or len(sides) != 2:
+            raise ModelError("periodic", sides, "must be two names of boundaries")
+        if self.state == "axisymmetric":
+            raise ModelError("periodic", sides, "an axisymmetric body does not repeat itself")
+        for boundary in sides:
+            self.facets(boundary, "periodic", outer=True)
+            for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
+                if boundary in names:
+                    raise ModelError(f"{kind}.{boundary}", names[boundary], "is periodic")
+
+    def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:
+        """Return the facet numbers of a named boundary, with ``outer`` one of the body's outside.
+
+        Supports may hold facets inside the body; pressure and contact need an outside to act on.
+        """
+        known = self.mesh.boundaries or {}
+        if boundary not in known or len(known[boundary]) == 0:
+            allowed = "must name a boundary of the mesh: " + (", ".join(known) or "it has none")
+            raise ModelError(field, boundary, allowed)
+        facets = np.asarray(known[boundary])
+        count = self.mesh.nfacets
+        if facets.dtype.kind not in "iu" or facets.min() < 0 or facets.max() >= count:
+            allowed = f"must be a boundary of facet numbers from 0 to {count - 1}"
+            raise ModelError(field, boundary, allowed)
+        if len(np.unique(facets)) < len(facets):
+            raise ModelError(field, boundary, "must be a boundary that has each facet once")
+        inside = facets[self.mesh.f2t[1, facets] != -1] if outer else facets[:0]
+        if len(inside):
+            first, second = self.mesh.f2t[:, inside[0]]
+            allowed = (
+                f"must lie on the outside of body {self.name!r}; {len(inside)} of its facets are "
+                f"inside, one between elements {first} and {second}"
+            )
+            raise ModelError(field, boundary, allowed)
+        return facets

@@ -1,0 +1,116 @@
+"""Model = bodies + contact pairs: what is solved, checked as a whole."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.model.body import Body
+
+LEAST_FRICTION = 1e-10
+"""Friction of this and less is none. All it carries is within the tolerance of normal forces in
+the contact problem, a hundredth of the imbalance and a thousandth of the contact violation an
+increment may leave."""
+
+
+def effective_friction(friction: float) -> float:
+    """Return the coefficient that is solved with: zero where friction is lost in rounding."""
+    return friction if friction > LEAST_FRICTION else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactPair:
+    """Two boundaries that may touch.
+
+    Attributes
+    ----------
+    slave, master : ``(body name, boundary name)``. The slave is the body whose surface ends at
+        a corner, else the finer or yielding one; pressure lives on its vertices
+    friction : Coulomb coefficient; 0 leaves out the tangential unknowns, and so does what is no
+        more than rounding (`effective_friction`)
+    shear_limit : largest contact shear over the initial shear yield stress of the weaker body,
+        whatever the pressure; inf (default) is none. Where friction could carry more, the
+        surface layer shears instead of slipping, and without bound as the mesh is refined
+    sliding : ``small`` pairs the surfaces where they are before loading, consistently with
+        small strains (and exactly linear between changes of status); ``finite`` pairs them
+        anew in every iteration
+    """
+
+    slave: tuple[str, str]
+    master: tuple[str, str]
+    friction: float = 0.0
+    shear_limit: float = math.inf
+    sliding: Literal["small", "finite"] = "small"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.friction) and self.friction >= 0):
+            raise ModelError("friction", self.friction, "must be finite and at least 0")
+        if not self.shear_limit > 0:
+            raise ModelError("shear_limit", self.shear_limit, "must be positive")
+        if self.sliding not in ("small", "finite"):
+            raise ModelError("sliding", self.sliding, "must be small or finite")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Model:
+    """Bodies in contact.
+
+    Attributes
+    ----------
+    bodies : with different names and one common state
+    contacts : pairs of their boundaries
+    """
+
+    bodies: tuple[Body, ...]
+    contacts: tuple[ContactPair, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        if not names or len(set(names)) < len(names):
+            raise ModelError("bodies", names, "must be at least one, with different names")
+        states = {body.state for body in self.bodies}
+        if len(states) > 1:
+            raise ModelError("bodies.state", sorted(states), "must be the same for all bodies")
+        for contact in self.contacts:
+            sides = (("slave", contact.slave), ("master", contact.master))
+            for side, (name, boundary) in sides:
+                self.body(name, side).facets(boundary, side, outer=True)
+            elastic = all(self.body(name, side).material.elastic for side, (name, _) in sides)
+            if elastic and not math.isinf(contact.shear_limit):
+                raise ModelError(
+                    "shear_limit", contact.shear_limit,
+                    "must be inf between elastic bodies: there is no yield stress to refer to",
+                )  # fmt: skip
+        self._check_pairs()
+
+    def _check_pairs(self) -> None:
+        """Refuse a surface paired with itself, and two surfaces paired twice."""
+        pairs = [(contact.slave, contact.master) for contact in self.contacts]
+        for i, (slave, master) in enumerate(pairs):
+            if self._overlap(slave, master):
+                allowed = f"shares facets with slave {slave}: must be another surface"
+                raise ModelError(f"contacts[{i}].master", master, allowed)
+            for j, (one, other) in enumerate(pairs[:i]):
+                straight = self._overlap(slave, one) and self._overlap(master, other)
+                if straight or (self._overlap(slave, other) and self._overlap(master, one)):
+                    allowed = f"pairs surfaces that contacts[{j}] pairs: give each pair once"
+                    raise ModelError(f"contacts[{i}]", (slave, master), allowed)
+
+    def _overlap(self, one: tuple[str, str], other: tuple[str, str]) -> bool:
+        """Whether two surfaces, given by body and boundary, share facets."""
+        if one[0] != other[0]:
+            return False
+        body = self.body(one[0])
+        return len(np.intersect1d(body.facets(one[1]), body.facets(other[1]))) > 0
+
+    def body(self, name: str, field: str = "body") -> Body:
+        """Return the body called ``name``."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        allowed = "must be one of " + ", ".join(b.name for b in self.bodies)
+        raise ModelError(field, name, allowed)

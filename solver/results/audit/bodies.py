@@ -1,0 +1,136 @@
+"""What each body must satisfy by itself: balance, its law, its loads and reactions."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.substructure import Substructure
+from solver.results.audit.law import excess, hooke, increment_error, law_error, of_state
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged, State
+    from solver.contact.system import System
+    from solver.results.audit.plain import PlainBody
+
+    Array = NDArray[np.float64]
+
+_SAMPLE = 200
+"""Flowing points at which an increment is followed in smaller steps."""
+
+
+class AuditedBody:
+    """A body of a system in a converged increment; what several figures need is evaluated once.
+
+    ``plain`` is the body itself, shared by its states.
+    """
+
+    def __init__(self, system: System, plain: PlainBody, converged: Converged) -> None:
+        self.plain = plain
+        self.name = plain.body.name
+        number = system.part(self.name)
+        self.part = system.parts[number]
+        self._system = system
+        self._converged = converged
+        self._u = converged.state.u[number]
+        self._response = converged.responses[number]
+        self._before = converged.start.plastic[number]
+
+    @property
+    def meshed(self) -> bool:
+        """Whether the increments solved for all of its nodes, and kept its internal variables."""
+        return not isinstance(self.part, Substructure)
+
+    def _strain(self, state: State) -> Array:
+        """Return strain (4, n_elements, n_points), from the displacements."""
+        return self.plain.strain(self._system.displacement(self.name, state))
+
+    @cached_property
+    def _reached(self) -> Array:
+        return self._strain(self._converged.state)
+
+    @cached_property
+    def stress(self) -> Array:
+        """Stress (4, n_elements, n_points): what the increment gave, or Hooke's."""
+        if self.meshed:
+            return self.plain.stress(self._response.stress)
+        body = self.plain.body
+        return hooke(self._reached, body.material, body.state)
+
+    @cached_property
+    def lacking(self) -> Array:
+        """Nodal forces (n_nodes, 2) that contact and supports must add to the loads [N]."""
+        whole = self.plain.part
+        wheel = self.plain.body.axle is not None  # its load acts on the hub
+        external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.load)
+        return self.plain.forces(self.stress) - external.reshape(-1, 2)
+
+    def applied(self) -> Array:
+        """Return the resultant of the loads (2,) [N]."""
+        load, travelling = self._converged.state.load, self.plain.body.travelling
+        if travelling is None:
+            return self.plain.applied(load)
+        share, _, ratio = travelling.now(load)
+        whole = np.pi / 2 * travelling.half_width * travelling.peak * share
+        return whole * self.plain.body.thickness * np.array([ratio, -1.0])
+
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Which displacements (n_nodes, 2) supports hold."""
+        held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
+        for boundary, axes in self.plain.body.supports.items():
+            nodes = self.plain.part.boundary_nodes(boundary)
+            for axis in axes:
+                held[nodes, "xy".index(axis)] = True
+        return held
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which unknowns (n_nodes, 2) nothing holds, copies of a periodic body left out."""
+        part = self.plain.part
+        own = part.same == np.arange(len(part.same))
+        return np.asarray(~self.held & own[:, None])
+
+    def stored(self) -> float:
+        """Return the elastic energy [N mm]; of a condensed body that of its kept unknowns."""
+        if self.meshed:
+            return self.plain.elastic_energy(self.stress)
+        return self.part.stiffness_along(self._u, self._response)[1] / 2
+
+    @property
+    def strength(self) -> float:
+        """The yield stress, or the largest stress of a body that cannot yield [MPa]."""
+        material = self.plain.body.material
+        return float(np.abs(self.stress).max()) if material.elastic else material.yield_stress
+
+    def law(self) -> tuple[float, float]:
+        """Return how far the increment is from its law, and its stress beyond yield [MPa]."""
+        if not self.meshed:
+            return 0.0, 0.0
+        body, after = self.plain.body, of_state(self._response.state)
+        stress, strain = self.stress.reshape(4, -1), self._reached.reshape(4, -1)
+        before = of_state(self._before)
+        broken = law_error(strain, stress, before, after, body.material, body.state)
+        if body.material.elastic:
+            return broken, 0.0
+        return broken, float(excess(stress, *after, body.material).max(initial=0.0))
+
+    def increment_error(self) -> float:
+        """Return the change of stress that smaller steps make where it flows, over yield stress."""
+        body = self.plain.body
+        if not self.meshed or body.material.elastic:
+            return 0.0
+        flowing = np.flatnonzero(self._response.state.accumulated > self._before.accumulated)
+        if not len(flowing):
+            return 0.0
+        some = flowing[:: max(1, len(flowing) // _SAMPLE)]
+        first = self._strain(self._converged.start).reshape(4, -1)[:, some]
+        last = self._reached.reshape(4, -1)[:, some]
+        plastic, accumulated = of_state(self._before)
+        before = (plastic[:, some], accumulated[some])
+        stress = self.stress.reshape(4, -1)[:, some]
+        return increment_error((first, last), stress, before, body.material, body.state)

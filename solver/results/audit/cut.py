@@ -1,0 +1,34 @@
+"""Self-equilibrium of a residual stress on a plane cut."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.fields import Sampler, recovery
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.system import System
+
+
+def cut_force(
+    system: System, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
+) -> float:
+    """Return the normal force on a plane cut over the force its area carries at yield.
+
+    ``where`` (2, n) are points along the straight cut; ``stress`` (4, n_points) Mandel. Zero for
+    a residual stress that holds itself, but for the discretisation error.
+    """
+    p = system.full(body)
+    along = where[:, -1] - where[:, 0]
+    length = float(np.linalg.norm(along))
+    n = np.array([along[1], -along[0]]) / length
+    s = Sampler(p, where)((recovery(p) @ stress.T).T)
+    traction = n[0] ** 2 * s[0] + n[1] ** 2 * s[1] + np.sqrt(2) * n[0] * n[1] * s[3]
+    t = np.linalg.norm(where - where[:, :1], axis=0)
+    measure = np.broadcast_to(p.measure(where), len(t))
+    area = float(np.trapezoid(measure, t))
+    return float(np.trapezoid(traction * measure, t)) / (area * p.body.material.yield_stress)

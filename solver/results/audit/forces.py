@@ -1,0 +1,122 @@
+"""Whether forces balance: at every node, between the bodies, and with what is applied."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.candidates import find_candidates
+from solver.fem.substructure import Substructure
+from solver.fem.wheel import Wheel
+from solver.results.audit.surfaces import deformed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.results.audit.bodies import AuditedBody
+    from solver.results.audit.pairs import AuditedPair
+
+    Array = NDArray[np.float64]
+
+_LITTLE = 1e-4
+"""Contact force over the force level below which it is compared with that."""
+
+
+def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
+    """Return the nodal forces (n_nodes, 2) of contact on each whole body, in its own frame [N]."""
+    state = converged.state
+    candidates = find_candidates(system, state, state.u, state.contacts)
+    out = {}
+    for i, (body, part) in enumerate(zip(system.model.bodies, system.parts, strict=True)):
+        force = candidates.on_part(i, candidates.forces, part.n)
+        whole = part.on_whole(force) if isinstance(part, Substructure) else force
+        out[body.name] = whole.reshape(-1, 2)
+    return out
+
+
+def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converged) -> float:
+    """Return external, internal and contact forces out of balance over the force level."""
+    contact = _on_bodies(system, converged)
+    square = 0.0
+    for body in bodies:
+        left = contact[body.name] - body.lacking
+        square += float((left[body.free] ** 2).sum())
+    return float(np.sqrt(square)) / (converged.state.force_scale or 1.0)
+
+
+def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the nodal forces (n_nodes, 2) the pairs exert on a body, in space, and its nodes."""
+    whole = body.plain.part
+    force = np.zeros((whole.X.shape[1], 2))
+    for pair in pairs:
+        surfaces, touching = pair.surfaces, pair.touching
+        for (name, _), chain, nodal in (
+            (surfaces.pair.slave, surfaces.slave, touching.on_slave),
+            (surfaces.pair.master, surfaces.master, touching.on_master),
+        ):
+            if name == body.name:
+                np.add.at(force, chain.nodes, nodal)
+    return force, (force != 0).any(axis=1)
+
+
+def action_reaction(
+    system: System,
+    bodies: Sequence[AuditedBody],
+    pairs: Sequence[AuditedPair],
+    converged: Converged,
+) -> float:
+    """Return how much the forces that bodies feel at their surfaces differ from the contact forces.
+
+    What a body feels is what its stress holds at the nodes of its contact surfaces. Resultant and
+    moment are compared on either side of every pair, so that both sides feel one and the same; the
+    figure is over the sum of normal forces of the body's least loaded pair (and the length of the
+    contact).
+    """
+    scale = _LITTLE * converged.state.force_scale
+    turning = any(pair.surfaces.pair.sliding == "finite" for pair in pairs)
+    worst = 0.0
+    for body in bodies:
+        own = [pair for pair in pairs if body.name in pair.bodies]
+        expected, nodes = _of_pairs(body, own)
+        level = max(scale, min((pair.force for pair in own if pair.force), default=0.0))
+        if not nodes.any() or level == 0.0:
+            continue
+        x, Q = deformed(system, body.name, converged.state)
+        felt = body.lacking @ Q.T
+        miss = np.where(body.held, 0.0, felt - expected)[nodes]
+        x = x if turning else body.plain.part.X
+        arm = x[:, nodes].T - x[:, nodes].mean(axis=1)
+        size = float(np.abs(arm).max()) or 1.0
+        moment = float((arm[:, 0] * miss[:, 1] - arm[:, 1] * miss[:, 0]).sum()) / size
+        worst = max(worst, float(np.abs(miss.sum(axis=0)).max()) / level, abs(moment) / level)
+    return worst
+
+
+def reactions(
+    bodies: Sequence[AuditedBody], pairs: Sequence[AuditedPair], converged: Converged
+) -> float:
+    """Return how far loads, contact and reactions of a body are from balance, over the force level.
+
+    Pressures count by the shape of their boundary, the load of a wheel by its program; reactions
+    are what the stress exerts where supports hold.
+    """
+    worst = 0.0
+    for body in bodies:
+        contact, _ = _of_pairs(body, pairs)
+        total = contact.sum(axis=0)
+        if isinstance(body.part, Wheel):
+            # the advance is prescribed: what it takes along x is not known beforehand
+            force = body.part.program.at(converged.state.load, "force")
+            total = np.array([0.0, total[1] - force])
+        else:
+            held = np.where(body.held, contact - body.lacking, 0.0)
+            total = total + body.applied() - held.sum(axis=0)
+            if body.plain.body.state == "axisymmetric":
+                total[0] = 0.0  # radial forces balance round the axis
+        worst = max(worst, float(np.abs(total).max()))
+    return worst / (converged.state.force_scale or 1.0)

@@ -1,0 +1,130 @@
+"""What each contact pair must satisfy, measured on the deformed bodies."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.model.model import effective_friction
+from solver.results.audit.surfaces import Surfaces
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.model.model import ContactPair
+    from solver.results.audit.surfaces import Touching
+
+    Array = NDArray[np.float64]
+
+_PRESSED = 1e-6
+"""Force below this part of the force level is none."""
+_GAP = 2e-3
+"""Gap allowed, over the elastic approach."""
+_OVERLAP = (0.02, 2.5e-3)
+"""Overlap allowed, over the elastic approach and over the side of an element."""
+_STILL = 1e-3
+"""Slip below this part of the elastic approach is none."""
+
+
+class AuditedPair:
+    """A contact pair in a converged increment.
+
+    Attributes
+    ----------
+    touching : gaps, slips and nodal forces, from the bodies
+    normal, tangential : the contact forces (n,) of the state [N]
+    """
+
+    def __init__(self, system: System, number: int, converged: Converged) -> None:
+        self._system = system
+        self._pair: ContactPair = system.model.contacts[number]
+        contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
+        self.normal, self.tangential = contact.normal, contact.tangential
+        self._closed = self.normal > _PRESSED * converged.state.force_scale
+        self.surfaces = Surfaces(system, self._pair)
+        self.touching: Touching = self.surfaces.touching(
+            converged.state, converged.start, self.normal, self.tangential
+        )
+
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """Names of slave and master body."""
+        return self._pair.slave[0], self._pair.master[0]
+
+    @property
+    def approach(self) -> float:
+        """How far contact presses the bodies into each other elastically [mm].
+
+        The peak pressure over the contact modulus E*, times the width of the contact.
+        """
+        closed, area = self._closed & (self.touching.area > 0), self.touching.area
+        if not closed.any():
+            return 0.0
+        compliance = 0.0
+        for name in self.bodies:
+            material = self._system.model.body(name).material
+            compliance += (1 - material.poisson_ratio**2) / material.youngs_modulus
+        pressure = float((self.normal[closed] / area[closed]).max())
+        return pressure * compliance * float(self.touching.edge[closed].sum())
+
+    @property
+    def force(self) -> float:
+        """Sum of the normal forces [N]."""
+        return float(self.normal[self._closed].sum())
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """What gaps and overlaps this pair is allowed [mm]."""
+        edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
+        touching = self._system.touching
+        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
+        return {"audit_closed_gap": max(_GAP * self.approach, touching), "audit_overlap": overlap}
+
+    @property
+    def _bound(self) -> Array:
+        mu = effective_friction(self._pair.friction)
+        strength = min(
+            self._system.model.body(name).material.shear_yield_stress for name in self.bodies
+        )
+        limit = np.full(len(self.normal), np.inf)
+        if np.isfinite(self._pair.shear_limit):
+            limit = self._pair.shear_limit * strength * self.touching.area
+        return np.minimum(mu * np.maximum(self.normal, 0.0), limit)
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """The figures of the pair; lengths in mm, forces in N."""
+        gap, true = np.nan_to_num(self.touching.gap), np.nan_to_num(self.touching.true_gap)
+        pressed = np.where(self._closed, self.normal, 0.0)
+        pressed /= max(float(pressed.sum()), 1e-300)
+        # by area: the last vertex at a sharp corner is not told from its own distortion
+        deep = np.maximum(-np.minimum(gap, true), 0.0) @ self.touching.area
+        area = float(self.touching.area[self._closed].sum() or self.touching.area.sum())
+        return {
+            "audit_overlap": max(float(deep) / (area or 1.0), float(np.abs(true) @ pressed)),
+            "audit_closed_gap": float(np.abs(gap) @ pressed),
+            "audit_tension": max(0.0, -float(self.normal.min(initial=0.0))),
+            "audit_friction_excess": float(
+                (np.abs(self.tangential) - self._bound).max(initial=0.0)
+            ),
+            "audit_slip": self._wrong_slip(),
+        }
+
+    def _wrong_slip(self) -> float:
+        """Return the friction work that slip lacks over the work it should do.
+
+        Slip against a shear below its bound, or along it, is wrong: nothing may slip before the
+        bound is reached, and friction opposes what slips. Vertices new in contact are left out.
+        """
+        judged = self._closed & self._start.touching & (self.touching.area > 0)
+        bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
+        least = _STILL * self.approach
+        should = float(bound @ np.maximum(np.abs(slip), least))
+        if should == 0.0:
+            return 0.0
+        does = -float(self.tangential[judged] @ slip)
+        return (float(bound @ np.abs(slip)) - does) / should

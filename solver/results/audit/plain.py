@@ -1,0 +1,131 @@
+"""A body evaluated once more, plainly: strain, nodal forces, applied forces, elastic energy.
+
+Nothing here uses the operators that increments are solved with: gradients come from the elements
+themselves, volumes from the quadrature, and the resultants of pressures from the shape of the
+boundary. Stress and strain have tensor components (xx, yy, zz, xy), elements and points last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.surface import edges_of
+from solver.mesh.elements import element_type
+from solver.tensors import to_tensor
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.model.body import Body
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlainBody:
+    """One meshed body; ``part`` gives nodes, elements and quadrature."""
+
+    part: Discretisation
+
+    @property
+    def body(self) -> Body:
+        """What was declared."""
+        return self.part.body
+
+    @cached_property
+    def _nodes(self) -> NDArray[np.int64]:
+        return np.asarray(self.part.same[self.part.basis.element_dofs])
+
+    @cached_property
+    def _gradients(self) -> Array:
+        """(n_element_nodes, 2, n_elements, n_points) [1/mm]."""
+        return np.array([np.asarray(b[0].grad) for b in self.part.basis.basis])
+
+    @cached_property
+    def _round(self) -> Array:
+        """Hoop strain of unit radial displacements (n_element_nodes, n_elements, n_points)."""
+        radius = self.part.basis.global_coordinates()[0]
+        return np.array([np.asarray(b[0]) / radius for b in self.part.basis.basis])
+
+    @cached_property
+    def volume(self) -> Array:
+        """Volume of the points (n_elements, n_points) [mm3]."""
+        return np.asarray(self.part.basis.dx * self._depth(self.part.basis.global_coordinates()))
+
+    def _depth(self, x: Array) -> Array:
+        round_axis = self.body.state == "axisymmetric"
+        return np.asarray(2 * np.pi * x[0] if round_axis else self.body.thickness)
+
+    @property
+    def _averaged(self) -> bool:
+        """Whether the element takes its change of volume from the mean over its points."""
+        kind = element_type(self.body.element)
+        return kind.mean_dilatation and self.body.state != "plane_stress"
+
+    def _level(self, field: Array) -> Array:
+        """Return a tensor field whose trace is that of the mean over each element."""
+        if not self._averaged:
+            return field
+        trace = field[:3].sum(axis=0)
+        mean = (trace * self.volume).sum(axis=1) / self.volume.sum(axis=1)
+        out = field.copy()
+        out[:3] += (mean[:, None] - trace) / 3
+        return out
+
+    def strain(self, u: Array) -> Array:
+        """Return strain (4, n_elements, n_points) for displacements (n,) [mm]."""
+        at = u.reshape(-1, 2)[self._nodes]  # (n_element_nodes, n_elements, 2)
+        xx = np.einsum("iep,ie->ep", self._gradients[:, 0], at[..., 0])
+        yy = np.einsum("iep,ie->ep", self._gradients[:, 1], at[..., 1])
+        xy = np.einsum("iep,ie->ep", self._gradients[:, 1], at[..., 0])
+        xy += np.einsum("iep,ie->ep", self._gradients[:, 0], at[..., 1])
+        zz = np.zeros_like(xx)
+        if self.body.state == "axisymmetric":
+            zz = np.einsum("iep,ie->ep", self._round, at[..., 0])
+        return self._level(np.array([xx, yy, zz, xy / 2]))
+
+    def stress(self, mandel: Array) -> Array:
+        """Return tensor components at elements and points from Mandel (4, n_points)."""
+        return to_tensor(mandel).reshape(4, *self.volume.shape)
+
+    def forces(self, stress: Array) -> Array:
+        """Return the nodal forces (n_nodes, 2) that balance a stress [N]."""
+        weighted = self._level(stress) * self.volume
+        G = self._gradients
+        x = np.einsum("iep,ep->ie", G[:, 0], weighted[0])
+        x += np.einsum("iep,ep->ie", G[:, 1], weighted[3])
+        y = np.einsum("iep,ep->ie", G[:, 1], weighted[1])
+        y += np.einsum("iep,ep->ie", G[:, 0], weighted[3])
+        if self.body.state == "axisymmetric":
+            x += np.einsum("iep,ep->ie", self._round, weighted[2])
+        count = self.part.X.shape[1]
+        nodes = self._nodes.ravel()
+        return np.stack([np.bincount(nodes, f.ravel(), count) for f in (x, y)], axis=1)
+
+    def applied(self, load: float) -> Array:
+        """Return the resultant (2,) of the pressures at a load factor [N].
+
+        A pressure p on an edge from A to B pushes with p times the depth and the length of AB,
+        against its normal.
+        """
+        total = np.zeros(2)
+        for boundary, pressure in self.body.pressure.items():
+            edges = edges_of(self.part, boundary)
+            start, end = self.part.X[:, edges[:, 0]], self.part.X[:, edges[:, 1]]
+            along = end - start
+            depth = np.broadcast_to(self._depth((start + end) / 2), along.shape[1:])
+            push = load * pressure * depth * np.array([-along[1], along[0]])
+            total += push.sum(axis=1)
+        return total
+
+    def elastic_energy(self, stress: Array) -> float:
+        """Return the energy of a stress [N mm]."""
+        E, nu = self.body.material.youngs_modulus, self.body.material.poisson_ratio
+        square = (stress[:3] ** 2).sum(axis=0) + 2 * stress[3] ** 2
+        density = ((1 + nu) * square - nu * stress[:3].sum(axis=0) ** 2) / (2 * E)
+        return float((density * self.volume).sum())

@@ -1,0 +1,191 @@
+"""All figures of one run, the limits they must keep, and the words about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.pressure import contact_pressure
+from solver.fem.fields import error_estimate
+from solver.results.audit.bodies import AuditedBody
+from solver.results.audit.forces import action_reaction, imbalance, reactions
+from solver.results.audit.pairs import AuditedPair
+from solver.results.audit.plain import PlainBody
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+
+_LARGE_STRAIN = 0.10
+_SURFACE_SHEAR = 1.1
+_LIMITS = {
+    "audit_residual": 1e-6,
+    "audit_reactions": 1e-5,
+    "audit_action_reaction": 1e-3,
+    "audit_law": 1e-6,
+    "audit_yield": 1e-6,
+    "audit_slip": 0.03,
+    "audit_energy": 1e-5,
+}
+_TURNING = 0.02  # energy lost where the directions of contact turn within an increment
+_TRAVELLING = 5e-3  # of the force: the elements integrate a Hertz pressure, which has no slope
+_FORCE = 1e-6  # of the force level
+
+
+@dataclass(frozen=True, slots=True)
+class Audit:
+    """Figures by name, the conditions violated, and warnings."""
+
+    figures: Mapping[str, float]
+    violations: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def passed(self) -> bool:
+        """Whether no condition is violated."""
+        return not self.violations
+
+
+def _largest(*values: float) -> float:
+    """Return the largest value, or NaN where one is NaN, which no limit lets pass."""
+    return float(np.max(values))
+
+
+def audit(
+    system: System, loaded: Converged, unloaded: Converged, least_dissipation: float
+) -> Audit:
+    """Check one run: its state under load and after unloading."""
+    states = (loaded, unloaded)
+    plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
+    bodies, released = (
+        [AuditedBody(system, body, converged) for body in plain] for converged in states
+    )
+    pairs = [AuditedPair(system, k, loaded) for k in range(len(system.interfaces))]
+    broken, beyond = _laws(bodies, released)
+    names = ("audit_overlap", "audit_closed_gap", "audit_tension", "audit_friction_excess",
+             "audit_slip")  # fmt: skip
+    figures = {
+        "audit_residual": _largest(
+            imbalance(system, bodies, loaded), imbalance(system, released, unloaded)
+        ),
+        "audit_reactions": reactions(bodies, pairs, loaded),
+        "audit_action_reaction": action_reaction(system, bodies, pairs, loaded),
+        "audit_law": broken,
+        "audit_yield": beyond,
+        "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
+        **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
+        "audit_energy": _energy_error(bodies, loaded),
+        "audit_dissipation": least_dissipation,
+        "audit_contact_after_unloading": float(
+            sum(np.abs(c.normal).sum() + np.abs(c.tangential).sum()
+                for c in unloaded.state.contacts)
+        ),
+    }  # fmt: skip
+    figures |= _strength(system, loaded) | _discretisation(system, states)
+    violations = _violations(system, figures, loaded, pairs)
+    return Audit(figures, violations, _warnings(figures, unloaded))
+
+
+def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tuple[float, float]:
+    """Return how far either state is from the law, and beyond yield, over the strength."""
+    broken, beyond = 0.0, 0.0
+    for both in zip(bodies, released, strict=True):
+        strength = max(*(body.strength for body in both), 1e-300)
+        for off, over in (body.law() for body in both):
+            broken = _largest(broken, off / strength)
+            beyond = _largest(beyond, over / strength)
+    return broken, beyond
+
+
+def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
+    """Return the work of the loads that is not found again, over the largest of all works."""
+    work = loaded.energy
+    terms = np.array([
+        sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
+        work.contact, -work.external,
+    ])  # fmt: skip
+    level = float(np.abs(terms).max())
+    return abs(float(terms.sum())) / level if level else 0.0
+
+
+def _strength(system: System, loaded: Converged) -> dict[str, float]:
+    """Return contact shear, and the shear friction could bear, over the shear yield stress."""
+    shear, friction = 0.0, 0.0
+    for k, interface in enumerate(system.interfaces):
+        pressure, tangential = contact_pressure(system, loaded.state, k)
+        for number, _, _ in interface.sides:
+            material = system.parts[number].body.material
+            if material.elastic:
+                continue
+            hardened = material.plastic_modulus * float(
+                loaded.responses[number].state.accumulated.max()
+            )
+            strength = (material.yield_stress + hardened) / np.sqrt(3)
+            shear = max(shear, float(np.abs(tangential).max()) / strength)
+            friction = max(friction, interface.friction * float(pressure.max()) / strength)
+    return {"audit_surface_shear": shear, "audit_friction_over_strength": friction}
+
+
+def _discretisation(system: System, states: tuple[Converged, Converged]) -> dict[str, float]:
+    """Return the estimated relative errors of stress in the energy norm."""
+    out = {}
+    for kind, converged in zip(("loaded", "residual"), states, strict=True):
+        error, energy = 0.0, 0.0
+        for body in system.model.bodies:
+            stress = system.response(body.name, converged).stress
+            here = error_estimate(system.full(body.name), stress)
+            error, energy = error + here[0], energy + here[1]
+        out[f"audit_error_{kind}"] = float(np.sqrt(error / energy)) if energy else 0.0
+    return out
+
+
+def _violations(
+    system: System,
+    figures: Mapping[str, float],
+    loaded: Converged,
+    pairs: Sequence[AuditedPair],
+) -> tuple[str, ...]:
+    scale = loaded.state.force_scale or 1.0
+    limits = _LIMITS | {
+        "audit_tension": _FORCE * scale,
+        "audit_friction_excess": _FORCE * scale,
+        "audit_contact_after_unloading": _FORCE * scale,
+    }
+    if any(contact.sliding == "finite" for contact in system.model.contacts):
+        limits["audit_energy"] = _TURNING
+    if any(body.travelling for body in system.model.bodies):
+        limits["audit_reactions"] = _TRAVELLING
+    judged = [(name, figures[name], limit) for name, limit in limits.items()]
+    for pair in pairs:
+        judged += [(name, pair.figures[name], limit) for name, limit in pair.limits.items()]
+    broken = [
+        f"{name} = {figure:.2e} exceeds {limit:.2e}"
+        for name, figure, limit in judged
+        if not figure <= limit
+    ]
+    yield_stress = max(
+        (p.body.material.yield_stress for p in system.parts if not p.body.material.elastic),
+        default=1.0,
+    )
+    if not figures["audit_dissipation"] >= -_LIMITS["audit_yield"] * yield_stress:
+        broken.append(f"plastic dissipation is negative: {figures['audit_dissipation']:.2e}")
+    return tuple(broken)
+
+
+def _warnings(figures: Mapping[str, float], unloaded: Converged) -> tuple[str, ...]:
+    largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
+    warnings = []
+    if largest > _LARGE_STRAIN:
+        warnings.append(
+            f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is stretched"
+        )
+    shear = figures["audit_surface_shear"]
+    if shear > _SURFACE_SHEAR:
+        warnings.append(
+            f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
+        )
+    return tuple(warnings)

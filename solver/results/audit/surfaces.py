@@ -1,0 +1,268 @@
+"""Contact seen from the bodies alone: true gaps, slips, and the forces the bodies feel.
+
+Surfaces are taken where the bodies are after deformation, large or small, and measured point by
+point against the nearest place of the partner; no derivative row of the contact problem is used.
+Means are those under the hats of the slave's vertices, which contact forces belong to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.overlap import largest_overlap
+from solver.fem.surface import extract
+from solver.fem.wheel import Wheel
+from solver.mesh.shapes import shape_derivatives, shape_functions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import State
+    from solver.contact.system import System
+    from solver.fem.surface import Surface
+    from solver.model.model import ContactPair
+
+    Array = NDArray[np.float64]
+
+_XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
+_NEWTON_STEPS = 5
+_BLOCK = 1000
+"""Points looked at together: each against every edge."""
+_BESIDE = 1e-9
+"""Distance over an edge's length by which a line may pass beside it."""
+
+
+def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
+    """Return where the nodes of a whole body are (2, n) [mm], and how it has turned (2, 2)."""
+    whole, part = system.full(name), system.parts[system.part(name)]
+    d = system.displacement(name, state).reshape(-1, 2).T
+    if not isinstance(part, Wheel):
+        return whole.X + d, np.eye(2)
+    u = state.u[system.part(name)]
+    angle, centre = u[part.rim + 2] / part.radius, part.centre[:, None]
+    Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    hub = u[part.rim : part.rim + 2, None]
+    return centre + hub + Q @ (whole.X - centre + d), Q
+
+
+@dataclass(frozen=True)
+class Touching:
+    """One pair at one state.
+
+    Attributes
+    ----------
+    area : (n,) integral of the hat of a slave vertex where the master faces it [mm2]
+    gap : (n,) mean gap under the hat in the kinematics of the pair, NaN where nothing faces [mm]
+    true_gap : (n,) the same of the deformed bodies, which small sliding neglects [mm]
+    slip : (n,) mean slip of the increment [mm]
+    edge : (n,) mean length of the edges at a vertex [mm]
+    on_slave, on_master : nodal forces (n_nodes, 2) that the contact forces amount to [N]
+    """
+
+    area: Array
+    gap: Array
+    true_gap: Array
+    slip: Array
+    edge: Array
+    on_slave: Array
+    on_master: Array
+
+
+class Surfaces:
+    """The two surfaces of a contact pair, on the whole bodies."""
+
+    def __init__(self, system: System, pair: ContactPair) -> None:
+        self._system = system
+        self.pair = pair
+        self.slave, self.master = (
+            extract(system.full(name), boundary) for name, boundary in (pair.slave, pair.master)
+        )
+
+        bodies = [system.model.body(name) for name, _ in (pair.slave, pair.master)]
+        self._overlap = largest_overlap(*bodies)
+        self._thickness = float(np.ptp(bodies[0].mesh.p, axis=1).min())
+
+    def _at(self, state: State) -> tuple[Array, Array]:
+        (slave, _), (master, _) = self.pair.slave, self.pair.master
+        xs, xm = (deformed(self._system, name, state)[0] for name in (slave, master))
+        return _on(self.slave, xs), _on(self.master, xm)
+
+    def touching(self, state: State, start: State, normal: Array, tangential: Array) -> Touching:
+        """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
+        slave, master = self.slave, self.master
+        (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
+        small = self.pair.sliding == "small"
+        edges, xi, length = _points(
+            slave, slave.X if small else xs, master, master.X if small else xm
+        )
+        N = shape_functions(xi, slave.edges.shape[1])
+        nodes = slave.edges[edges]
+
+        def on_slave(x: Array) -> Array:
+            return np.asarray((x[:, nodes] * N).sum(axis=-1))
+
+        n = _normals(xs, slave, edges, xi)
+        true = partner = _Partner(xm, master, on_slave(xs), n, self._thickness / 2)
+        if small:  # places and directions are those of the bodies at rest
+            n = _normals(slave.X, slave, edges, xi)
+            partner = _Partner(master.X, master, on_slave(slave.X), n, self._overlap)
+        t = np.stack([-n[1], n[0]])
+        apart = partner.of(xm) - on_slave(xs)
+        moved = on_slave(xs - xs0) - partner.of(xm - xm0)
+
+        along = slave.X[:, nodes] * shape_derivatives(xi, slave.edges.shape[1])
+        depth = (slave.measure[nodes] * N).sum(axis=-1)
+        weight = length * depth
+        weight *= np.linalg.norm(along.sum(axis=-1), axis=0)
+        hats = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
+        ends = np.stack([edges, edges + 1])
+        count = len(slave.edges) + 1
+
+        def total(values: Array) -> Array:
+            return np.bincount(ends.ravel(), (hats * values).ravel(), count).astype(float)
+
+        def mean(values: Array, where: Array) -> Array:
+            of = total(where)
+            return np.divide(total(where * values), of, out=np.full(count, np.nan), where=of > 0)
+
+        area = total(partner.faces)
+        safe = np.where(area > 0, area, 1.0)
+        pressure, shear = ((hats * (f / safe)[ends]).sum(axis=0) for f in (normal, tangential))
+        force = partner.faces * (-pressure * n + shear * t)
+        true_gap = true.distance(on_slave(xs))
+        return Touching(
+            area=area,
+            gap=mean((apart * n).sum(axis=0), partner.faces),
+            true_gap=mean(true_gap, true.faces),
+            slip=mean((moved * t).sum(axis=0), partner.faces),
+            edge=_edge_lengths(slave),
+            on_slave=_spread(force, nodes, N, len(slave.nodes)),
+            on_master=_spread(-force, partner.nodes, partner.shape, len(master.nodes)),
+        )
+
+
+def _points(
+    slave: Surface, xs: Array, master: Surface, xm: Array
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return edge, place on it and weight of points (n,) that integrate over the slave.
+
+    The edges are cut opposite the master's vertices, where what is integrated has kinks; where
+    the surfaces touch, which is where it matters, it is the same along either's normals.
+    """
+    last = len(master.edges) - 1
+    corners = np.append(np.arange(len(master.edges)), last)
+    ends = np.append(np.full(len(master.edges), -1.0), 1.0)
+    outward = _normals(xm, master, corners, ends)
+    opposite = _Partner(xs, slave, xm[:, master.vertices], outward, np.inf)
+    cut = opposite.faces > 0
+    whole = np.arange(len(slave.edges))
+    owner = np.concatenate([whole, whole, opposite.edge[cut]])
+    place = np.concatenate([np.full(len(whole), -1.0), np.ones(len(whole)), opposite.eta[cut]])
+    order = np.lexsort((place, owner))
+    owner, place = owner[order], place[order]
+    within = owner[1:] == owner[:-1]
+    middle = (place[1:] + place[:-1])[within] / 2
+    half = (place[1:] - place[:-1])[within] / 2
+    xi = (middle[:, None] + half[:, None] * _XI).ravel()
+    return np.repeat(owner[1:][within], len(_XI)), xi, (half[:, None] * _WEIGHT).ravel()
+
+
+def _on(surface: Surface, x: Array) -> Array:
+    return np.asarray(x[:, surface.nodes])
+
+
+def _spread(force: Array, nodes: NDArray[np.int64], shape: Array, count: int) -> Array:
+    """Return nodal forces (count, 2) of point forces (2, n) by shape functions (n, k)."""
+    return np.stack(
+        [np.bincount(nodes.ravel(), (f[:, None] * shape).ravel(), count) for f in force], axis=1
+    )
+
+
+def _edge_lengths(surface: Surface) -> Array:
+    length = np.linalg.norm(np.diff(surface.X[:, surface.vertices]), axis=0)
+    return np.asarray((np.append(length, length[-1]) + np.append(length[0], length)) / 2)
+
+
+def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) -> Array:
+    """Return unit normals (2, n): those of the vertices, one-sided at the ends, interpolated."""
+    tangents = [
+        (x[:, surface.edges] * shape_derivatives(np.array(end), surface.edges.shape[1])).sum(
+            axis=-1
+        )
+        for end in (-1.0, 1.0)
+    ]
+    first, last = (np.stack([t[1], -t[0]]) / np.linalg.norm(t, axis=0) for t in tangents)
+    at = np.hstack([first, last[:, -1:]])
+    at[:, 1:-1] += last[:, :-1]
+    at /= np.linalg.norm(at, axis=0)
+    n = (1 - xi) / 2 * at[:, edges] + (1 + xi) / 2 * at[:, edges + 1]
+    return np.asarray(n / np.linalg.norm(n, axis=0))
+
+
+class _Partner:
+    """The places of a surface that lines through points (2, n) along ``way`` meet from outside.
+
+    Of several the nearest, but none farther behind a point than ``reach`` [mm]. ``faces`` (n,) is 1
+    where there is one, else 0.
+    """
+
+    def __init__(self, x: Array, surface: Surface, points: Array, way: Array, reach: float) -> None:
+        self.way = way
+        corners = x[:, surface.vertices]
+        some = [slice(k, k + _BLOCK) for k in range(0, points.shape[1], _BLOCK)]
+        met = [_met(corners, points[:, at], way[:, at], reach) for at in some]
+        self.edge, start, self.faces = (np.concatenate(part) for part in zip(*met, strict=True))
+        # a line that meets the chord of one edge may meet the curve of the next
+        eta = _foot(x[:, surface.edges[self.edge]], points, way, start)
+        onward = np.where(eta > 1.0, 1, np.where(eta < -1.0, -1, 0))
+        own = np.clip(self.edge + onward, 0, len(surface.edges) - 1)
+        eta = np.where(own != self.edge, -onward.astype(float), eta)
+        self.edge, self.nodes = own, surface.edges[own]
+        self.eta = np.clip(_foot(x[:, self.nodes], points, way, eta), -1.0, 1.0)
+        self.shape = shape_functions(self.eta, self.nodes.shape[1])
+        self.point = self.of(x)
+
+    def of(self, field: Array) -> Array:
+        """Return values (2, n) at the places of a field on the surface's nodes."""
+        return np.asarray((field[:, self.nodes] * self.shape).sum(axis=-1))
+
+    def distance(self, points: Array) -> Array:
+        """Return how far ahead of the points the places are (n,) [mm]."""
+        return np.asarray(((self.point - points) * self.way).sum(axis=0))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[0] * b[1] - a[1] * b[0])
+
+
+def _met(
+    corners: Array, points: Array, way: Array, reach: float
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return which chord (n,) lines meet from outside, where on it, and 1 where there is one."""
+    side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
+    chord = np.diff(corners)
+    beside = _BESIDE * np.linalg.norm(chord, axis=0)
+    first, last = side[:, :-1], side[:, 1:]
+    met = np.minimum(first, last) <= beside
+    met &= np.maximum(first, last) >= -beside
+    met &= _cross(chord[:, None, :], way[:, :, None]) > 0
+    share = first / np.where(first == last, 1.0, first - last)
+    where = corners[:, None, :-1] + share * chord[:, None, :] - points[:, :, None]
+    ahead = (where * way[:, :, None]).sum(axis=0)
+    distance = np.where(met & (ahead > -reach), np.abs(ahead), np.inf)
+    edge = distance.argmin(axis=1)
+    at = np.arange(len(edge)), edge
+    return edge, np.clip(2 * share[at] - 1, -1.0, 1.0), np.isfinite(distance[at]).astype(float)
+
+
+def _foot(xe: Array, points: Array, way: Array, eta: Array) -> Array:
+    """Return where lines meet edges (2, n, k), continued, by Newton's method from ``eta`` (n,)."""
+    count = xe.shape[-1]
+    for _ in range(_NEWTON_STEPS):
+        away = (xe * shape_functions(eta, count)).sum(axis=-1) - points
+        slope = _cross(way, (xe * shape_derivatives(eta, count)).sum(axis=-1))
+        eta = np.clip(eta - _cross(way, away) / np.where(slope == 0, 1.0, slope), -2.0, 2.0)
+    return eta

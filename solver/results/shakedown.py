@@ -1,0 +1,145 @@
+"""What becomes of a body that the same load passes again and again.
+
+============================  ===============================================================
+elastic                       it never yields
+elastic shakedown             it yields at first; residual stress then keeps it elastic
+plastic shakedown             every cycle yields, and plastic strain comes back to where it was
+ratchetting                   every cycle leaves plastic strain behind
+undecided                     the cycles have not become steady
+============================  ===============================================================
+
+The *signed* plastic strain tells a closed cycle from an open one; the accumulated strain tells
+whether there is flow at all. Both are judged by the bounds between which they tend, and decided
+only where the whole of these bounds agrees.
+
+K.L. Johnson, Contact Mechanics (1985), section 9.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+QUIET = 1e-3
+"""Accumulated plastic strain of a cycle, over the yield strain, below which nothing flows."""
+CLOSED = 0.05
+"""Plastic strain left by a cycle over that accumulated in it, up to which the cycle is closed; also
+the part of the largest accumulation up to which that of a depth is not told from interpolation."""
+STEADY = 0.02
+"""Relative change from cycle to cycle, with twice that over the second half of a sequence, up to
+which it has come to its limit."""
+AT_REST = 2e-3
+"""Relative change from cycle to cycle below which what came before does not matter."""
+KEPT = 0.8
+"""Part of its value half-way that a sequence must keep to tend to anything but zero. A decay as
+1 / n^p keeps 1 / 2^p of it, however long it has lasted."""
+SLOWEST = 0.95
+"""Ratio of successive changes above which a sequence tends nowhere yet."""
+KNOWN = 0.1
+"""Distance of the bounds of a limit, over the upper one, up to which their mean is the limit."""
+
+
+class State(IntEnum):
+    """The shakedown state, with the value it is stored as."""
+
+    ELASTIC = 0
+    ELASTIC_SHAKEDOWN = 1
+    PLASTIC_SHAKEDOWN = 2
+    RATCHETTING = 3
+    UNDECIDED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Shakedown:
+    """The state, and the plastic strain a cycle accumulates and leaves in the end (NaN unknown)."""
+
+    state: State
+    accumulated: float
+    net: float
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Bounds of what a sequence of numbers that are not negative tends to."""
+
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, sequence: Array) -> Limit:
+        """Return the limit of a sequence (n,) from its last four values, or three.
+
+        A steady sequence has come to its limit, one that changes geometrically is extrapolated
+        (Aitken's process), one that goes up and down keeps within what it showed, any other one
+        goes on as it does. Two triples of values have each their say. What has fallen too far
+        since half-way may go on to zero.
+        """
+        if len(sequence) < 3:
+            return cls(0.0, np.inf)
+        last, halfway = float(sequence[-1]), float(sequence[len(sequence) // 2 - 1])
+        change = max(abs(last - sequence[-2]), abs(last - halfway) / 2)
+        if change <= STEADY * abs(last):
+            return cls(last, last)
+        triples = [sequence[i - 3 : i] for i in (len(sequence) - 1, len(sequence)) if i > 2]
+        low, high = np.transpose([_tends(*triple) for triple in triples])
+        kept = last >= KEPT * halfway
+        return cls(float(low.min()) if kept else 0.0, float(high.max()))
+
+    @property
+    def value(self) -> float:
+        """The limit where it is known, else NaN."""
+        known = self.high - self.low <= KNOWN * self.high < np.inf
+        return (self.low + self.high) / 2 if known else np.nan
+
+
+def _tends(first: float, second: float, third: float) -> tuple[float, float]:
+    """Return the bounds of the limit that three successive values show."""
+    before, last = second - first, third - second
+    if abs(last) <= AT_REST * abs(third):
+        return third, third
+    if last * before < 0:
+        return min(first, second, third), max(first, second, third)
+    if abs(last) < SLOWEST * abs(before):
+        limit = max(third + last**2 / (before - last), 0.0)
+        return limit, limit
+    return (third, np.inf) if last > 0 else (0.0, third)
+
+
+def classify(
+    accumulated: Array, net: Array, yield_strain: float, *, hardens: bool = False
+) -> Shakedown:
+    """Return the shakedown state from what each cycle did.
+
+    Parameters
+    ----------
+    accumulated : (n_cycles, n_depths) equivalent plastic strain accumulated in a cycle
+    net : (n_cycles, n_depths) equivalent of the signed plastic strain a cycle leaves
+    yield_strain : yield stress / Young's modulus
+    hardens : whether linear hardening bounds plastic strain, so that no cycle can go on leaving
+        some: ratchetting then has not come to its end, however slow it is
+    """
+    if not accumulated.any():
+        return Shakedown(State.ELASTIC, 0.0, 0.0)
+    quiet = QUIET * yield_strain
+    flow = Limit.of(accumulated.max(axis=1))
+    if accumulated[-1].max() <= quiet or flow.high <= quiet:
+        return Shakedown(State.ELASTIC_SHAKEDOWN, 0.0, 0.0)
+    flows = accumulated[-1] > CLOSED * accumulated[-1].max()
+    depth = np.where(flows, net[-1] - CLOSED * accumulated[-1], -np.inf).argmax()
+    net, turnover = net[:, depth], accumulated[:, depth]
+    left = Limit.of(net)
+    opening = Limit.of(np.divide(net, turnover, out=np.zeros_like(net), where=turnover > 0))
+    state = State.UNDECIDED
+    if flow.low > quiet and opening.high <= CLOSED:
+        state = State.PLASTIC_SHAKEDOWN
+    elif left.low > quiet and opening.low > CLOSED and not hardens:
+        state = State.RATCHETTING
+    return Shakedown(state, flow.value, left.value)

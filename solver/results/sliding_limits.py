@@ -1,0 +1,81 @@
+"""Closed forms of a Hertz pressure that slides: its stress, and the loads that shake down.
+
+K.L. Johnson, Contact Mechanics (1985), sections 4.6, 7.1 and 9.2.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_X = np.linspace(-4.0, 4.0, 1601)
+
+
+def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Array, Array]:
+    """Return sigma_x, sigma_y and tau over p0 under a Hertz pressure that slides along +x.
+
+    ``x`` (n,) and ``depth`` are over the half-width; tension is positive, and the shear traction
+    on the half-space is ``friction`` times the pressure along +x (y and depth point down).
+    E. McEwen, Phil. Mag. 40 (1949) 454-459; Johnson, eqs. (4.49), (7.8).
+    """
+    s = 1 - x**2 + depth**2
+    root = np.sqrt(s**2 + 4 * x**2 * depth**2)
+    m = np.sqrt((root + s) / 2)
+    n = np.sign(x) * np.sqrt(np.maximum(root - s, 0.0) / 2)
+    both = np.maximum(m**2 + n**2, np.finfo(float).tiny)
+    along = 2 * depth - m * (1 + (depth**2 + n**2) / both)
+    across = -m * (1 - (depth**2 + n**2) / both)
+    shear = -n * (m**2 - depth**2) / both
+    dragged = n * (2 + (m**2 - depth**2) / both) - 2 * x
+    return along + friction * dragged, across + friction * shear, shear + friction * along
+
+
+def largest_shear(friction: float) -> tuple[float, float]:
+    """Return the largest shear / p0 below a sliding Hertz contact, and its depth / half-width."""
+
+    def least(depth: float) -> float:
+        return -float(np.abs(sliding_contact(_X, depth, friction)[2]).max())
+
+    found = minimize_scalar(least, bounds=(0.05, 1.5), method="bounded")
+    return -float(found.fun), float(found.x)
+
+
+def johnson_limit(friction: float) -> float:
+    """Return p0 / k up to which a sliding Hertz line contact shakes down elastically.
+
+    Residual stress can take away the difference of normal stresses where the shear is largest,
+    but not the shear, which therefore decides: below the surface, or, from a friction of about
+    0.37 on, at it. Johnson, section 9.2 (maximum shear stress criterion).
+    """
+    return 1 / max(largest_shear(friction)[0], friction)
+
+
+def melan_limit(friction: float, poisson_ratio: float) -> float:
+    """Return `johnson_limit` for von Mises' criterion in plane strain.
+
+    At each depth one residual stress (sigma_x, sigma_z) must bring all stresses met there inside
+    the yield surface (Melan). Below the surface both criteria agree; at the surface the stress
+    out of plane, which follows the two others, makes von Mises' limit the lower one.
+    """
+
+    def least(depth: float) -> float:
+        along, across, shear = sliding_contact(_X, depth, friction)
+        out = poisson_ratio * (along + across)
+
+        def largest(residual: Array) -> float:
+            a, b, c = along + residual[0], across, out + residual[1]
+            return float((((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) / 6 + shear**2).max())
+
+        starts = ((0.1, 0.1), (0.5, 0.2))
+        options = {"xatol": 1e-6, "fatol": 1e-9, "maxiter": 4000}
+        return min(float(minimize(largest, start, method="Nelder-Mead", options=options).fun)
+                   for start in starts)  # fmt: skip
+
+    return float(1 / np.sqrt(max(least(0.0), least(largest_shear(friction)[1]))))

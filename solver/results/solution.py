@@ -1,0 +1,120 @@
+"""Solve a model of the user's own: load it, release it, look at what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from solver.contact.pressure import contact_pressure
+from solver.contact.system import System
+from solver.errors import ModelError
+from solver.fem.fields import recovery
+from solver.loading.path import Path
+from solver.loading.stepper import PathControl, Tally
+from solver.results.audit import Audit, audit
+from solver.tensors import to_tensor
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.model.model import Model
+
+Stage = Literal["loaded", "unloaded"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solution:
+    """A model loaded to ``load`` and released.
+
+    Attributes
+    ----------
+    system : the model's parts and interfaces
+    loaded, unloaded : the converged states
+    tally : what it cost
+    """
+
+    system: System
+    load: float
+    loaded: Converged
+    unloaded: Converged
+    tally: Tally
+
+    def _at(self, stage: Stage) -> Converged:
+        if stage not in ("loaded", "unloaded"):
+            raise ModelError("stage", stage, "must be loaded or unloaded")
+        return self.loaded if stage == "loaded" else self.unloaded
+
+    def nodes(self, body: str) -> NDArray[np.float64]:
+        """Return node positions (2, n_nodes) of a body [mm]."""
+        return self.system.full(body).X
+
+    def displacement(self, body: str, stage: Stage = "unloaded") -> NDArray[np.float64]:
+        """Return nodal displacements (2, n_nodes) [mm]."""
+        return self.system.displacement(body, self._at(stage).state).reshape(-1, 2).T
+
+    def stress(self, body: str, stage: Stage = "unloaded") -> NDArray[np.float64]:
+        """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
+
+        Unloaded, this is the residual stress.
+        """
+        points = self.system.response(body, self._at(stage)).stress
+        return to_tensor((recovery(self.system.full(body)) @ points.T).T)
+
+    def plastic_strain(self, body: str) -> NDArray[np.float64]:
+        """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
+        strain = self.system.response(body, self.unloaded).state.accumulated
+        return np.maximum(recovery(self.system.full(body)) @ strain, 0.0)
+
+    def contact(
+        self, pair: int = 0, stage: Stage = "loaded"
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave."""
+        chain = self.system.interfaces[pair].slave_surface
+        pressure, shear = contact_pressure(self.system, self._at(stage).state, pair)
+        return chain.X[:, chain.vertices], pressure, shear
+
+    def audit(self) -> Audit:
+        """Return what this solution proves about itself."""
+        return audit(self.system, self.loaded, self.unloaded, self.tally.dissipation)
+
+
+def solve(
+    model: Model,
+    *,
+    load: float = 1.0,
+    control: PathControl | None = None,
+    linear_solver: str = "auto",
+) -> Solution:
+    """Load a model to a multiple of its pressures, take the bodies apart, and return both states.
+
+    Parameters
+    ----------
+    load : load factor: multiple of the pressures of the model's bodies
+    control : increments and tolerances; twenty increments of loading when absent
+    linear_solver : ``auto``, ``pardiso`` or ``superlu``
+
+    Raises
+    ------
+    ModelError : bad input
+    LimitLoad : the structure has no equilibrium at this load
+    NotConverged : an increment failed although an equilibrium may exist
+    """
+    if not (np.isfinite(load) and load > 0):
+        raise ModelError("load", load, "must be positive and finite")
+    system = System(model, linear_solver)
+    path = Path(system, control or PathControl(load_step=load / 20))
+    (branch,) = path.branches([load])
+    if branch.error is not None:
+        raise branch.error
+    assert branch.loaded is not None
+    assert branch.unloaded is not None
+    return Solution(
+        system=system,
+        load=load,
+        loaded=branch.loaded,
+        unloaded=branch.unloaded,
+        tally=branch.tally,
+    )

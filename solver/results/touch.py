@@ -1,0 +1,112 @@
+"""What acts between the bodies of a scene: in contact, or as prescribed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from solver.contact.pressure import contact_pressure
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.model.motion import TravellingPressure
+
+    Array = NDArray[np.float64]
+
+
+class Touch(Protocol):
+    """What acts on the lower body, whose surface runs along x."""
+
+    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+        """Return pressure, shear along +x [MPa] and gap [mm] at positions x (n,).
+
+        NaN beyond the surface, and for a gap there is not: bodies taken apart have none to speak
+        of, a prescribed pressure has none.
+        """
+
+    def extent(self, converged: Converged) -> tuple[float, float]:
+        """Return the half-width of the contact [mm] and the peak pressure [MPa]."""
+
+    def force(self, converged: Converged) -> float:
+        """Return the tangential force along +x [N]."""
+
+
+class Contact:
+    """The first interface of a system.
+
+    In every scene the lower body's +x is the opposite of the slave's own tangent.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._interface = system.interfaces[0]
+        chain = self._interface.slave_surface
+        self._x = chain.X[0, chain.vertices]
+
+    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+        """See `Touch`."""
+        state, order = converged.state, np.argsort(self._x)
+        pressure, shear = contact_pressure(self._system, state, 0)
+        gap = self._interface.pairing(state.u).gap
+        if not state.contacts[0].normal.any():
+            gap = np.full_like(gap, np.nan)
+
+        def sampled(values: Array, beyond: Array) -> Array:
+            left, right = beyond
+            found = np.interp(x, self._x[order], values[order], left=left, right=right)
+            return np.asarray(found)
+
+        # contact does not go on where the surface of the pair ends and that of the body does not
+        free = np.where(self._interface.slave_surface.goes_on, 0.0, np.nan)
+        free = free if self._x[0] < self._x[-1] else free[::-1]
+        nowhere = np.full(2, np.nan)
+        return sampled(pressure, free), sampled(-shear, free), sampled(gap, nowhere)
+
+    def extent(self, converged: Converged) -> tuple[float, float]:
+        """See `Touch`."""
+        pressure, _ = contact_pressure(self._system, converged.state, 0)
+        x = self._x[converged.state.contacts[0].normal > 0]
+        symmetric = self._x.min() == 0
+        width = float(x.max() if symmetric else np.ptp(x) / 2) if len(x) else 0.0
+        return width, float(pressure.max())
+
+    def force(self, converged: Converged) -> float:
+        """See `Touch`."""
+        return -float(converged.state.contacts[0].tangential.sum())
+
+
+class Prescribed:
+    """A travelling pressure over a surface that repeats itself after ``period``, if not 0."""
+
+    def __init__(self, travelling: TravellingPressure, period: float) -> None:
+        self._travelling = travelling
+        self._period = period
+
+    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+        """See `Touch`."""
+        pressure, ratio = self._travelling.at(converged.state.load, x, self._period)
+        return pressure, ratio * pressure, np.full_like(x, np.nan)
+
+    def extent(self, converged: Converged) -> tuple[float, float]:
+        """See `Touch`."""
+        share, _, _ = self._travelling.now(converged.state.load)
+        return self._travelling.half_width, share * self._travelling.peak
+
+    def force(self, converged: Converged) -> float:
+        """See `Touch`."""
+        _, _, ratio = self._travelling.now(converged.state.load)
+        width, peak = self.extent(converged)
+        return np.pi / 2 * width * peak * ratio
+
+
+def touch_of(system: System) -> Touch:
+    """Return what acts between the bodies of a system, or on its only one."""
+    if system.interfaces:
+        return Contact(system)
+    (body,) = system.model.bodies
+    assert body.travelling is not None
+    return Prescribed(body.travelling, system.full(body.name).period)

@@ -1,0 +1,115 @@
+"""The command ``residua``: its arguments and exit status."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from studies.command import commands
+from studies.command.commands import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
+from studies.errors import GridLost, StoreBusy, StudyError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status.
+
+    0: all went well. 1: not all runs are ok: some failed, or something kept them from being
+    computed, such as another process in the directory. 2: bad input. 130: interrupted.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        return options.command(options)
+    except StudyError as error:
+        return complain(error, BAD_INPUT)
+    except (StoreBusy, GridLost) as error:
+        return complain(error, FAILED)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output has left; say no more
+        return OK
+    except OSError as error:
+        return complain(error, FAILED)
+
+
+def _integer(least: int, most: int) -> Callable[[str], int]:
+    def checked(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= most:
+            allowed = f"must be an integer >= {least} and <= {most}"
+            raise argparse.ArgumentTypeError(f"{text!r}: {allowed}")
+        return int(text)
+
+    return checked
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="residua", description="Residual stress after elastic-plastic contact."
+    )
+    known = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(name: str, command: Any, **defaults: Any) -> argparse.ArgumentParser:
+        text = defaults.get("talk", command).__doc__
+        one = known.add_parser(name, help=text, description=text)
+        one.set_defaults(command=command, **defaults)
+        return one
+
+    one = add("run", commands.run)
+    one.add_argument("study", type=Path, metavar="STUDY.toml")
+    one.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
+    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one a core)")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    one.add_argument("--resume", action="store_true", help="do not try failed runs again")
+
+    one = add("scenes", commands.scenes)
+    one.add_argument("name", nargs="?")
+
+    one = add("show", commands.show)
+    one.add_argument("path", type=Path, metavar="DIR|RUN")
+
+    one = add("plot", commands.plot)
+    one.add_argument("path", type=Path, metavar="RUN|DIR")
+    one.add_argument(
+        "--select", nargs="+", default=[], metavar="NAME=VALUE",
+        help="of the sweep, or of the field's own dimensions, such as pass=2",
+    )  # fmt: skip
+    one.add_argument("--field", default="residual_stress")
+    one.add_argument("--component")
+    one.add_argument(
+        "--zoom", type=float, metavar="MM",
+        help="only this close to the contact's centre, or to its edge where half of the bodies "
+        "was computed",
+    )  # fmt: skip
+    one.add_argument("--out", type=Path, required=True, metavar="PNG")
+
+    one = add("compare", commands.compare)
+    one.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="data set, study or DIR")
+    one.add_argument("--reference", type=Path, metavar="CSV", help="published numbers of your own")
+    one.add_argument("--select", nargs="+", default=[], metavar="NAME=VALUE")
+    one.add_argument("--out", type=Path, metavar="PNG", help="draw profiles and published numbers")
+    one.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
+
+    one = add("serve", commands.serve)
+    one.add_argument("--host", default="127.0.0.1")
+    one.add_argument("--port", type=_integer(0, 65535), default=8000)
+    one.add_argument("--data", type=Path, default=Path("out"), metavar="DIR")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+
+    for talk in (commands.submit, commands.status, commands.cancel, commands.fetch):
+        name = talk.__name__
+        one = add(name, commands.remote, talk=talk)
+        one.add_argument("--url", default="http://127.0.0.1:8000")
+        if name == "submit":
+            one.add_argument("study", type=Path, metavar="STUDY.toml")
+        else:
+            one.add_argument("id")
+        if name == "fetch":
+            one.add_argument("--out", type=Path, metavar="FILE")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

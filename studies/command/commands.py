@@ -1,0 +1,246 @@
+"""What the command ``residua`` does: one function a subcommand, each returning an exit status."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from studies.definition.study import Study
+from studies.errors import StudyError
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+SHOWN = 100
+"""Most runs that `run` prints; `show` prints all."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute a study, print its runs and draw one of them."""
+    from studies.command.progress import Progress
+    from studies.execution.run import run_study
+    from studies.storage.store import Store
+    from studies.views.reading import open_study
+    from studies.views.tables import messages, runs_table
+
+    study = Study.from_toml(options.study)
+    progress = Progress(study)
+    with _interruption() as interrupted:
+        outcome = run_study(
+            study,
+            Store(options.out),
+            workers=options.workers,
+            scheduler=options.scheduler,
+            resume=options.resume,
+            on_event=progress,
+            should_stop=lambda: bool(interrupted),
+        )
+    progress.close()
+    with open_study(outcome.dataset) as dataset:
+        if study.size <= SHOWN:
+            print(runs_table(dataset))
+        print(messages(dataset), end="")
+        warned = _warned(dataset)
+        picture = _picture(dataset, outcome.dataset.with_name("residual_stress_xx.png"))
+    counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
+    computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
+    print(f"\n{study.name}: {study.size} runs ({counts}{warned}), {computed}")
+    for written in (outcome.dataset, *picture):
+        print(f"wrote {written}")
+    if outcome.stopped:
+        return INTERRUPTED
+    return OK if outcome.ok else FAILED
+
+
+def scenes(options: argparse.Namespace) -> int:
+    """List the scenes, or the parameters of one."""
+    from studies.views.tables import scene_table, scenes_table
+
+    print(scene_table(options.name) if options.name else scenes_table())
+    return OK
+
+
+def show(options: argparse.Namespace) -> int:
+    """Print what is known of a run, a study or all studies of a directory."""
+    from studies.views.reading import begun_studies, find_datasets, open_netcdf, present_datasets
+    from studies.views.tables import messages, run_details, runs_table
+
+    begun = begun_studies(options.path)
+    for path in (present_datasets if begun else find_datasets)(options.path):
+        with open_netcdf(path) as dataset:
+            print(f"{dataset.attrs['title']}  ({path})\n")
+            if dataset["status"].size == 1:
+                print(run_details(dataset), end="\n\n")
+            else:
+                print(runs_table(dataset), messages(dataset), sep="\n")
+    for line in begun:
+        print(line)
+    return OK
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a field of one run, or one value a run over the sweep."""
+    from studies.views.plots.picture import picture
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        drawn = picture(dataset, options.field, options.component, options.zoom, selection)
+        _save(drawn, options.out)
+    print(f"wrote {options.out}")
+    return OK
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Set computed residual stress beside published numbers."""
+    from studies.views.comparison.compare import compare as compared_with
+    from studies.views.comparison.plot import comparison_figure
+    from studies.views.comparison.profiles import read_profiles
+    from studies.views.comparison.reference import published_cases, read_reference, reference_of
+    from studies.views.comparison.table import comparison_table, write_comparisons
+
+    computed = read_profiles(options.paths, _selection(options.select))
+    published = read_reference(options.reference or reference_of(computed.scene))
+    cases = {} if options.reference else published_cases(computed.scene)
+    compared, absent = compared_with(computed, published)
+    if options.csv:
+        with _written("--csv", options.csv) as part:
+            write_comparisons(part, computed, compared)
+    if options.out:
+        _save(comparison_figure(computed, published), options.out)
+    print(comparison_table(computed, compared, absent, cases))
+    for written in filter(None, (options.out, options.csv)):
+        print(f"wrote {written}")
+    return OK
+
+
+def serve(options: argparse.Namespace) -> int:
+    """Start the HTTP service."""
+    # By name, since studies must work where the service is not installed.
+    service: Any = importlib.import_module("service.app")
+    service.serve(options.host, options.port, options.data, options.scheduler)
+    return OK
+
+
+def remote(options: argparse.Namespace) -> int:
+    """Talk to a running service."""
+    import httpx
+
+    from studies.command.client import Refused, Service
+
+    try:
+        service = Service(options.url)
+        print(options.talk(service, options))
+    except Refused as error:
+        return complain(error, BAD_INPUT)
+    except (httpx.HTTPError, httpx.InvalidURL) as error:
+        return complain(f"{options.url}: {error}", FAILED)
+    return OK
+
+
+def submit(service: Any, options: argparse.Namespace) -> str:
+    """Send a study to a running service and print its id."""
+    return str(service.submit(options.study)["id"])
+
+
+def status(service: Any, options: argparse.Namespace) -> str:
+    """Print the state of a study on a running service."""
+    state = service.status(options.id)
+    return f"{state['status']}  {state['progress']:g} %"
+
+
+def cancel(service: Any, options: argparse.Namespace) -> str:
+    """Stop a study on a running service."""
+    service.cancel(options.id)
+    return f"cancelled {options.id}"
+
+
+def fetch(service: Any, options: argparse.Namespace) -> str:
+    """Save the data set of a study on a running service."""
+    target = options.out or Path(f"{options.id}.nc")
+    service.fetch(options.id, target)
+    return f"wrote {target}"
+
+
+@contextmanager
+def _interruption() -> Iterator[list[int]]:
+    """Give a list that is empty until Ctrl-C; a second Ctrl-C does not wait."""
+    received: list[int] = []
+
+    def receive(number: int, frame: object) -> None:
+        if received:
+            raise KeyboardInterrupt
+        received.append(number)
+        print("\nstopping; what is finished is kept", file=sys.stderr)
+
+    before = signal.signal(signal.SIGINT, receive)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _warned(dataset: Any) -> str:
+    """Return how many runs succeeded with a warning, which their details show."""
+    from studies.definition.vocabulary import STATUSES
+
+    warned = (dataset["status"] == STATUSES.index("ok")) & (dataset["message"] != "")
+    return f"; {int(warned.sum())} with a warning" if warned.any() else ""
+
+
+def _picture(dataset: Any, path: Path) -> list[Path]:
+    """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
+    from studies.views.plots.maps import map_figure
+    from studies.views.reading import one_run
+
+    try:
+        drawn = map_figure(one_run(dataset), "residual_stress", "xx")
+    except StudyError:
+        return []
+    _save(drawn, path)
+    return [path]
+
+
+def _save(drawn: Any, path: Path) -> None:
+    """Write a figure in the format that the name of the file asks for."""
+    kinds = drawn.canvas.get_supported_filetypes()
+    kind = path.suffix.removeprefix(".").lower() or "png"
+    if kind not in kinds:
+        raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
+    with _written("--out", path) as part:
+        drawn.savefig(part, format=kind)
+
+
+@contextmanager
+def _written(option: str, path: Path) -> Iterator[Path]:
+    """Give a path to write to, for the file that an option names."""
+    from studies.storage.store import appearing
+
+    try:
+        with appearing(path) as part:
+            yield part
+    except OSError as error:
+        raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
+
+
+def _selection(texts: Sequence[str]) -> dict[str, str]:
+    """Return what ``--select`` asks for, each name once."""
+    chosen: dict[str, str] = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign:
+            raise StudyError("--select", text, "must be NAME=VALUE")
+        if name in chosen:
+            raise StudyError("--select", text, f"{name} is selected already, as {chosen[name]}")
+        chosen[name] = value
+    return chosen
+
+
+def complain(reason: object, status: int) -> int:
+    """Say why a command ends, and return its exit status."""
+    print(f"residua: {reason}", file=sys.stderr)
+    return status

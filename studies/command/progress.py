@@ -1,0 +1,83 @@
+"""How far a study is, on the terminal or in a log."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TextIO
+
+from studies.definition.design import Case
+from studies.definition.study import Study
+from studies.definition.vocabulary import OK
+from studies.execution.run import StudyEvent
+
+_WIDTH = 28
+_REDRAW = 0.1
+"""Seconds between two drawings of the bar."""
+
+
+class Progress:
+    """A bar on one line of a terminal; elsewhere a plain line for each run.
+
+    Parameters
+    ----------
+    study : names the runs by their place in the sweep
+    stream : where to write; standard error by default
+    """
+
+    def __init__(self, study: Study, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
+        self._bar = self._stream.isatty()
+        self._names = {case.id: _place(study, case) for case in study.cases()}
+        self._started = time.monotonic()
+        self._begun: float | None = None
+        self._progress = 0.0
+        self._drawn = 0.0
+        self._seen = 0
+        self._failed = 0
+
+    def __call__(self, event: StudyEvent) -> None:
+        """Take in an event."""
+        if self._begun is None:
+            self._begun = event.progress
+        if event.kind == "run":
+            self._seen += 1
+            self._failed += event.status != OK
+            if not self._bar:
+                reason = f": {event.message}" if event.status != OK else ""
+                line = f"{100 * event.progress:3.0f} %  {event.status}  {self._names[event.run]}"
+                print(line + reason, file=self._stream, flush=True)
+        now = time.monotonic()
+        self._progress = event.progress
+        if self._bar and now - self._drawn > _REDRAW:
+            self._drawn = now
+            self._draw()
+
+    def close(self) -> None:
+        """Draw the bar a last time and leave its line."""
+        if self._bar and self._begun is not None:
+            self._draw()
+            print(file=self._stream)
+
+    def _draw(self) -> None:
+        progress = self._progress
+        filled = round(_WIDTH * progress)
+        failed = f", {self._failed} failed" if self._failed else ""
+        bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
+        text = (
+            f"{bar} {100 * progress:3.0f} %  {self._seen} runs{failed}{self._remaining(progress)}"
+        )
+        print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)
+
+    def _remaining(self, progress: float) -> str:
+        """Return the time left, at the pace so far."""
+        gained = progress - (self._begun or 0.0)
+        if gained <= 0.02 or progress >= 1.0:
+            return ""
+        seconds = (time.monotonic() - self._started) * (1.0 - progress) / gained
+        return f"  {int(seconds // 60)}:{int(seconds % 60):02d} left"
+
+
+def _place(study: Study, case: Case) -> str:
+    place = study.place(case).items()
+    return ", ".join(f"{name} = {value}" for name, value in place) or study.name

@@ -1,0 +1,87 @@
+"""A sweep expanded: cases (one run each) and paths (one task each)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from solver import errors as solver_errors
+from solver.scenes import Scene
+from studies.definition.identity import content_id
+from studies.definition.parameters import build, parameters_of
+from studies.errors import StudyError
+
+USUAL_AXES = ("load_ratio", "friction", "hardening")
+"""Parameters that every data set carries as dimensions, of size one where they are not swept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One run: what to compute, under which name, and where it lies in the sweep.
+
+    Attributes
+    ----------
+    id : content id of the run, the same in every study
+    parameters : the scene's parameter object
+    values : all parameters by name, as JSON holds them
+    index : position on each axis of the study
+    """
+
+    id: str
+    parameters: Any
+    values: Mapping[str, Any]
+    index: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Cases that share one loading path, in increasing order of the scene's branch parameter."""
+
+    id: str
+    parameters: Any
+    cases: tuple[Case, ...]
+
+
+def cases(
+    scene: Scene, fixed: Mapping[str, Any], axes: Mapping[str, Sequence[Any]]
+) -> Iterator[Case]:
+    """Yield every point of the sweep, the last axis running fastest.
+
+    Raises
+    ------
+    StudyError
+        when the scene refuses a combination of parameters
+    """
+    defaults = {name: known.default for name, known in parameters_of(scene).items()}
+    positions = [range(len(values)) for values in axes.values()]
+    for index in itertools.product(*positions):
+        point = {name: values[i] for (name, values), i in zip(axes.items(), index, strict=True)}
+        given = {**defaults, **fixed, **point}
+        try:
+            parameters = build(scene, given)
+        except solver_errors.ModelError as error:
+            raise _located(error, point, dict(zip(axes, index, strict=True))) from error
+        yield Case(content_id("run", scene.name, given), parameters, given, index)
+
+
+def paths(scene: Scene, points: Iterator[Case]) -> list[Path]:
+    """Group `points` that differ in nothing but the branch parameter of the scene."""
+    groups: dict[str, list[Case]] = {}
+    for case in points:
+        shared = {name: value for name, value in case.values.items() if name != scene.branch}
+        groups.setdefault(content_id("path", scene.name, shared), []).append(case)
+    return [
+        Path(key, group[0].parameters, tuple(sorted(group, key=lambda c: c.values[scene.branch])))
+        for key, group in groups.items()
+    ]
+
+
+def _located(
+    error: solver_errors.ModelError, point: Mapping[str, Any], index: Mapping[str, int]
+) -> StudyError:
+    where = f"sweep.{error.field}[{index[error.field]}]" if error.field in index else ""
+    at = ", ".join(f"{name} = {value}" for name, value in point.items())
+    allowed = f"{error.allowed} (at {at})" if at else error.allowed
+    return StudyError(where or f"parameters.{error.field}", error.value, allowed)

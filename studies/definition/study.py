@@ -1,0 +1,152 @@
+"""A study: one scene, some fixed parameters, some swept ones; checked before anything runs."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from solver.scenes import SCENES
+from studies.definition import design
+from studies.definition.identity import content_id
+from studies.definition.parameters import one_of, parameters_of, scene_named
+from studies.definition.sweep import (
+    Axes,
+    checked_axes,
+    checked_table,
+    checked_text,
+    expanded,
+    linked_values,
+    owners,
+)
+from studies.errors import StudyError
+
+
+class Study(BaseModel):
+    """One scene swept over some of its parameters.
+
+    Build it with `from_toml` or `from_dict`, which raise `StudyError` for bad input.
+
+    Attributes
+    ----------
+    name : 1 to 80 of ``A-Z a-z 0-9 . _ -``, not beginning with a dot
+    scene : name of the scene
+    parameters : fixed parameters; the rest are the scene's defaults
+    sweep : axes: lists of values by parameter, and linked axes, which have names of their own
+        and set several parameters by label; see `checked_axes` for their order
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    scene: str
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    sweep: Axes = Field(default_factory=dict)
+
+    @classmethod
+    def from_toml(cls, path: FilePath | str) -> Self:
+        """Read a study file."""
+        try:
+            text = FilePath(path).read_text(encoding="utf-8")
+            content = tomllib.loads(text)
+        except OSError as error:
+            raise StudyError("file", str(path), f"cannot be read: {error.strerror}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise StudyError("file", str(path), f"must be valid TOML: {error}") from None
+        return cls.from_dict(content)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """Check and normalise the content of a study file (or of its JSON equivalent)."""
+        if not isinstance(content, Mapping):
+            raise StudyError("study", content, "must be a table with name, scene and sweep")
+        try:
+            return cls.model_validate(dict(content))
+        except ValidationError as error:
+            first = error.errors()[0]
+            cause = first.get("ctx", {}).get("error")
+            if isinstance(cause, StudyError):
+                raise cause from None
+            field = ".".join(str(part) for part in first["loc"])
+            raise StudyError(field, first["input"], first["msg"]) from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check(cls, content: dict[str, Any]) -> dict[str, Any]:
+        for key in content:
+            if key not in cls.model_fields:
+                raise StudyError(str(key), content[key], one_of(key, cls.model_fields))
+        scene = scene_named(content.get("scene"))
+        known = parameters_of(scene)
+        fixed = checked_table("parameters", content.get("parameters", {}), known)
+        axes = checked_axes(content.get("sweep", {}), known)
+        for parameter, axis in owners(axes).items():
+            if parameter in fixed:
+                allowed = f"is swept too, by sweep.{axis}: keep one"
+                raise StudyError(f"parameters.{parameter}", fixed[parameter], allowed)
+        name = checked_text("name", content.get("name"))
+        parameters = {
+            key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
+        }
+        for _ in expanded(scene, parameters, axes):
+            pass  # building a case is how the scene checks combinations of parameters
+        return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": axes}
+
+    @cached_property
+    def id(self) -> str:
+        """Content id of the study.
+
+        The name counts, because it is the title of what the study writes: a copy under
+        another name is another data set. That costs nothing, since the two share every run.
+        The order of values counts, and so does that of labels.
+        """
+        axes = {
+            name: list(axis.items()) if isinstance(axis, dict) else axis
+            for name, axis in self.sweep.items()
+        }
+        return content_id("study", self.name, self.scene, self.fixed, axes)
+
+    @property
+    def fixed(self) -> dict[str, Any]:
+        """All parameters that are not swept, the scene's defaults included."""
+        known = parameters_of(SCENES[self.scene])
+        swept = owners(self.sweep)
+        defaults = {name: p.default for name, p in known.items() if name not in swept}
+        return defaults | self.parameters
+
+    @cached_property
+    def axes(self) -> dict[str, list[Any]]:
+        """Values on each axis, labels on a linked one, in the order of `Case.index`."""
+        return {name: list(axis) for name, axis in self.sweep.items()}
+
+    @property
+    def linked(self) -> dict[str, tuple[str, list[Any]]]:
+        """Parameters that linked axes set: the axis, and the values over its labels."""
+        return linked_values(self.sweep)
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return math.prod(len(axis) for axis in self.sweep.values())
+
+    def cases(self) -> Iterator[design.Case]:
+        """Yield the runs of the study."""
+        return expanded(SCENES[self.scene], self.parameters, self.sweep)
+
+    def place(self, case: design.Case) -> dict[str, Any]:
+        """Return the value, or the label, of a run of the study on each axis."""
+        pairs = zip(self.axes.items(), case.index, strict=True)
+        return {name: values[position] for (name, values), position in pairs}
+
+    def paths(self) -> list[design.Path]:
+        """Return the loading paths of the study: the cases that one task computes together."""
+        return design.paths(SCENES[self.scene], self.cases())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `from_dict` reads."""
+        return self.model_dump()

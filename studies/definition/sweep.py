@@ -1,0 +1,207 @@
+"""The sweep of a study: axes of one parameter, and linked axes, which move several together.
+
+An axis that is a list holds the values of the parameter it is named after. An axis that is a
+table has a name of its own; it holds labels, and the parameters each label sets. For each
+combination of labels the study is a sweep of lists, with what the labels set fixed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from solver.results.quantities import QUANTITIES
+from solver.scenes import Scene
+from studies.definition import design
+from studies.definition.identity import canonical
+from studies.definition.parameters import Parameter, nearest
+from studies.errors import StudyError
+
+MAXIMUM_RUNS = 100_000
+"""Largest number of points a sweep may have."""
+
+LinkedAxis = dict[str, dict[str, Any]]
+"""Label -> values of the parameters that the axis sets: the same ones for every label."""
+
+Axes = dict[str, list[Any] | LinkedAxis]
+
+_TEXT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
+_AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,79}")
+
+
+def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
+    """Return the axes of a sweep, normalised.
+
+    Linked axes come first, by name; then the others, in the order in which the scene declares its
+    parameters. The values and labels of an axis stay in the order given. What a label leaves out
+    and another one sets has the scene's default.
+
+    Raises
+    ------
+    StudyError
+        for anything wrong but combinations of parameters, which building a case checks
+    """
+    if not isinstance(content, Mapping):
+        raise StudyError("sweep", content, "must be a table of axes")
+    tables = {name: axis for name, axis in content.items() if isinstance(axis, Mapping)}
+    lists = checked_table(
+        "sweep", {name: axis for name, axis in content.items() if name not in tables}, known
+    )
+    _check_size(content)
+    linked = {name: _linked_axis(name, tables[name], known) for name in sorted(tables, key=str)}
+    axes: Axes = linked | {key: _axis(known[key], lists[key]) for key in known if key in lists}
+    first: dict[str, str] = {}
+    for parameter, axis in _settings(axes):
+        if first.setdefault(parameter, axis) != axis:
+            allowed = f"sets {parameter}, as sweep.{first[parameter]} does: keep one"
+            raise StudyError(f"sweep.{axis}", content[axis], allowed)
+    return axes
+
+
+def checked_table(field: str, content: Any, known: Mapping[str, Parameter]) -> dict[str, Any]:
+    """Return a table whose keys are parameters of the scene, its values unchecked."""
+    if not isinstance(content, Mapping):
+        raise StudyError(field, content, "must be a table of parameters")
+    for name, value in content.items():
+        if name not in known:
+            allowed = f"the scene has no such parameter; it has {', '.join(known)}"
+            raise StudyError(f"{field}.{name}", value, allowed + nearest(name, known))
+    return dict(content)
+
+
+def checked_text(field: str, text: Any) -> str:
+    """Return the name of a study or a label, if it is plain enough for files and command lines."""
+    if isinstance(text, str) and _TEXT.fullmatch(text):
+        return text
+    raise StudyError(field, text, "must be 1 to 80 of A-Z a-z 0-9 . _ -, not beginning with a dot")
+
+
+def owners(axes: Axes) -> dict[str, str]:
+    """Return, for each parameter that is swept, the axis that sets it."""
+    return dict(_settings(axes))
+
+
+def linked_values(axes: Axes) -> dict[str, tuple[str, list[Any]]]:
+    """Return, for each parameter set by a linked axis, that axis and the values over its labels."""
+    return {
+        parameter: (axis, [settings[parameter] for settings in labels.values()])
+        for axis, labels in axes.items()
+        if isinstance(labels, dict)
+        for parameter in _set_by(axis, labels)
+    }
+
+
+def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[design.Case]:
+    """Yield every point of the sweep, the last axis running fastest.
+
+    Raises
+    ------
+    StudyError
+        when the scene refuses a combination of parameters
+    """
+    linked = {name: axis for name, axis in axes.items() if isinstance(axis, dict)}
+    lists = {name: axis for name, axis in axes.items() if isinstance(axis, list)}
+    for point in itertools.product(*(enumerate(axis.items()) for axis in linked.values())):
+        index = tuple(position for position, _ in point)
+        labels = dict(zip(linked, (label for _, (label, _) in point), strict=True))
+        given = dict(fixed)
+        for _, (_, settings) in point:
+            given |= settings
+        try:
+            for case in design.cases(scene, given, lists):
+                yield replace(case, index=(*index, *case.index))
+        except StudyError as error:
+            raise _located(error, linked, labels) from error
+
+
+def _settings(axes: Axes) -> Iterator[tuple[str, str]]:
+    """Yield each parameter of each axis, and the axis."""
+    for name, axis in axes.items():
+        for parameter in _set_by(name, axis):
+            yield parameter, name
+
+
+def _set_by(name: str, axis: list[Any] | LinkedAxis) -> list[str]:
+    return list(next(iter(axis.values()))) if isinstance(axis, dict) else [name]
+
+
+def _check_size(axes: Mapping[str, Any]) -> None:
+    for name, axis in axes.items():
+        if not isinstance(axis, list | tuple | Mapping) or not axis:
+            allowed = "must be a list of one value or more, or a table of one label or more"
+            raise StudyError(f"sweep.{name}", axis, allowed)
+    runs = math.prod(len(axis) for axis in axes.values())
+    if runs > MAXIMUM_RUNS:
+        sizes = " x ".join(f"{len(axis)} {name}" for name, axis in axes.items())
+        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({sizes})")
+
+
+def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
+    seen: dict[str, int] = {}
+    axis = []
+    for position, value in enumerate(values):
+        field = f"sweep.{parameter.name}[{position}]"
+        normal = parameter.normalise(value, field)
+        first = seen.setdefault(canonical(normal), position)
+        if first != position:
+            raise StudyError(field, value, f"occurs already at position {first}: keep one")
+        axis.append(normal)
+    return axis
+
+
+def _linked_axis(
+    name: str, content: Mapping[str, Any], known: Mapping[str, Parameter]
+) -> LinkedAxis:
+    _check_name(name, content, known)
+    given: LinkedAxis = {}
+    for label, settings in content.items():
+        field = f"sweep.{name}.{checked_text(f'sweep.{name}', label)}"
+        given[label] = {
+            key: known[key].normalise(value, f"{field}.{key}")
+            for key, value in checked_table(field, settings, known).items()
+        }
+    together = [key for key in known if any(key in settings for settings in given.values())]
+    axis: LinkedAxis = {}
+    seen: dict[str, str] = {}
+    for label, settings in given.items():
+        axis[label] = {key: settings.get(key, known[key].default) for key in together}
+        first = seen.setdefault(canonical(axis[label]), label)
+        if first != label:
+            allowed = f"sets the same parameters as {first}: keep one"
+            raise StudyError(f"sweep.{name}.{label}", content[label], allowed)
+    return axis
+
+
+def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:
+    """Refuse the name of a linked axis that is not free to become a dimension of the data set."""
+    from studies.definition.vocabulary import LABEL_ATTRIBUTES
+
+    if name in known:
+        allowed = "must be a list of values: a table is an axis with a name of its own"
+    elif name in QUANTITIES or name in LABEL_ATTRIBUTES:
+        allowed = "the data set has a variable of this name: give the axis another one"
+    elif not isinstance(name, str) or not _AXIS.fullmatch(name):
+        allowed = "the name must be 1 to 80 of A-Z a-z 0-9 _, beginning with a letter"
+    else:
+        return
+    raise StudyError(f"sweep.{name}", content, allowed)
+
+
+def _located(
+    error: StudyError, linked: Mapping[str, LinkedAxis], labels: Mapping[str, str]
+) -> StudyError:
+    """Return the error of a case, naming the label it arises with, and the label's own value."""
+    if not labels:
+        return error
+    parameter = error.field.removeprefix("parameters.")
+    fields = (
+        f"sweep.{axis}.{label}.{parameter}"
+        for axis, label in labels.items()
+        if parameter in linked[axis][label]
+    )
+    where = ", ".join(f"{axis} = {label}" for axis, label in labels.items())
+    return StudyError(next(fields, error.field), error.value, f"{error.allowed}, where {where}")

@@ -1,0 +1,95 @@
+"""What a worker does: walk one loading path, and write each run as soon as it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from solver.results.record import Record
+from solver.scenes import Scene
+from studies.definition.design import Case, Path
+from studies.definition.identity import solver_hash
+from studies.storage import dataset as layout
+from studies.storage.store import Store
+
+NO_RECORD = "the path ended without a record of this run"
+
+
+@dataclass(frozen=True, slots=True)
+class PathTask:
+    """A path to walk, or what is left of it, and where its runs go.
+
+    ``source`` is the solver the caller has; a worker with another one refuses the task.
+    """
+
+    scene: Scene
+    path: Path
+    directory: FilePath
+    source: str
+
+
+class Stopped(Exception):
+    """Raised inside a path to leave it, because the study was asked to stop."""
+
+
+def walk(
+    task: PathTask, report: Callable[[dict[str, Any]], None], stopped: Callable[[], bool]
+) -> list[dict[str, Any]]:
+    """Compute the runs of a path, and return their catalogue rows.
+
+    A run that is already there is left alone: a worker that took the path over from a dead one
+    continues where that stopped. When the path raises, the runs it still owed are
+    written as broken, with the reason; a record that cannot be written breaks its own run only.
+    """
+    if task.source != solver_hash():
+        raise RuntimeError(
+            "the worker has another version of the solver than the caller; restart both"
+        )
+    store = Store(task.directory)
+    rows: list[dict[str, Any]] = []
+
+    def keep(row: dict[str, Any]) -> None:
+        rows.append(row)
+        report({"path": task.path.id, "row": row})
+
+    def monitor(fraction: float) -> None:
+        report({"path": task.path.id, "fraction": float(fraction)})
+        if stopped():
+            raise Stopped
+
+    owed: dict[Any, Case] = {}
+    for case in task.path.cases:
+        if store.run_path(case.id).exists():
+            keep(store.read_row(case.id))
+        else:
+            owed[case.values[task.scene.branch]] = case
+    reason = NO_RECORD
+    try:
+        if owed:
+            monitor(0.0)
+            for record in task.scene.path(task.path.parameters, list(owed), monitor):
+                value = getattr(record.parameters, task.scene.branch)
+                row = _written(store, task.scene, owed[value], record)
+                del owed[value]
+                keep(row)
+    except Stopped:
+        return rows
+    except Exception as error:
+        reason = _reason(error)
+    for case in owed.values():
+        keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
+    return rows
+
+
+def _written(store: Store, scene: Scene, case: Case, record: Record) -> dict[str, Any]:
+    """Write the run a record tells of, as broken when the record cannot be written."""
+    try:
+        return store.write_run(layout.run_dataset(scene, case, record))
+    except Exception as error:
+        return store.write_run(layout.broken_dataset(scene, case, _reason(error)))
+
+
+def _reason(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

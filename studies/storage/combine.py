@@ -1,0 +1,247 @@
+"""The runs of a study laid side by side in one data set, written run by run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+
+from solver.scenes import SCENES, Scene
+from studies.definition.design import Case
+from studies.definition.parameters import parameters_of
+from studies.definition.study import Study
+from studies.definition.vocabulary import MISSING, STATUSES
+from studies.storage import dataset as layout
+from studies.storage.store import Store, appearing
+
+SAME = 1e-9
+"""Relative difference below which two runs are taken to have the same grid."""
+
+
+def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
+    """Write the combined data set of `study` and return its path.
+
+    Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is
+    no dimension but a coordinate over the labels of that axis. Runs are matched by
+    *label* along labelled dimensions (``component``, ``stage``, ``body``), which get the union
+    of the labels. Along numeric dimensions (``x``, ``depth``) they are matched by label too
+    where all runs have the same grid, or the beginning of the longest one. Where grids differ,
+    as they do when a length is swept, runs are matched by position, and the coordinate becomes a
+    variable over the sweep, so that ``x`` of each run stays with the run. Shorter grids are
+    filled up with NaN. Runs without a record are NaN, and `status` says why.
+    """
+    scene = SCENES[study.scene]
+    target = store.dataset_path(study.id)
+    found = [case for case in cases if store.run_path(case.id).exists()]
+    axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
+    frame = _Frame(axes=axes, usual=usual, linked=study.linked)
+    for case in found:
+        with h5py.File(store.run_path(case.id), "r") as run:
+            frame.learn(run)
+    attributes = layout.provenance(study.name, scene, study.fixed) | {"id": study.id}
+    with appearing(target) as part, h5netcdf.File(part, "w") as file:
+        file.attrs.update(attributes)
+        frame.create_axes(file, scene)
+        frame.create_fields(file)
+        for case in found:
+            with h5py.File(store.run_path(case.id), "r") as run:
+                place = dict(zip(study.axes, case.index, strict=True))
+                frame.place(file, run, tuple(place.get(name, 0) for name in axes))
+        frame.write_small(file)
+    return target
+
+
+def _axes(study: Study, scene: Scene) -> dict[str, list[Any]]:
+    """Return all sweep dimensions; a usual one that is not swept has its single value."""
+    values = next(study.cases()).values
+    usual = [name for name in layout.usual_dimensions(scene) if name not in study.linked]
+    return {name: [values[name]] for name in usual} | study.axes
+
+
+@dataclass(slots=True, kw_only=True)
+class _Frame:
+    """Shape of the combined data set, learnt from the runs, and what is small enough to hold.
+
+    Attributes
+    ----------
+    axes, usual : all sweep dimensions with their values; those that the file of a run has
+    linked : parameter set by a linked axis -> the axis, the values over it
+    labels : labelled dimension -> union of the labels
+    grids, sizes : numeric dimension -> the grid found, of several alike the longest; the
+        greatest length
+    ragged : numeric dimensions whose grid differs from run to run
+    fields : variable -> (dimensions after the sweep's, attributes)
+    small : variable -> its values over the sweep: scalars, flags, grids that differ
+    """
+
+    axes: Mapping[str, Sequence[Any]]
+    usual: Sequence[str]
+    linked: dict[str, tuple[str, list[Any]]]
+    labels: dict[str, list[str]] = field(default_factory=dict)
+    grids: dict[str, np.ndarray] = field(default_factory=dict)
+    sizes: dict[str, int] = field(default_factory=dict)
+    ragged: set[str] = field(default_factory=set)
+    fields: dict[str, tuple[list[str], dict[str, Any]]] = field(default_factory=dict)
+    small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("status", np.dtype(np.int8)), ("message", np.dtype(object))):
+            self._hold(name, kind)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values on each sweep dimension."""
+        return tuple(len(values) for values in self.axes.values())
+
+    @property
+    def auxiliary(self) -> dict[str, str]:
+        """CF attribute of a variable over the sweep: its coordinates that are no dimensions."""
+        return {"coordinates": " ".join(self.linked)} if self.linked else {}
+
+    def learn(self, run: h5py.File) -> None:
+        """Take in the grids and variables of one run."""
+        for name, variable in run.items():
+            if name in self.usual or name in self.fields or name in self.small:
+                continue
+            if variable.is_scale:
+                self._learn_coordinate(name, _values(variable))
+            elif inner := [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]:
+                self.fields[name] = (inner, layout.attributes_of(name))
+            else:
+                self._hold(name, variable.dtype)
+
+    def _hold(self, name: str, kind: np.dtype[Any]) -> None:
+        empty = np.full(self.shape, _absent(name, kind), dtype=kind)
+        self.small[name] = (empty, layout.attributes_of(name))
+
+    def _learn_coordinate(self, name: str, values: np.ndarray) -> None:
+        if values.dtype.kind not in "fi":
+            known = self.labels.setdefault(name, [])
+            known.extend(label for label in values if label not in known)
+            return
+        grid = self.grids.setdefault(name, values)
+        self.sizes[name] = max(self.sizes.get(name, 0), len(values))
+        both = min(len(grid), len(values))
+        tolerance = SAME * np.abs(grid).max(initial=0.0)
+        if not np.allclose(grid[:both], values[:both], rtol=0.0, atol=tolerance):
+            self.ragged.add(name)
+        elif len(values) > len(grid):
+            self.grids[name] = values
+
+    def create_axes(self, file: h5netcdf.File, scene: Scene) -> None:
+        """Make the dimensions and their coordinates."""
+        lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
+        file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
+        own = {name: (name, values) for name, values in self.axes.items()}
+        for name, (axis, values) in (own | self.linked).items():
+            attributes = _axis_attributes(scene, name)
+            _write(file, name, (axis,), _axis_array(values), attributes, complete=True)
+        for name, labels in self.labels.items():
+            texts = np.array(labels, dtype=object)
+            _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
+        for name, grid in self.grids.items():
+            if name not in self.ragged:
+                _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
+                continue
+            by_run = np.full((*self.shape, self.sizes[name]), np.nan)
+            self.small[name] = (by_run, layout.attributes_of(name))
+
+    def create_fields(self, file: h5netcdf.File) -> None:
+        """Make the variables that are written run by run: one compressed chunk a run."""
+        for name, (inner, attributes) in self.fields.items():
+            variable = file.create_variable(
+                name,
+                (*self.axes, *inner),
+                dtype="f8",
+                fillvalue=np.nan,
+                chunks=(*(1,) * len(self.axes), *self._inner_shape(inner)),
+                compression="gzip",
+                compression_opts=1,
+                shuffle=True,
+            )
+            variable.attrs.update(attributes | self.auxiliary)
+
+    def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
+        """Put the values of one run in their place."""
+        for name, variable in run.items():
+            if name in self.fields:
+                inner, _ = self.fields[name]
+                whole = np.full(self._inner_shape(inner), np.nan)
+                values = _values(variable).reshape(variable.shape[len(self.usual) :])
+                whole[np.ix_(*(self._places(run, dimension) for dimension in inner))] = values
+                file.variables[name][at] = whole
+            elif name in self.ragged:
+                self.small[name][0][at][: len(variable)] = _values(variable)
+            elif name in self.small:
+                self.small[name][0][at] = _values(variable).item()
+
+    def write_small(self, file: h5netcdf.File) -> None:
+        """Write what was held in memory: scalars, flags, grids that differ."""
+        for name, (values, attributes) in self.small.items():
+            if name in self.ragged:
+                _write(file, name, (*self.axes, name), values, attributes)
+            else:
+                held = attributes | self.auxiliary
+                _write(file, name, tuple(self.axes), values, held, complete=name == "status")
+
+    def _inner_shape(self, inner: Sequence[str]) -> tuple[int, ...]:
+        return tuple(self.sizes.get(name) or len(self.labels[name]) for name in inner)
+
+    def _places(self, run: h5py.File, dimension: str) -> list[int]:
+        """Return where a run's points along a dimension lie in the combined one."""
+        if dimension in self.labels:
+            return [self.labels[dimension].index(label) for label in _values(run[dimension])]
+        return list(range(len(run[dimension])))
+
+
+def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:
+    """Return the attributes of a parameter of the scene, or of a linked axis."""
+    known = name in parameters_of(scene)
+    return layout.axis_attributes(scene, name) if known else layout.attributes_of(name)
+
+
+def _values(variable: h5py.Dataset) -> np.ndarray:
+    """Return all values; texts as str."""
+    return variable.asstr()[...] if variable.dtype.kind == "O" else variable[...]
+
+
+def _write(
+    file: h5netcdf.File,
+    name: str,
+    dimensions: Sequence[str],
+    values: np.ndarray,
+    attributes: Mapping[str, Any],
+    *,
+    complete: bool = False,
+) -> None:
+    """Write a variable; one that is not complete gets a fill value."""
+    text = values.dtype.kind == "O"
+    variable = file.create_variable(
+        name,
+        tuple(dimensions),
+        dtype=h5py.string_dtype() if text else values.dtype,
+        fillvalue=None if text or complete else _absent(name, values.dtype),
+    )
+    variable[...] = values
+    variable.attrs.update(attributes)
+
+
+def _absent(name: str, kind: np.dtype[Any]) -> Any:
+    """Return what stands for a run that has not given this variable."""
+    if name == "status":
+        return STATUSES.index(MISSING)
+    return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
+
+
+def _axis_array(values: Sequence[Any]) -> np.ndarray:
+    """Return numbers as numbers and anything else as text."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.asarray(values)
+    texts = [value if isinstance(value, str) else json.dumps(value) for value in values]
+    return np.array(texts, dtype=object)

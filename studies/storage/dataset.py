@@ -1,0 +1,198 @@
+"""One run as a labelled data set: names, units, flags and provenance in CF terms."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import json
+import subprocess
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import solver
+from solver.results.quantities import QUANTITIES
+from solver.results.record import Record
+from solver.scenes import Scene
+from studies.definition.design import USUAL_AXES, Case
+from studies.definition.identity import solver_hash
+from studies.definition.parameters import parameters_of
+from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES
+
+INTEGER_FILL = -1
+
+
+def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
+    """Return the CF attributes of a sweep axis, from the scene's own description."""
+    known = parameters_of(scene)[axis]
+    given = {"long_name": known.description, "units": known.unit}
+    return {key: value for key, value in given.items() if value}
+
+
+def attributes_of(name: str) -> dict[str, str]:
+    """Return the CF attributes of a variable or coordinate; unknown ones are named in words."""
+    quantity = QUANTITIES.get(name)
+    known = quantity.attributes if quantity else {"long_name": name.replace("_", " ")}
+    return known | dict(LABEL_ATTRIBUTES.get(name, {}))
+
+
+def usual_dimensions(scene: Scene) -> tuple[str, ...]:
+    """Return the sweep dimensions every run of the scene has."""
+    known = parameters_of(scene)
+    return tuple(name for name in USUAL_AXES if name in known)
+
+
+def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
+    """Return the data set of a run; it does not depend on the study that asked for it."""
+    sweep = usual_dimensions(scene)
+    ones = (1,) * len(sweep)
+    status = STATUSES[record.status.code]
+    dataset = _frame(scene, case, sweep, status, record.message)
+    for name, labels in record.coordinates.items():
+        dataset[name] = (name, np.asarray(labels), attributes_of(name))
+    for name, (dimensions, values) in record.fields.items():
+        if unnamed := set(dimensions) - set(record.coordinates):
+            raise ValueError(f"{name} has dimensions without coordinates: {sorted(unnamed)}")
+        array = np.asarray(values, dtype=float)
+        dataset[name] = ((*sweep, *dimensions), array.reshape(*ones, *array.shape))
+    for name, number in record.scalars.items():
+        dataset[name] = (sweep, _scalar(name, number).reshape(ones))
+    for name in (*record.fields, *record.scalars):
+        dataset[name].attrs.update(attributes_of(name))
+    return dataset
+
+
+def broken_dataset(scene: Scene, case: Case, message: str) -> xr.Dataset:
+    """Return the data set of a run that gave no record: status and message only."""
+    return _frame(scene, case, usual_dimensions(scene), ERROR, message)
+
+
+def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Return how to store each variable: compressed numbers, a fill value for counts."""
+    packed = {"zlib": True, "complevel": 1, "shuffle": True}
+    chosen: dict[str, dict[str, Any]] = {}
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind == "f":
+            fill = {} if name in dataset.coords else {"_FillValue": np.nan}
+            chosen[str(name)] = {**packed, **fill} if variable.ndim else fill
+        elif variable.dtype.kind == "i" and name != "status":
+            chosen[str(name)] = {"_FillValue": np.int32(INTEGER_FILL)}
+    return chosen
+
+
+def singles(run: xr.Dataset) -> dict[str, Any]:
+    """Return the variables of a run that have one value."""
+    rank = run["status"].ndim
+    return {str(name): each.item() for name, each in run.data_vars.items() if each.ndim == rank}
+
+
+def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the catalogue keeps of a run: identity, outcome, parameters and figures.
+
+    Parameters
+    ----------
+    attributes : global attributes of the run's data set
+    values : its variables that have one value
+    """
+    scalars = {
+        name: _plain(name, value)
+        for name, value in values.items()
+        if name not in {"status", "message"}
+    }
+    return {
+        "id": attributes["id"],
+        "scene": attributes["scene"],
+        "status": STATUSES[values["status"]],
+        "message": values["message"],
+        "parameters": json.loads(attributes["parameters"]),
+        "scalars": scalars,
+        "path": f"runs/{attributes['id']}.nc",
+        "created": attributes["created"],
+        "cpu_seconds": scalars.get("cpu_seconds"),
+        "solver_source": attributes["solver_source"],
+    }
+
+
+def provenance(title: str, scene: Scene, parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Return the global attributes: what this is, from which parameters, made by what, when."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "scene": scene.name,
+        "parameters": json.dumps(parameters),
+        "source": f"Residua {solver.__version__}",
+        "solver_source": solver_hash(),
+        "versions": json.dumps(_versions()),
+        **_commit(),
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _frame(
+    scene: Scene, case: Case, sweep: tuple[str, ...], status: str, message: str
+) -> xr.Dataset:
+    """Return a data set with everything but what the solver computed."""
+    ones = (1,) * len(sweep)
+    flag = np.full(ones, STATUSES.index(status), dtype=np.int8)
+    text = np.full(ones, message, dtype=object)
+    title = f"{scene.name}: {scene.summary}"
+    return xr.Dataset(
+        {
+            "status": (sweep, flag, attributes_of("status")),
+            "message": (sweep, text, attributes_of("message")),
+        },
+        coords={name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep},
+        attrs=provenance(title, scene, case.values) | {"id": case.id},
+    )
+
+
+def _is_count(name: str) -> bool:
+    return name in QUANTITIES and QUANTITIES[name].count
+
+
+def _scalar(name: str, number: float) -> np.ndarray:
+    if _is_count(name):
+        return np.asarray(number if np.isfinite(number) else INTEGER_FILL, dtype=np.int32)
+    return np.asarray(number, dtype=float)
+
+
+def _plain(name: str, number: float) -> float | None:
+    """Return a number as JSON has it: None for one that is absent."""
+    absent = number == INTEGER_FILL if _is_count(name) else not np.isfinite(number)
+    return None if absent else number
+
+
+@cache
+def _versions() -> dict[str, str]:
+    names = ("numpy", "scipy", "scikit-fem", "xarray")
+    return {"solver": solver.__version__} | {
+        name: importlib.metadata.version(name) for name in names
+    }
+
+
+@cache
+def _commit() -> dict[str, str]:
+    """Return the commit of the solver's own working tree, or nothing where it is not under git."""
+    root = Path(solver.__file__).parent
+    try:
+        for command in (
+            ["git", "-C", str(root), "ls-files", "--error-unmatch", "__init__.py"],
+            [
+                "git",
+                "-C",
+                str(root),
+                "describe",
+                "--always",
+                "--dirty",
+                "--abbrev=40",
+                "--exclude=*",
+            ],
+        ):
+            answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
+    except (OSError, subprocess.SubprocessError):
+        return {}
+    return {"commit": answer.stdout.strip()}

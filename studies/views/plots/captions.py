@@ -1,0 +1,89 @@
+"""What figures call values, quantities and runs."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from studies.definition.parameters import parameters_of, plain, scene_named
+
+_STAY = "\N{NO-BREAK SPACE}"
+
+
+def words(identifier: str) -> str:
+    """Return an identifier in words."""
+    return identifier.replace("_", " ")
+
+
+def value_text(coordinate: xr.DataArray) -> str:
+    """Return a coordinate's single value with its unit."""
+    return _text(coordinate.item(), coordinate.attrs.get("units", ""))
+
+
+def named(name: str, value: Any, unit: str = "") -> str:
+    """Return a quantity and its value in words; what is true or false by its name alone."""
+    if isinstance(value, bool):
+        return words(name) if value else f"not {words(name)}"
+    return f"{words(name)} {_text(value, unit)}"
+
+
+def label(variable: xr.DataArray) -> str:
+    """Return what an axis shows, with its unit."""
+    return _measured(variable.attrs.get("long_name", str(variable.name)), variable)
+
+
+def short_label(variable: xr.DataArray) -> str:
+    """Return the name of a parameter or a figure in words, with its unit."""
+    return _measured(words(str(variable.name)), variable)
+
+
+def capitalised(text: str) -> str:
+    """Return text with its first letter as a capital, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def setting(run: xr.Dataset) -> str:
+    """Return the scene and what tells this run from others, in words.
+
+    That is where it lies on the axes of the sweep, and its parameters other than the scene's
+    defaults. The two-dimensional state is told in any case.
+    """
+    scene = run.attrs["scene"]
+    known = parameters_of(scene_named(scene))
+    given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
+    state = [words(given["state"])] if "state" in given and "state" not in run.coords else []
+    place = [
+        named(
+            str(name),
+            plain(each.item(), known[name].default) if name in known else each.item(),
+            each.attrs.get("units", ""),
+        )
+        for name, each in run.coords.items()
+        if each.ndim == 0
+    ]
+    others = [
+        named(name, value, known[name].unit)
+        for name, value in given.items()
+        if name in known and name not in {"state", *run.coords} and value != known[name].default
+    ]
+    parts = [scene, *state, *place, *others]
+    return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)
+
+
+def wrapped(text: str, width: float, points: int) -> str:
+    """Return text in lines that fit `width` inches at a font size."""
+    return textwrap.fill(text, int(width * 72.0 / (0.52 * points)), break_long_words=False)
+
+
+def _text(value: Any, unit: str) -> str:
+    number = f"{value:g}" if isinstance(value, int | float) else words(str(value))
+    return number if unit in {"", "1"} else f"{number} {unit}"
+
+
+def _measured(name: str, variable: xr.DataArray) -> str:
+    unit = variable.attrs.get("units", "1")
+    return name if unit == "1" else f"{name} [{unit}]"

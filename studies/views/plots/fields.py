@@ -1,0 +1,77 @@
+"""What of a data set can be drawn: its variables, by what they lie over, and parts of them."""
+
+from __future__ import annotations
+
+import math
+
+import xarray as xr
+
+from studies.definition.parameters import one_of
+from studies.errors import StudyError
+
+MAP = ("y", "x")
+ALONG = ("s", "depth")
+"""Dimensions that one figure of a run runs over: both of a map, or one of these for lines."""
+
+
+def sweep_fields(dataset: xr.Dataset) -> list[str]:
+    """Return the numbers and flags that have one value a run."""
+    sweep = dataset["status"].dims
+    return [
+        str(name)
+        for name, each in dataset.data_vars.items()
+        if each.dims == sweep and each.dtype.kind in "fiu"
+    ]
+
+
+def map_fields(dataset: xr.Dataset) -> list[str]:
+    """Return the variables that are drawn as maps of the bodies."""
+    return [str(name) for name, each in dataset.data_vars.items() if set(MAP) <= set(each.dims)]
+
+
+def line_fields(dataset: xr.Dataset) -> list[str]:
+    """Return the variables that are drawn as lines along the surface or along depth."""
+    return [str(name) for name, each in dataset.data_vars.items() if set(ALONG) & set(each.dims)]
+
+
+def check_field(field: str, known: list[str]) -> None:
+    """Raise a `StudyError` unless `field` is one of the `known`."""
+    if field not in known:
+        raise StudyError("field", field, one_of(field, known))
+
+
+def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:
+    """Return one component of a tensor, the first by default; a scalar field as it is."""
+    if "component" not in values.dims:
+        if component is not None:
+            raise StudyError("component", component, f"{values.name} is a scalar: leave it out")
+        return values
+    known = [str(name) for name in values["component"].to_numpy()]
+    if component is not None and component not in known:
+        raise StudyError("component", component, f"must be one of {', '.join(known)}")
+    return values.sel(component=component or known[0])
+
+
+def focus(run: xr.Dataset, along: xr.DataArray, zoom: float) -> float:
+    """Return the place along the surface that a zoom is about [mm]: the centre of the contact.
+
+    Where one half of symmetric bodies was computed, the grid ends at this centre: then it is the
+    edge of the contact.
+
+    Raises
+    ------
+    StudyError
+        when it is the edge, and the run does not know it
+    """
+    if float(along.min()) < 0.0:
+        return 0.0
+    edge = float(run["contact_half_width"]) if "contact_half_width" in run else math.nan
+    if not math.isfinite(edge):
+        missing = "is about the edge of the contact, but this run has no contact_half_width"
+        raise StudyError("zoom", zoom, f"{missing}: leave it out")
+    return edge
+
+
+def too_close(zoom: float) -> StudyError:
+    """Return what is wrong with a zoom that shows nothing."""
+    return StudyError("zoom", zoom, "must be a length [mm] that holds two points or more")

@@ -1,0 +1,110 @@
+"""Lines of one run: profiles along depth, and what acts on the contact surface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from itertools import cycle
+
+import numpy as np
+import xarray as xr
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+
+from studies.errors import StudyError
+from studies.views.plots.captions import label, value_text, words, wrapped
+from studies.views.plots.fields import check_field, component_of, focus, line_fields, too_close
+from studies.views.plots.maps import entitle
+from studies.views.reading import one_run
+
+_DECAYED = 0.02
+"""Depth is shown to where nothing larger than this part of the peak is left."""
+_EACH, _LINES = 6, 12
+"""Most values of a dimension, and most lines, that are told apart."""
+_STYLES = ("-", "--", ":", "-.")
+_SIZE = (8.0, 4.6)
+
+
+def line_figure(
+    run: xr.Dataset,
+    field: str,
+    component: str | None = None,
+    zoom: float | None = None,
+) -> Figure:
+    """Return `field` along the surface or along depth: a line for each pass, station, stage, body.
+
+    Of more passes than can be told apart the first, the last and some between are drawn, and of
+    several stations then the middle one.
+
+    `zoom` shows only that length on either side of the contact's centre (of its edge, where half
+    of the bodies was computed), or below the surface [mm]. Without it, depth ends where the values
+    have decayed.
+    """
+    run = one_run(run)
+    check_field(field, line_fields(run))
+    values = component_of(run[field], component)
+    along = "s" if "s" in values.dims else "depth"
+    for name in values.dims:
+        values = values.dropna(name, how="all")
+    if not values.size:
+        raise StudyError("field", field, "has no values here")
+    values = _told_apart(values, [name for name in values.dims if name != along])
+    others = [name for name in values.dims if name != along]
+    if zoom is not None:
+        middle = focus(run, values["s"], zoom) if along == "s" else 0.0
+        values = values.where(abs(values[along] - middle) <= zoom, drop=True)
+        if values.sizes[along] < 2:
+            raise too_close(zoom)
+    elif along == "depth":
+        values = values.isel(depth=slice(_depth_shown(values, others)))
+    sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
+    axes = sheet.add_subplot()
+    entitle(axes, run, values, _SIZE[0] - 0.8)
+    shape = [values.sizes[name] for name in others] or [1]
+    for first, colour in enumerate(_colours(values, others)):
+        for style, rest in zip(cycle(_STYLES), np.ndindex(*shape[1:]), strict=False):
+            line = values.isel(dict(zip(others, (first, *rest), strict=False))).dropna(along)
+            if line.size:
+                name = ", ".join(value_text(line[each]) for each in others)
+                axes.plot(line[along], line, style, color=colour, label=name, linewidth=1.6)
+    axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
+    axes.grid(color="0.92")
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.0)
+    axes.set(xlabel=label(values[along]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
+    if others:
+        title = ", ".join(words(str(name)) for name in others)
+        axes.legend(
+            loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, frameon=False,
+            title=title,
+        )  # fmt: skip
+    return sheet
+
+
+def _told_apart(values: xr.DataArray, others: Sequence[Hashable]) -> xr.DataArray:
+    """Return as many lines as can be told apart; dimensions with one value left are dropped."""
+    for name in others:
+        if values.sizes[name] > _EACH:
+            among = np.linspace(0.0, values.sizes[name] - 1.0, _EACH)
+            values = values.isel({name: among.round().astype(int)})
+    if math.prod(values.sizes[name] for name in others) > _LINES:
+        values = values.isel({others[-1]: [values.sizes[others[-1]] // 2]})
+    return values.squeeze([name for name in others if values.sizes[name] == 1])
+
+
+def _colours(values: xr.DataArray, others: Sequence[Hashable]) -> Sequence[object]:
+    """Return a colour for each value of the first dimension: in order, where it is a number."""
+    if not others:
+        return ["C0"]
+    first = values[others[0]]
+    if first.dtype.kind in "fiu":
+        return list(colormaps["viridis"](np.linspace(0.0, 0.85, first.size)))
+    return [f"C{number}" for number in range(first.size)]
+
+
+def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
+    """Return the number of points down to where nothing worth showing is left."""
+    largest = abs(values).max(others).to_numpy()
+    shown = np.flatnonzero(largest > _DECAYED * largest.max())
+    return int(shown[-1]) + 2 if shown.size else values.sizes["depth"]

@@ -1,0 +1,163 @@
+"""Maps of the bodies of one run."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from studies.views.plots.captions import capitalised, label, setting, wrapped
+from studies.views.plots.fields import check_field, component_of, focus, map_fields, too_close
+from studies.views.reading import one_run
+
+SIGNED = "RdBu_r"
+SEQUENTIAL = "YlOrRd"
+_OUTSIDE = "0.86"
+_PERCENT, _WORTHWHILE = 99.8, 1.5
+"""Next to a sharp corner stress grows without bound: colours end at this percentile of the map,
+where its largest value is that many times larger."""
+
+_AREA, _LONGEST = 26.0, 8.0
+"""Area of a map and its longest side [in]."""
+_TEXT = 3.2
+"""Least length of the lines around a map [in]."""
+
+
+def map_figure(
+    run: xr.Dataset,
+    field: str = "residual_stress",
+    component: str | None = None,
+    zoom: float | None = None,
+) -> Figure:
+    """Return a map of `field` over the bodies, whole where half of them was computed.
+
+    Parameters
+    ----------
+    run : data set of one run
+    field : variable over ``y`` and ``x``
+    component : of a stress tensor; the first one by default
+    zoom : show only what lies within this distance of the contact's centre, or of its edge where
+        half of the bodies was computed [mm]
+
+    Raises
+    ------
+    StudyError
+        when the data set has no such field or component, or the zoom holds no points
+    """
+    run = one_run(run)
+    check_field(field, map_fields(run))
+    values = component_of(run[field], component).transpose("y", "x")
+    edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
+    values = whole(values) if zoom is None else _near(values, focus(run, values["x"], zoom), zoom)
+    signed = "component" in values.coords
+    high, note = _limit(values, signed)
+    width, height = _size(values)
+    sheet = Figure(figsize=(width, height), dpi=150)
+    axes = sheet.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=_OUTSIDE)
+    entitle(axes, run, values, max(width, _TEXT))
+    mesh = axes.pcolormesh(
+        values["x"], values["y"], values, shading="nearest", rasterized=True,
+        cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
+    )  # fmt: skip
+    left, right = axes.get_xlim()
+    axes.axhline(0.0, color="0.3", linewidth=0.6)
+    start = max(left, -edge if left < 0.0 else 0.0)
+    if edge > 0.0:
+        axes.plot(
+            [start, min(edge, right)], [0.0, 0.0], color="k", linewidth=1.4,
+            solid_capstyle="butt", label="contact under load",
+        )  # fmt: skip
+        axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
+    axes.set(xlim=(left, right), xlabel=_symbol(run["x"]), ylabel=_symbol(run["y"]))
+    axes.set_aspect("equal")
+    beside = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.16 / width, 1.0))
+    over, under = bool((values > high).any()), signed and bool((values < -high).any())
+    beyond = {(1, 1): "both", (1, 0): "max", (0, 1): "min"}.get((over, under), "neither")
+    bar = sheet.colorbar(mesh, cax=beside, extend=beyond, extendfrac=0.03)
+    bar.set_label(wrapped(label(values), max(height, _TEXT / 2.0), 10))
+    bar.outline.set_visible(False)
+    axes.annotate(
+        wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords="axes fraction",
+        xytext=(0.0, -40.0), textcoords="offset points", va="top", fontsize=8, color="0.3",
+    )  # fmt: skip
+    _fit(sheet, axes)
+    return sheet
+
+
+def whole(values: xr.DataArray) -> xr.DataArray:
+    """Return a map of both halves of the bodies, where one half was computed.
+
+    A grid whose first column ends at, or lies on, x = 0 is that of bodies symmetric about this
+    line, or about this axis. Shear across it changes sign on the other side.
+    """
+    x = values["x"].to_numpy()
+    if len(x) < 2 or not np.isclose(x[0], [0.0, (x[1] - x[0]) / 2], atol=1e-6 * x[-1]).any():
+        return values
+    component = str(values["component"].item()) if "component" in values.coords else ""
+    sign = -1.0 if component.count("x") == 1 else 1.0
+    other = sign * values.isel(x=slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1))
+    return xr.concat([other.assign_coords(x=-other["x"]), values], "x").assign_attrs(values.attrs)
+
+
+def _near(values: xr.DataArray, middle: float, zoom: float) -> xr.DataArray:
+    near = values.where((abs(values["x"] - middle) <= zoom) & (abs(values["y"]) <= zoom), drop=True)
+    if min(near.shape) < 2:
+        raise too_close(zoom)
+    return near
+
+
+def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
+    """Return where colours end, and a note on the values beyond."""
+    there = values.to_numpy()[np.isfinite(values)]
+    size = np.abs(there) if signed else there
+    if not size.size or not size.max() > 0.0:
+        return 1.0, ""
+    high = float(np.percentile(size[size > 0.0], _PERCENT))
+    if size.max() <= _WORTHWHILE * high:
+        return float(size.max()), ""
+    unit = values.attrs.get("units", "1")
+    note = (
+        f"Colours end at {'±' if signed else ''}{high:.3g}{'' if unit == '1' else f' {unit}'}: "
+        f"{np.mean(size > high):.1%} of the map lies beyond. "
+        f"Values go from {there.min():.3g} to {there.max():.3g}."
+    )
+    return high, note.replace("-", "\N{MINUS SIGN}")
+
+
+def _size(values: xr.DataArray) -> tuple[float, float]:
+    """Return width and height of the axes of a map [in]."""
+    width, height = (float(np.ptp(values[name].to_numpy())) for name in ("x", "y"))
+    scale = min(np.sqrt(_AREA / (width * height)), _LONGEST / max(width, height))
+    return scale * width, scale * height
+
+
+def _fit(sheet: Figure, axes: Axes) -> None:
+    """Give the figure the size of all that is drawn, the axes keeping theirs."""
+    size = sheet.get_size_inches()
+    sheet.draw_without_rendering()
+    ink = sheet.get_tightbbox().padded(0.1)
+    sheet.set_size_inches(ink.width, ink.height)
+    axes.set_position(
+        (-ink.x0 / ink.width, -ink.y0 / ink.height, size[0] / ink.width, size[1] / ink.height)
+    )
+
+
+def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
+    """Set the title, and below it what tells the run from others, in lines of `width` inches."""
+    quantity = values.attrs.get("long_name", str(values.name))
+    of = f", {values['component'].item()}" if "component" in values.coords else ""
+    shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
+    below = axes.set_title(
+        wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
+        loc="left", fontsize=8, color="0.3", pad=5.0,
+    )  # fmt: skip
+    axes.annotate(
+        f"{capitalised(quantity)}{of}", (0.0, 1.0), xycoords=below,
+        xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
+    )  # fmt: skip
+
+
+def _symbol(coordinate: xr.DataArray) -> str:
+    """Return the name of a map's axis, with its unit."""
+    return f"{coordinate.name} [{coordinate.attrs.get('units', '1')}]"

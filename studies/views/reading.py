@@ -1,0 +1,192 @@
+"""Stored results opened as labelled data sets, and one run picked out of many."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from studies.definition.study import Study
+from studies.definition.vocabulary import OK, STATUSES
+from studies.errors import StudyError
+from studies.storage.store import ENGINE, Store
+
+
+def open_study(path: Path | str) -> xr.Dataset:
+    """Open the combined data set of a study; arrays are read when they are used.
+
+    Parameters
+    ----------
+    path : a ``dataset.nc``, the directory of a study, or an output directory with one study
+
+    Raises
+    ------
+    StudyError
+        when there is no data set, or more than one
+    """
+    found = find_datasets(path)
+    if len(found) > 1:
+        names = ", ".join(str(each.parent) for each in found)
+        raise StudyError("path", str(path), f"holds several studies; name one of {names}")
+    return open_netcdf(found[0])
+
+
+def open_netcdf(path: Path | str) -> xr.Dataset:
+    """Open the file of a run or of a study; arrays are read when they are used."""
+    try:
+        return xr.open_dataset(path, engine=ENGINE)
+    except OSError as error:
+        raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
+
+
+def find_datasets(path: Path | str) -> list[Path]:
+    """Return the data sets `path` stands for: itself, a study's, or those of all studies in it."""
+    found = present_datasets(path)
+    if not found:
+        begun = "; ".join(begun_studies(path))
+        allowed = begun or "must be a data set, a study or an output directory"
+        raise StudyError("path", str(path), allowed)
+    return found
+
+
+def present_datasets(path: Path | str) -> list[Path]:
+    """Return what `find_datasets` does, or nothing."""
+    path = Path(path)
+    if path.is_file():
+        return [path]
+    own = path / "dataset.nc"
+    return [own] if own.is_file() else sorted(path.glob("studies/*/dataset.nc"))
+
+
+def begun_studies(path: Path | str) -> list[str]:
+    """Return how far each study is that has no data set yet: of those in `path`, or `path` itself.
+
+    A study has a data set when the work on it has ended, were it by Ctrl-C.
+    """
+    path = Path(path).resolve()
+    files = [*path.glob("study.json"), *sorted(path.glob("studies/*/study.json"))]
+    begun = [file for file in files if not file.with_name("dataset.nc").is_file()]
+    return [f"{_progress(file)}; no data set yet ({file.parent})" for file in begun]
+
+
+def _progress(file: Path) -> str:
+    """Return the name of a study, and how many of its runs are finished."""
+    study = None
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        name = content["name"]
+        study = Study.from_dict(content)
+    except StudyError:  # it knows parameters that the scene has no more
+        pass
+    except (OSError, ValueError, TypeError, KeyError):
+        return f"{file.parent.name}: its {file.name} cannot be read"
+    if study is None or study.id != file.parent.name:
+        return f"{name}: begun by another state of the solver"
+    store = Store(file.parents[2])
+    finished = sum(store.run_path(case.id).is_file() for case in study.cases())
+    return f"{study.name}: {finished} of {study.size} runs finished"
+
+
+def flags(variable: xr.DataArray) -> dict[int, str]:
+    """Return what the values of a variable mean, nothing for one that is no flag."""
+    meanings = str(variable.attrs.get("flag_meanings", "")).split()
+    values = np.atleast_1d(variable.attrs.get("flag_values", [])).tolist()
+    return dict(zip(values, meanings, strict=True))
+
+
+def sweep_axes(dataset: xr.Dataset) -> list[str]:
+    """Return the sweep dimensions of a data set, those of size one included."""
+    return [str(name) for name in dataset["status"].dims]
+
+
+def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the coordinates that tell runs apart, each with its sweep dimension.
+
+    These are the dimensions themselves, and after them what linked axes set.
+    """
+    axes = {axis: axis for axis in sweep_axes(dataset)}
+    return axes | {
+        str(name): axis
+        for axis in axes
+        for name, each in dataset.coords.items()
+        if each.dims == (axis,)
+    }
+
+
+def select(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> xr.Dataset:
+    """Return the part of a data set where the sweep has the wanted values, all axes kept.
+
+    Parameters
+    ----------
+    dataset : of a study or of a run
+    selection : axis, or parameter set by a linked axis -> wanted value
+
+    Raises
+    ------
+    StudyError
+        when an axis or a value is unknown
+    """
+    coordinates = sweep_coordinates(dataset)
+    for name, value in selection.items():
+        if name not in coordinates:
+            raise StudyError(name, value, f"must be one of {', '.join(coordinates)}")
+        dataset = dataset.isel({coordinates[name]: positions(dataset[name], value)})
+    return dataset
+
+
+def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = None) -> xr.Dataset:
+    """Return one successful run of a study.
+
+    Parameters
+    ----------
+    dataset : of a study or of a run
+    selection : axis, or parameter set by a linked axis -> wanted value. What it leaves open is
+        decided in favour of the largest number and the first label: usually the run with most
+        residual stress.
+
+    Raises
+    ------
+    StudyError
+        when an axis or a value is unknown, or no run that matches succeeded
+    """
+    axes = sweep_axes(dataset)
+    chosen = select(dataset, selection or {})
+    ok = np.argwhere(chosen["status"].to_numpy() == STATUSES.index(OK))
+    if not len(ok):
+        reasons = sorted({str(text) for text in chosen["message"].to_numpy().flat if text})
+        wanted = dict(selection) if selection else "any"
+        raise StudyError("run", wanted, f"no such run succeeded: {'; '.join(reasons) or 'missing'}")
+    numeric = [chosen[axis].dtype.kind in "fiu" for axis in axes]
+    best = max(
+        ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
+    )
+    return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
+
+
+def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
+    """Return where a coordinate has the wanted value, or raise a `StudyError` that lists it."""
+    values = axis.to_numpy()
+    try:
+        same = (
+            np.isclose(values.astype(float), float(value), rtol=1e-9)
+            if values.dtype.kind in "fiu"
+            else values == str(value)
+        )
+    except ValueError:
+        same = np.zeros(len(values), dtype=bool)
+    if not same.any():
+        known = ", ".join(dict.fromkeys(str(each) for each in values))
+        raise StudyError(str(axis.name), value, f"must be one of {known}")
+    return np.flatnonzero(same)
+
+
+def _own_grid(run: xr.Dataset) -> xr.Dataset:
+    """Return a run on its own grid, where the study's runs have different ones."""
+    for name in [str(name) for name in run.dims]:
+        if name in run.coords and name not in run.indexes:
+            there = run[name].notnull().to_numpy()
+            run = run.isel({name: there}).set_xindex(name)
+    return run

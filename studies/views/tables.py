@@ -1,0 +1,149 @@
+"""Text tables: the runs of a study, the parameters of a scene."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from solver.scenes import SCENES
+from studies.definition.parameters import parameters_of, scene_named
+from studies.definition.vocabulary import OK, STATUSES
+from studies.views.columns import aligned, in_blocks, stacked
+from studies.views.reading import flags, sweep_axes, sweep_coordinates
+
+FIGURES: Mapping[str, str] = {
+    "residual_x_half_plane": "residual x half plane",
+    "residual_x_punch": "residual x punch",
+    "surface_residual_x": "surface residual x",
+    "first_row_residual_x": "first row residual x",
+    "free_surface_residual_x": "free surface residual x",
+    "lowest_residual_x": "lowest residual x",
+    "depth_of_lowest_residual_x": "at depth",
+    "surface_residual_z": "surface residual z",
+    "first_row_residual_z": "first row residual z",
+    "free_surface_residual_z": "free surface residual z",
+    "lowest_residual_z": "lowest residual z",
+    "depth_of_lowest_residual_z": "at depth",
+    "surface_plastic_strain": "surface plastic strain",
+    "highest_plastic_strain": "mid-track plastic strain",
+    "depth_of_highest_plastic_strain": "at depth",
+    "peak_contact_pressure": "contact pressure",
+    "max_plastic_strain": "plastic strain",
+    "increments": "increments",
+    "cut_increments": "cut",
+    "median_iterations": "median iterations",
+    "cpu_seconds": "cpu",
+}
+"""Variables a table of runs shows, where the scene gives them, and their headings."""
+
+
+NAMED = 4
+"""Most runs that are named for a message; the rest are counted."""
+
+
+def runs_table(dataset: xr.Dataset) -> str:
+    """Return a line for each run: where it lies in the sweep, its status, its main figures.
+
+    Beside the labels of a linked axis stands what they set. Residual stresses and plastic strain
+    are what contact left; increments, those cut, and the median of Newton's iterations tell how
+    hard it was to find.
+    """
+    places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+    keys = sum(name == axis for name, axis in places.items())
+    columns = [*places, "status", *(name for name in FIGURES if name in dataset)]
+    headings = [FIGURES.get(name, name.replace("_", " ")) for name in columns]
+    units = [_unit(dataset[name]) for name in columns]
+    values = {name: dataset[name].to_numpy() for name in columns}
+    rows = []
+    for at in np.ndindex(values["status"].shape):
+        place = dict(zip(sweep_axes(dataset), at, strict=True))
+        where = [_text(values[name][place[places[name]]]) for name in columns[: len(places)]]
+        status = STATUSES[values["status"][at]]
+        figures = [_text(values[name][at]) for name in columns[len(places) + 1 :]]
+        rows.append([*where, status, *figures])
+    return in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
+
+
+def messages(dataset: xr.Dataset) -> str:
+    """Return each message of the runs once: outcome, text, how many runs have it, and which."""
+    axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
+    status, text = (dataset[name].to_numpy() for name in ("status", "message"))
+    found: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for at in np.ndindex(status.shape):
+        place = dict(zip(sweep_axes(dataset), at, strict=True))
+        where = (f"{axis} = {_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
+        if text[at]:
+            outcome = STATUSES[status[at]]
+            kind = "warning" if outcome == OK else outcome
+            found[kind, str(text[at])].append(", ".join(where))
+    return "".join(
+        f"\n{kind}: {message}\n    {_listed(places)}\n"
+        for (kind, message), places in sorted(found.items())
+    )
+
+
+def _listed(places: Sequence[str]) -> str:
+    """Return how many runs there are, and the first of them."""
+    if not places[0]:
+        return "the only run"
+    more = f"; and {len(places) - NAMED} more" if len(places) > NAMED else ""
+    runs = "1 run" if len(places) == 1 else f"{len(places)} runs"
+    return f"{runs}: {'; '.join(places[:NAMED])}{more}"
+
+
+def run_details(dataset: xr.Dataset) -> str:
+    """Return the parameters, outcome and figures of a single run."""
+    lines = [["scene", dataset.attrs["scene"]]]
+    swept = {name: dataset[name].item() for name in sweep_coordinates(dataset)}
+    lines += [[name, _text(value)] for name, value in (_parameters(dataset) | swept).items()]
+    lines.append(["status", _figure(dataset["status"])])
+    if message := str(dataset["message"].item()):
+        lines.append(["message", message])
+    rank = dataset["status"].ndim
+    lines += [
+        [str(name), f"{_figure(each)} {_unit(each)}".rstrip()]
+        for name, each in dataset.data_vars.items()
+        if each.ndim == rank and name not in {"status", "message"}
+    ]
+    return aligned(lines)
+
+
+def scenes_table() -> str:
+    """Return a line for each scene."""
+    return aligned([[scene.name, scene.summary] for scene in SCENES.values()])
+
+
+def scene_table(name: str) -> str:
+    """Return a line for each parameter of a scene: default, what is allowed, what it means."""
+    scene = scene_named(name)
+    known = parameters_of(scene).values()
+    lines = [["parameter", "default", "allowed", "meaning"]]
+    lines += [[each.name, _text(each.default), each.allowed, each.description] for each in known]
+    return f"{scene.name}: {scene.summary}\n\n{aligned(lines)}"
+
+
+def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
+    return json.loads(dataset.attrs["parameters"])
+
+
+def _figure(variable: xr.DataArray) -> str:
+    """Return the single value of a variable; what a flag means instead of its number."""
+    return flags(variable).get(variable.item()) or _text(variable.item())
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return json.dumps(value)
+    if isinstance(value, float | np.floating):
+        return "-" if np.isnan(value) else f"{value:z.4g}"
+    return "-" if value is None else str(value)
+
+
+def _unit(variable: xr.DataArray) -> str:
+    unit = variable.attrs.get("units", "")
+    return "" if unit in {"", "1"} else f"[{unit}]"
