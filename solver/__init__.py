@@ -8,9 +8,10 @@ with plasticity outside and contact inside, and releases it; a `Solution` or, fo
 
 from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
-from solver.loading.outcome import Tolerances
-from solver.loading.path import Branch, Path
-from solver.loading.stepper import PathControl
+from solver.loading.control import PathControl, Tolerances
+from solver.loading.outcome import Outcome
+from solver.loading.program import Program, Stage
+from solver.loading.walker import Walker
 from solver.materials.material import Material
 from solver.model.body import Body
 from solver.model.model import ContactPair, Model
@@ -25,21 +26,23 @@ __all__ = [
     "SCENES",
     "Audit",
     "Body",
-    "Branch",
     "ContactPair",
     "LimitLoad",
     "Material",
     "Model",
     "ModelError",
     "NotConverged",
-    "Path",
+    "Outcome",
     "PathControl",
+    "Program",
     "Record",
     "Scene",
     "Solution",
     "SolverError",
+    "Stage",
     "Status",
     "System",
     "Tolerances",
+    "Walker",
     "solve",
 ]

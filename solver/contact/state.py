@@ -52,11 +52,11 @@ class ContactState:
 class State:
     """A converged state of the whole system; never changed, only replaced.
 
-    ``load`` is the load factor, ``force_scale`` the largest force level met so far, to which
-    tolerances refer [N].
+    ``time`` orders states; it is the load factor where bodies have no other amplitude.
+    ``force_scale`` is the largest force level met so far, to which tolerances refer [N].
     """
 
-    load: float
+    time: float
     u: tuple[NDArray[np.float64], ...]
     plastic: tuple[PlasticState, ...]
     contacts: tuple[ContactState, ...]

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _TOUCHING = 1e-9
 """Over the length of the longest contact surface."""
+_SET_DOWN = 1e-9
+"""Gap over the radius of a wheel below which what is set down touches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,9 +215,16 @@ class System:
         return _TOUCHING * float(max(lengths, default=0.0))
 
     @cached_property
+    def moves(self) -> bool:
+        """Whether a load moves over the bodies."""
+        return any(part.moves for part in self.parts)
+
+    @cached_property
     def overlapping(self) -> bool:
-        """Whether bodies overlap before loading."""
-        return any((contact.gap < -self.touching).any() for contact in self.initial().contacts)
+        """Whether bodies overlap before loading; what is set down just touches."""
+        return not self.moves and any(
+            (contact.gap < -self.touching).any() for contact in self.initial().contacts
+        )
 
     @cached_property
     def proportional(self) -> bool:
@@ -243,7 +252,7 @@ class System:
         """Return the displacements (n,) of a whole body [mm]."""
         number = self.part(name)
         part, u = self.parts[number], state.u[number]
-        return part.expand(u, state.load) if isinstance(part, Substructure) else u
+        return part.expand(u, state.time) if isinstance(part, Substructure) else u
 
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body."""
@@ -261,3 +270,23 @@ class System:
             gap = interface.pairing(u).gap
             contacts.append(ContactState.at_rest(gap, gap <= self.touching))
         return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))
+
+    def moved(self, state: State, time: float) -> State:
+        """Return a state in which what moves by itself has gone on to a time."""
+        parts = zip(self.parts, state.u, strict=True)
+        return replace(state, u=tuple(part.moved(u, time) for part, u in parts))
+
+    def set_down(self, state: State, time: float) -> State:
+        """Return the state at a time at which a lap begins: wheels where it does, just touching."""
+        u, contacts = list(state.u), list(state.contacts)
+        for number, part in enumerate(self.parts):
+            if not isinstance(part, Wheel):
+                continue
+            u[number] = part.placed(time)
+            own = [k for k, i in enumerate(self.interfaces) if number in (i.slave, i.master)]
+            gaps = [self.interfaces[k].pairing(tuple(u)).gap for k in own]
+            least = min(gap.min() for gap in gaps)
+            u[number] = part.lowered(u[number], least)
+            for k, gap in zip(own, gaps, strict=True):
+                contacts[k] = ContactState.at_rest(gap, gap < least + _SET_DOWN * part.radius)
+        return replace(state, time=time, u=tuple(u), contacts=tuple(contacts))

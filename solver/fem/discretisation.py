@@ -39,7 +39,7 @@ class Discretisation(Nodes, Part):
     dofs : (n_elements, 2 n_element_nodes)
     B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
     weights : (n_elements, n_points) volume of the points, thickness or 2 pi r in it [mm3]
-    load : (n,) nodal forces at load factor one [N]
+    load_vector : (n,) nodal forces of the pressures at load factor one [N]
     active : unknowns that are neither supported nor pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
     """
@@ -58,9 +58,10 @@ class Discretisation(Nodes, Part):
         if kind.mean_dilatation and body.state != "plane_stress":
             self.B = kinematics.mean_dilatation(self.B, self.weights)
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
-        self.load = np.zeros(self.n)
+        self.moves = body.travelling is not None
+        self.load_vector = np.zeros(self.n)
         for boundary, pressure in body.pressure.items():
-            self.load += pressure_forces(self, boundary, pressure)
+            self.load_vector += pressure_forces(self, boundary, pressure)
         self._hold()
 
     def _hold(self) -> None:
@@ -91,14 +92,14 @@ class Discretisation(Nodes, Part):
         """Volume of the points (n_points,) [mm3]."""
         return self.weights.ravel()
 
-    def external(self, load: float) -> NDArray[np.float64]:
-        """Return the external nodal forces (n,) at a load factor or time [N]."""
+    def external(self, time: float) -> NDArray[np.float64]:
+        """Return the external nodal forces (n,) at a time [N]."""
         if self.body.travelling is None:
-            return load * self.load
-        return travelling_forces(self, self.body.travelling, load)
+            return super().external(time)
+        return travelling_forces(self, self.body.travelling, time)
 
     def grows(self, before: float, after: float) -> bool:
-        """Whether the external load grows from one load factor or time to another."""
+        """Whether the external load grows from one time to another."""
         travelling = self.body.travelling
         if travelling is None:
             return super().grows(before, after)
@@ -127,11 +128,11 @@ class Discretisation(Nodes, Part):
         return np.asarray(nodal, dtype=float)
 
     def residual(
-        self, load: float, u: NDArray[np.float64], response: Response
+        self, time: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:
         """Return external minus internal forces (n,), contact forces left out [N]."""
         del u
-        return self.external(load) - self.internal_force(response.stress)
+        return self.external(time) - self.internal_force(response.stress)
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return the tangent and the elastic quadratic form of a step [N mm]."""

@@ -1,4 +1,4 @@
-"""What every part of a system does unless it does better."""
+"""What the increments ask of a body: unknowns, forces, surfaces that move."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ if TYPE_CHECKING:
 
 
 class Part:
-    """A body as the increment sees it: unknowns ``u`` (n,), forces, surfaces that move.
+    """A body as the increments see it; this base class answers for a body that does not move.
 
-    ``load`` (n,) holds the external nodal forces at load factor one [N].
+    Its unknowns are ``u`` (n,); ``moves`` tells whether its load moves over the bodies.
+
+    ``load_vector`` (n,) holds the nodal forces of the body's pressures [N].
     """
 
     n: int
     body: Body
-    load: NDArray[np.float64]
+    load_vector: NDArray[np.float64]
+    moves: bool = False
 
     @property
     def volumes(self) -> NDArray[np.float64]:
@@ -32,13 +35,19 @@ class Part:
         """Return the unknowns (n,) before anything happens."""
         return np.zeros(self.n)
 
-    def external(self, load: float) -> NDArray[np.float64]:
-        """Return the external nodal forces (n,) at a load factor [N]."""
-        return load * self.load
+    def external(self, time: float) -> NDArray[np.float64]:
+        """Return the external nodal forces (n,) at a time [N]."""
+        return self.body.load_factor(time) * self.load_vector
 
     def grows(self, before: float, after: float) -> bool:
-        """Whether the external load grows from one load factor to another."""
-        return abs(after) > abs(before) and bool(self.load.any())
+        """Whether the external load grows from one time to another."""
+        less, more = (abs(self.body.load_factor(time)) for time in (before, after))
+        return more > less and bool(self.load_vector.any())
+
+    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """Return the unknowns with what moves by itself gone on to a time."""
+        del time
+        return u
 
     def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
         """Return where a step (n,) strains this part most [mm]; nowhere in one without points."""

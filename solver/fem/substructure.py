@@ -48,8 +48,8 @@ class _Condensed:
         self._solver = linear.analyse(upper, linear_solver) if len(self.inner) else None
         if self._solver is not None:
             self._solver.factorise(upper.data)
-        self._load = part.load[self.inner]
-        self.load = part.load[kept] - self._couple.T @ self._inside(self._load)
+        self._load = part.load_vector[self.inner]
+        self.load_vector = part.load_vector[kept] - self._couple.T @ self._inside(self._load)
         self.stiffness = K[kept][:, kept].toarray()
         for first in range(0, len(kept), _BLOCK):
             some = slice(first, first + _BLOCK)
@@ -61,11 +61,11 @@ class _Condensed:
         """Return inner displacements for inner forces, the kept unknowns held."""
         return force if self._solver is None else self._solver.solve(force)
 
-    def expand(self, u: NDArray[np.float64], load: float, size: int) -> NDArray[np.float64]:
-        """Return all displacements (size,) from those kept."""
+    def expand(self, u: NDArray[np.float64], factor: float, size: int) -> NDArray[np.float64]:
+        """Return all displacements (size,) from those kept, at a load factor."""
         full = np.zeros(size)
         full[self.kept] = u
-        full[self.inner] = self._inside(load * self._load - self._couple @ u)
+        full[self.inner] = self._inside(factor * self._load - self._couple @ u)
         return full
 
 
@@ -73,6 +73,7 @@ class Substructure(Part):
     """A part with the unknowns of its contact surfaces alone.
 
     It offers what a `Discretisation` offers to an increment; ``whole`` is the meshed body.
+    ``elastic`` are the unknowns that the condensed stiffness acts on.
     """
 
     def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
@@ -81,8 +82,9 @@ class Substructure(Part):
         nodes = np.unique(np.concatenate([surface.nodes for surface in surfaces]))
         self._condensed = _condense(whole, nodes, linear_solver)
         kept = self._condensed.kept
+        self.elastic = slice(len(kept))
         self.n = len(kept)
-        self.load = self._condensed.load
+        self.load_vector = self._condensed.load_vector
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
         self.active = choose_pins(self.rigid, self.free)
@@ -108,16 +110,18 @@ class Substructure(Part):
         return Response(np.zeros((4, 0)), np.zeros((4, 4, 0)), state, np.zeros(0, dtype=bool))
 
     def residual(
-        self, load: float, u: NDArray[np.float64], response: Response
+        self, time: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:
         """Return external minus internal forces (n,) [N]."""
         del response
-        return self.external(load) - self._condensed.stiffness @ u
+        force = self.external(time)
+        force[self.elastic] -= self._condensed.stiffness @ u[self.elastic]
+        return force
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return the tangent and the elastic quadratic form of a step [N mm]."""
         del response
-        energy = float(step @ self._condensed.stiffness @ step)
+        energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
         return energy, energy
 
     def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
@@ -128,12 +132,13 @@ class Substructure(Part):
     def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the nodal forces (n,) of the whole body for those of this part [N]."""
         whole = np.zeros(self.whole.n)
-        whole[self._condensed.kept] = force[: len(self._condensed.kept)]
+        whole[self._condensed.kept] = force[self.elastic]
         return whole
 
-    def expand(self, u: NDArray[np.float64], load: float) -> NDArray[np.float64]:
-        """Return the displacements of the whole body [mm]."""
-        return self._condensed.expand(u, load, self.whole.n)[self.whole.copied]
+    def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """Return the displacements of the whole body [mm]; those of a wheel in its hub's frame."""
+        factor = self.body.load_factor(time)
+        return self._condensed.expand(u[self.elastic], factor, self.whole.n)[self.whole.copied]
 
 
 def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:

@@ -10,11 +10,10 @@ is prescribed.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from solver.fem.operators import Dense, Fixed
 from solver.fem.substructure import Substructure
 
 if TYPE_CHECKING:
@@ -22,11 +21,27 @@ if TYPE_CHECKING:
 
     from solver.fem.discretisation import Discretisation
     from solver.fem.surface import Surface
-    from solver.materials import Response
+
+
+_X, _Y, _TURN = range(3)
+
+
+class Hub(NamedTuple):
+    """How a hub has moved: along x and y [mm], and turned counter-clockwise [rad].
+
+    ``arc`` is the rotation times the wheel's radius [mm].
+    """
+
+    x: float
+    y: float
+    arc: float
+    rotation: float
 
 
 class Wheel(Substructure):
     """A part whose unknowns are rim displacements in the hub's frame, then (cx, cy, w)."""
+
+    moves = True
 
     def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
         super().__init__(whole, surfaces, linear_solver)
@@ -34,61 +49,38 @@ class Wheel(Substructure):
         assert axle is not None
         self.centre = np.asarray(axle.centre, dtype=float)
         self.radius = axle.radius
-        self.turned = axle.turned
-        self.program = program = axle.program
-        self.rim = self.n
-        self.n = self.rim + 3
-        self.load = np.zeros(self.n)
-        moving = [1] if program.rotation is not None else [1, 2]
-        self.rigid = np.zeros((self.n, len(moving)))
-        self.rigid[self.rim + np.array(moving), np.arange(len(moving))] = 1.0
-        self.free = np.concatenate([self.free, self.rim + np.array(moving)])
+        self.axle = axle
+        self._hub = self.n
+        self.n += 3
+        self.load_vector = np.zeros(self.n)
+        free = [_Y] if axle.rotation is not None else [_Y, _TURN]
+        self.rigid = np.zeros((self.n, len(free)))
+        self.rigid[self._hub + np.array(free), np.arange(len(free))] = 1.0
+        self.free = np.concatenate([self.free, self._hub + np.array(free)])
 
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
-        """Return the one operator of the rim; the hub has no stiffness."""
-        del surfaces, linear_solver
-        S = self._condensed.stiffness[np.ix_(self.active, self.active)]
-        return Fixed(Dense(S, self.active, self.n))
-
-    def external(self, load: float) -> NDArray[np.float64]:
+    def external(self, time: float) -> NDArray[np.float64]:
         """Return the force and moment on the hub at a time."""
         force = np.zeros(self.n)
-        force[self.rim + 1] = -self.program.at(load, "force")
-        if self.program.rotation is None:
-            force[self.rim + 2] = self.program.at(load, "moment") / self.radius
+        force[self._hub + _Y] = -self.axle.force.at(time)
+        if self.axle.rotation is None:
+            force[self._hub + _TURN] = self.axle.moment.at(time) / self.radius
         return force
 
     def grows(self, before: float, after: float) -> bool:
         """Whether force or moment on the axle grow from one time to another."""
-        return any(
-            abs(self.program.at(after, name)) > abs(self.program.at(before, name))
-            for name in ("force", "moment")
-        )
+        loads = (self.axle.force, self.axle.moment)
+        return any(abs(load.at(after)) > abs(load.at(before)) for load in loads)
 
-    def residual(
-        self, load: float, u: NDArray[np.float64], response: Response
-    ) -> NDArray[np.float64]:
-        """Return external minus internal forces (n,) [N]."""
-        del response
-        force = self.external(load)
-        force[: self.rim] -= self._condensed.stiffness @ u[: self.rim]
-        return force
-
-    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
-        """Return the quadratic form of a step twice [N mm]."""
-        del response
-        energy = float(step[: self.rim] @ self._condensed.stiffness @ step[: self.rim])
-        return energy, energy
-
-    def expand(self, u: NDArray[np.float64], load: float) -> NDArray[np.float64]:
-        """Return the elastic displacements of the whole wheel in the hub's frame [mm]."""
-        return super().expand(u[: self.rim], 0.0)
+    def hub(self, u: NDArray[np.float64]) -> Hub:
+        """Return how the hub has moved."""
+        x, y, arc = (float(value) for value in u[self._hub :])
+        return Hub(x, y, arc, arc / self.radius)
 
     # -- kinematics ----------------------------------------------------------------------------
 
     def _frame(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the rotation matrix."""
-        angle = u[self.rim + 2] / self.radius
+        angle = self.hub(u).rotation
         c, s = np.cos(angle), np.sin(angle)
         return np.array([[c, -s], [s, c]])
 
@@ -106,7 +98,7 @@ class Wheel(Substructure):
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         Q = self._frame(u)
-        hub = u[self.rim : self.rim + 2, None]
+        hub = u[self._hub : self._hub + 2, None]
         d = u[surface.dofs].reshape(-1, 2).T
         return Q @ (surface.X - self.centre[:, None] + d) + self.centre[:, None] + hub - surface.X
 
@@ -128,27 +120,34 @@ class Wheel(Substructure):
         turning[:gaps] = 0.0
         hub = nodal.sum(axis=1)
         rows = np.hstack([(nodal @ Q).reshape(block.shape), hub, turning[:, None]])
-        return np.append(surface.dofs, self.rim + np.arange(3)), rows
+        return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return ``u`` with the hub where it has to be at a time, rolling along with it."""
         out = u.copy()
-        out[self.rim] = self.program.at(time, "advance")
-        if self.program.rotation is None:
-            out[self.rim + 2] -= out[self.rim] - u[self.rim]
+        x, turn = self._hub + _X, self._hub + _TURN
+        out[x] = self.axle.advance.at(time)
+        if self.axle.rotation is None:
+            out[turn] -= out[x] - u[x]
         else:
-            out[self.rim + 2] = self.radius * self.program.at(time, "rotation")
+            out[turn] = self.radius * self.axle.rotation.at(time)
+        return out
+
+    def lowered(self, u: NDArray[np.float64], by: float) -> NDArray[np.float64]:
+        """Return ``u`` with the hub lowered [mm]."""
+        out = u.copy()
+        out[self._hub + _Y] -= by
         return out
 
     def start(self) -> NDArray[np.float64]:
-        """Return the wheel where the first pass begins."""
-        return self.placed(float(self.program.time[0]))
+        """Return the wheel where its programs begin."""
+        return self.placed(float(self.axle.advance.time[0]))
 
     def placed(self, time: float) -> NDArray[np.float64]:
-        """Return the undeformed wheel where the program wants it.
+        """Return the undeformed wheel where it has to be at a time.
 
         A wheel free to turn stands as if it had rolled there from where it was meshed.
         """
         u = np.zeros(self.n)
-        u[self.rim + 2] = self.radius * self.turned
+        u[self._hub + _TURN] = self.radius * self.axle.turned
         return self.moved(u, time)

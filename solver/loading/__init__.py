@@ -1,1 +1,1 @@
-"""Loading walked in increments: each one solved, cut where it fails, repeated to the end."""
+"""A loading history walked in increments: each one solved, cut where it fails, branched from."""

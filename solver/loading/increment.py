@@ -28,9 +28,10 @@ from solver.contact.state import Converged, State
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
+from solver.loading.control import Tolerances
 from solver.loading.flow import Flow, mechanism, softer
 from solver.loading.line_search import search
-from solver.loading.outcome import IncrementFailed, Tolerances, Yielded
+from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ _LATE = 1
 
 
 class Increment:
-    """One increment of ``system`` from the state ``start`` to the load factor ``load``.
+    """One increment of ``system`` from the state ``start`` to the time ``time``.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ class Increment:
         self,
         system: System,
         start: State,
-        load: float,
+        time: float,
         *,
         guess: State | None = None,
         contact: bool = True,
@@ -82,7 +83,7 @@ class Increment:
     ) -> None:
         self.system = system
         self.start = start
-        self.load = load
+        self.time = time
         self.guess = guess
         self.contact = contact
         self.elastic_first = elastic_first
@@ -159,21 +160,21 @@ class Increment:
     def _residuals(self, u: Vectors, responses: Sequence[Response]) -> Vectors:
         """Return external minus internal forces of each part, contact forces left out."""
         return tuple(
-            part.residual(self.load, ui, response)
+            part.residual(self.time, ui, response)
             for part, ui, response in zip(self.system.parts, u, responses, strict=True)
         )
 
     def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
         if not self.contact:
             return no_candidates(self.system)
-        span = self.load - self.start.load
+        span = self.time - self.start.time
         return find_candidates(self.system, self.start, u, contacts, span)
 
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
         inner = on_parts(self.system, candidates, candidates.forces)
-        external = norm([part.external(self.load) for part in parts])
+        external = norm([part.external(self.time) for part in parts])
         level = external + norm(inner)
         if external == 0:  # bodies that overlap push each other: stress alone tells how much
             level += norm(residuals)
@@ -220,7 +221,7 @@ class Increment:
         They push each other apart by a given distance then, which plastic flow alone can do in many
         ways: the step would be any of them, and as large as rounding makes it.
         """
-        loaded = any(part.external(self.load).any() for part in self.system.parts)
+        loaded = any(part.external(self.time).any() for part in self.system.parts)
         return not loaded and mechanism(self.system.parts, step.u, responses)
 
     # -- 5: line search ------------------------------------------------------------------------
@@ -267,7 +268,7 @@ class Increment:
         scale: float,
         iterations: int,
     ) -> Converged:
-        contacts = candidates.kept(self.start.contacts, self.load - self.start.load)
+        contacts = candidates.kept(self.start.contacts, self.time - self.start.time)
         spent = [
             part.plastic_work(before, response)
             for part, before, response in zip(
@@ -278,11 +279,11 @@ class Increment:
         held = zip(self.system.parts, residuals, inner, strict=True)
         return Converged(
             start=self.start,
-            forces=tuple(part.external(self.load) - r - c for part, r, c in held),
+            forces=tuple(part.external(self.time) - r - c for part, r, c in held),
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.load, u, tuple(r.state for r in responses), contacts, scale),
+            state=State(self.time, u, tuple(r.state for r in responses), contacts, scale),
             responses=responses,
             iterations=iterations,
             elastic=not any(r.yielding.any() for r in responses),

@@ -1,101 +1,29 @@
-"""Goes from one converged state to a target in increments, halving those that fail."""
+"""Goes from one converged state to a time in increments, halving those that fail."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field, replace
+import time as clock
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.state import Converged, Energy, State
-from solver.errors import LimitLoad, ModelError, NotConverged
+from solver.errors import LimitLoad, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
-from solver.loading.outcome import IncrementFailed, Tolerances
+from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
+from solver.loading.program import ROUNDING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from solver.contact.state import ContactState
     from solver.contact.system import System
+    from solver.loading.control import Control
 
     Report = Callable[[], None]
-    Predict = Callable[[State | None, State, float], State | None]
-
-ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PathControl:
-    """How a path is cut into increments.
-
-    Attributes
-    ----------
-    load_step : spacing of the trunk, in load factor
-    unload_steps : equal increments from full load to none; the last takes the bodies apart
-    max_cuts : times an increment may be halved before the path ends
-    tolerances : of an increment
-    """
-
-    load_step: float = 0.05
-    unload_steps: int = 5
-    max_cuts: int = 4
-    tolerances: Tolerances = field(default_factory=Tolerances)
-
-    def __post_init__(self) -> None:
-        if not self.load_step > 0:
-            raise ModelError("load_step", self.load_step, "must be positive")
-        if self.unload_steps < 1:
-            raise ModelError("unload_steps", self.unload_steps, "must be at least 1")
-
-
-@dataclass(frozen=True, slots=True)
-class Tally:
-    """What a path has cost and done.
-
-    Newton iterations of each increment, cuts, iterations that needed the inner fallback or a
-    blended tangent, CPU seconds, plastic work [N mm], least plastic dissipation at a point of an
-    increment [N mm/mm3].
-    """
-
-    iterations: tuple[int, ...] = ()
-    cuts: int = 0
-    pivoted: int = 0
-    blended: int = 0
-    seconds: float = 0.0
-    plastic_work: float = 0.0
-    dissipation: float = 0.0
-
-    def plus(self, converged: Converged) -> Tally:
-        """Return the tally with one more increment."""
-        return replace(
-            self,
-            iterations=(*self.iterations, converged.iterations),
-            pivoted=self.pivoted + converged.pivoted,
-            blended=self.blended + converged.blended,
-            plastic_work=self.plastic_work + converged.plastic_work,
-            dissipation=float(np.minimum(self.dissipation, converged.dissipation)),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """A state on the path, the one before it for extrapolation, and the cost so far."""
-
-    now: Converged
-    before: State | None
-    tally: Tally
-
-
-class Stopped(Exception):
-    """A path has ended: why, and its last point."""
-
-    def __init__(self, error: NotConverged, point: Point) -> None:
-        super().__init__(str(error))
-        self.error = error
-        self.point = point
 
 
 class Stepper:
@@ -103,113 +31,140 @@ class Stepper:
 
     Parameters
     ----------
-    predict : gives the state an increment iterates from, or None for the last converged one
-    elastic_first : whether increments with a prediction still begin with the elastic operator
-    place : says in words where on the path a load factor (or time) is
+    report : called after every increment
+    place : says in words where on the path a time is
     """
 
     def __init__(
         self,
         system: System,
-        control: PathControl,
+        control: Control,
         report: Report | None = None,
-        predict: Predict | None = None,
-        *,
-        elastic_first: bool = False,
         place: Callable[[float], str] = "load factor {:.6g}".format,
     ) -> None:
         self.system = system
         self.control = control
-        self._predict = predict or extrapolate
-        self._elastic_first = elastic_first
-        self._place = place
-        self.report = report or (lambda: None)
-        self._clock = time.process_time()
+        self.place = place
+        self._report = report or (lambda: None)
+        self._clock = clock.process_time()
 
-    def rest(self, state: State) -> Point:
-        """Return the first point of a path: a state without contact forces at load zero."""
-        at_rest = Increment(self.system, state, state.load, contact=False).solve()
+    def rest(self, state: State, tally: Tally | None = None) -> Point:
+        """Return the first point of a path: a state without contact forces."""
+        at_rest = Increment(self.system, state, state.time, contact=False).solve()
         stresses = zip(self.system.parts, at_rest.responses, strict=True)
         energy = Energy(stored=sum(elastic_energy(part, r.stress) for part, r in stresses))
-        return Point(replace(at_rest, state=state, energy=energy), None, Tally())
+        return Point(replace(at_rest, state=state, energy=energy), None, tally or Tally())
 
-    def together(self, state: State) -> Point:
-        """Return the first point of a path, overlapping bodies having pushed each other apart.
+    def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
+        """Return the first point of a lap: what moves is set down, what overlaps pushed apart.
 
-        They do so before any load acts, so that what they resist is not taken for a limit load.
+        Overlapping bodies push each other apart before any load acts, so that what they resist is
+        not taken for a limit load. Raises `PathEnded` where they do not find their balance.
         """
-        point = self.rest(state)
+        point = self.rest(self.system.set_down(state, time), tally)
         if not self.system.overlapping:
             return point
         try:
             pushed = Increment(
-                self.system, state, state.load, tolerances=self.control.tolerances
+                self.system, point.now.state, time, tolerances=self.control.tolerances
             ).solve()
         except IncrementFailed as failure:
             error = NotConverged(f"the overlap of the bodies could not be resolved: {failure}")
-            raise Stopped(error, replace(point, tally=self.timed(point.tally))) from failure
-        pushed = self.worked(point.now, pushed)
-        return Point(pushed, None, self.timed(point.tally.plus(pushed)))
+            raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
+        pushed = self._worked(point.now, pushed)
+        return Point(pushed, None, self._timed(point.tally.plus(pushed)))
 
     def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
-        """Return the point at load ``target`` or raise `Stopped`."""
-        step = target - point.now.state.load
+        """Return the point at time ``target`` or raise `PathEnded`."""
+        step = target - point.now.state.time
         least = abs(step) / 2**self.control.max_cuts
-        while point.now.state.load != target:
+        while point.now.state.time != target:
             state = point.now.state
-            close = abs(target - state.load) <= abs(step) * (1 + ROUNDING)
-            load = target if close else state.load + step
-            together = contact or load != target
-            guess = self._predict(point.before, state, load) if together else None
+            close = abs(target - state.time) <= abs(step) * (1 + ROUNDING)
+            time = target if close else state.time + step
+            together = contact or time != target
+            guess = self._predict(point.before, state, time) if together else None
             try:
                 converged = Increment(
                     self.system,
                     state,
-                    load,
+                    time,
                     guess=guess,
                     contact=together,
-                    elastic_first=guess is None or self._elastic_first,
-                    patient=abs(load - state.load) < 2 * least * (1 - ROUNDING),
+                    elastic_first=guess is None or self.system.moves,
+                    patient=abs(time - state.time) < 2 * least * (1 - ROUNDING),
                     tolerances=self.control.tolerances,
                 ).solve()
             except IncrementFailed as failure:
                 tally = replace(point.tally, cuts=point.tally.cuts + 1)
-                point = replace(point, tally=self.timed(tally), before=None)
-                step = (load - state.load) / 2
+                point = replace(point, tally=self._timed(tally), before=None)
+                step = (time - state.time) / 2
                 if abs(step) < least * (1 - ROUNDING):
-                    raise Stopped(self._ended(failure, state.load, load), point) from failure
+                    raise PathEnded(self._ended(failure, state.time, time), point) from failure
                 continue
-            converged = self.worked(point.now, converged)
-            point = Point(converged, state, self.timed(point.tally.plus(converged)))
+            converged = self._worked(point.now, converged)
+            point = Point(converged, state, self._timed(point.tally.plus(converged)))
             if converged.strayed:
-                error = NotConverged(f"{self._place(load)}: {converged.strayed}", state.load, load)
-                raise Stopped(error, point)
-            self.report()
+                error = NotConverged(f"{self.place(time)}: {converged.strayed}", state.time, time)
+                raise PathEnded(error, point)
+            self._report()
         return point
 
-    def worked(self, before: Converged, now: Converged) -> Converged:
+    def elastic(self, point: Point, target: float) -> Point | None:
+        """Return the point at time ``target`` in one increment, None where something yields.
+
+        One increment is exact where the history of friction cannot matter: no friction, or
+        surfaces that fit before loading, where everything grows in proportion.
+        """
+        if not self.system.proportional:
+            return None
+        try:
+            converged = Increment(
+                self.system,
+                point.now.state,
+                target,
+                elastic_only=True,
+                tolerances=self.control.tolerances,
+            ).solve()
+        except (Yielded, IncrementFailed):
+            return None
+        if converged.strayed:  # stepping tells at which load
+            return None
+        converged = self._worked(point.now, converged)
+        self._report()
+        return Point(converged, None, self._timed(point.tally.plus(converged)))
+
+    def _predict(self, before: State | None, now: State, time: float) -> State | None:
+        """Return the state an increment iterates from, or None for the last converged one.
+
+        Under a load that moves over a body the next state is not on the line through the last two:
+        then only what moves goes on.
+        """
+        return self.system.moved(now, time) if self.system.moves else extrapolate(before, now, time)
+
+    def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return an increment with the work along its path up to there."""
         return replace(now, energy=worked(self.system.parts, before, now))
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
-        way = f"between {self._place(reached)} and {self._place(attempted)}"
+        way = f"between {self.place(reached)} and {self.place(attempted)}"
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
         if failure.flow.limit and growing:
             return LimitLoad(f"no equilibrium {way}: {failure.flow}", reached, attempted)
         return NotConverged(f"the increment {way} failed: {failure}", reached, attempted)
 
-    def timed(self, tally: Tally) -> Tally:
+    def _timed(self, tally: Tally) -> Tally:
         """Return the tally with the CPU time spent since the last call."""
-        now = time.process_time()
+        now = clock.process_time()
         spent, self._clock = now - self._clock, now
         return replace(tally, seconds=tally.seconds + spent)
 
 
-def extrapolate(before: State | None, now: State, load: float) -> State | None:
-    """Return the state at ``load`` on the line through two states, or None at a reversal."""
-    if before is None or now.load == before.load:
+def extrapolate(before: State | None, now: State, time: float) -> State | None:
+    """Return the state at ``time`` on the line through two states, or None at a reversal."""
+    if before is None or now.time == before.time:
         return None
-    share = (load - now.load) / (now.load - before.load)
+    share = (time - now.time) / (now.time - before.time)
     if share <= 0:
         return None
 
@@ -225,3 +180,10 @@ def extrapolate(before: State | None, now: State, load: float) -> State | None:
         u=tuple(n + share * (n - b) for b, n in zip(before.u, now.u, strict=True)),
         contacts=tuple(contact(b, n) for b, n in zip(before.contacts, now.contacts, strict=True)),
     )
+
+
+def turned(point: Point) -> Point:
+    """Return the point where time begins to mean another motion."""
+    state = point.now.state
+    contacts = tuple(contact.halted() for contact in state.contacts)
+    return replace(point, now=replace(point.now, state=replace(state, contacts=contacts)))

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from skfem import Mesh
 
     from solver.materials.material import Material
+    from solver.model.amplitude import Amplitude
     from solver.model.motion import Axle, TravellingPressure
 
 
@@ -34,10 +35,11 @@ class Body:
     full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
     thickness : of plane bodies [mm]
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
-    pressure : boundary name -> pressure at load factor one, positive when pushing [MPa]
+    pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]
+    amplitude : of the pressures over time; when absent time is the load factor
     condense : reduce the body to its contact surfaces where its material is elastic
     axle : makes an elastic body a wheel; its supports then hold it to the hub
-    travelling : a pressure that moves along a boundary; load factors then are times
+    travelling : a pressure that moves along a boundary
     periodic : two straight boundaries, the second a copy of the first one period along x; the
         body repeats itself beyond them
     """
@@ -51,6 +53,7 @@ class Body:
     thickness: float = 1.0
     supports: Mapping[str, str] = field(default_factory=dict)
     pressure: Mapping[str, float] = field(default_factory=dict)
+    amplitude: Amplitude | None = None
     condense: bool = True
     axle: Axle | None = None
     travelling: TravellingPressure | None = None
@@ -93,6 +96,10 @@ class Body:
         for boundary, value in self.pressure.items():
             if not np.isfinite(value):
                 raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")
+
+    def load_factor(self, time: float) -> float:
+        """Return the factor of the pressures at a time."""
+        return time if self.amplitude is None else self.amplitude.at(time)
 
     def _check_periodic(self, sides: tuple[str, str]) -> None:
         if not isinstance(sides, tuple) or len(sides) != 2:

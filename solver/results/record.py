@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 
 class Status(Enum):
-    """Outcome of a run; the text is advice."""
+    """Outcome of a run."""
 
     OK = "the run converged and passed its audit"
-    LIMIT_LOAD = "no equilibrium at this load: lower load_ratio or let the material harden"
-    NOT_CONVERGED = "an increment did not converge: reduce load_step or refine the mesh"
-    AUDIT_FAILED = "converged, but the audit found a violated condition: see the message"
+    LIMIT_LOAD = "there is no equilibrium at this load"
+    NOT_CONVERGED = "an increment did not converge"
+    AUDIT_FAILED = "the run converged, but its audit found a violated condition"
 
     @property
     def code(self) -> int:
@@ -33,7 +33,7 @@ class Record:
     Attributes
     ----------
     parameters : the scene's parameter object of exactly this run
-    status, message : outcome, and the reason when it is not ``OK``
+    status, message : outcome; when it is not ``OK``, the reason and what to do
     coordinates : dimension name -> values, floats (``x``, ``y``, ``depth``, ``s``, ``station``)
         or labels (``component``, ``stage``, ``body``)
     fields : variable name -> (dimension names, values); NaN outside the bodies

@@ -11,8 +11,9 @@ from solver.contact.pressure import contact_pressure
 from solver.contact.system import System
 from solver.errors import ModelError
 from solver.fem.fields import recovery
-from solver.loading.path import Path
-from solver.loading.stepper import PathControl, Tally
+from solver.loading.control import PathControl
+from solver.loading.outcome import Tally
+from solver.loading.walker import Walker
 from solver.results.audit import Audit, audit
 from solver.tensors import to_tensor
 
@@ -105,16 +106,14 @@ def solve(
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
     system = System(model, linear_solver)
-    path = Path(system, control or PathControl(load_step=load / 20))
-    (branch,) = path.branches([load])
-    if branch.error is not None:
-        raise branch.error
-    assert branch.loaded is not None
-    assert branch.unloaded is not None
+    control = control or PathControl(load_step=load / 20)
+    (outcome,) = Walker(system, control).walk([control.program(load)])
+    if outcome.error is not None:
+        raise outcome.error
     return Solution(
         system=system,
         load=load,
-        loaded=branch.loaded,
-        unloaded=branch.unloaded,
-        tally=branch.tally,
+        loaded=outcome.points["loaded"],
+        unloaded=outcome.points["unloaded"],
+        tally=outcome.tally,
     )

@@ -1,4 +1,4 @@
-"""What acts between the bodies of a scene: in contact, or as prescribed."""
+"""What acts between the bodies of a run: in contact, or as prescribed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
+from solver.fem.wheel import Wheel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,15 +35,20 @@ class Touch(Protocol):
     def force(self, converged: Converged) -> float:
         """Return the tangential force along +x [N]."""
 
+    def centre(self, converged: Converged) -> float:
+        """Return where the load is along x [mm]."""
+
 
 class Contact:
     """The first interface of a system.
 
-    In every scene the lower body's +x is the opposite of the slave's own tangent.
+    In every scene the lower body's +x is the opposite of the slave's own tangent. ``symmetric``
+    tells that the other half of the contact is not computed.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, *, symmetric: bool) -> None:
         self._system = system
+        self._symmetric = symmetric
         self._interface = system.interfaces[0]
         chain = self._interface.slave_surface
         self._x = chain.X[0, chain.vertices]
@@ -70,13 +76,19 @@ class Contact:
         """See `Touch`."""
         pressure, _ = contact_pressure(self._system, converged.state, 0)
         x = self._x[converged.state.contacts[0].normal > 0]
-        symmetric = self._x.min() == 0
-        width = float(x.max() if symmetric else np.ptp(x) / 2) if len(x) else 0.0
+        width = float(x.max() if self._symmetric else np.ptp(x) / 2) if len(x) else 0.0
         return width, float(pressure.max())
 
     def force(self, converged: Converged) -> float:
         """See `Touch`."""
         return -float(converged.state.contacts[0].tangential.sum())
+
+    def centre(self, converged: Converged) -> float:
+        """See `Touch`."""
+        parts = zip(self._system.parts, converged.state.u, strict=True)
+        return next(
+            (part.centre[0] + part.hub(u).x for part, u in parts if isinstance(part, Wheel)), 0.0
+        )
 
 
 class Prescribed:
@@ -88,25 +100,30 @@ class Prescribed:
 
     def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
         """See `Touch`."""
-        pressure, ratio = self._travelling.at(converged.state.load, x, self._period)
+        pressure, ratio = self._travelling.at(converged.state.time, x, self._period)
         return pressure, ratio * pressure, np.full_like(x, np.nan)
 
     def extent(self, converged: Converged) -> tuple[float, float]:
         """See `Touch`."""
-        share, _, _ = self._travelling.now(converged.state.load)
+        share, _, _ = self._travelling.now(converged.state.time)
         return self._travelling.half_width, share * self._travelling.peak
 
     def force(self, converged: Converged) -> float:
         """See `Touch`."""
-        _, _, ratio = self._travelling.now(converged.state.load)
+        _, _, ratio = self._travelling.now(converged.state.time)
         width, peak = self.extent(converged)
         return np.pi / 2 * width * peak * ratio
 
+    def centre(self, converged: Converged) -> float:
+        """See `Touch`."""
+        _, centre, _ = self._travelling.now(converged.state.time)
+        return centre
 
-def touch_of(system: System) -> Touch:
+
+def touch_of(system: System, *, symmetric: bool) -> Touch:
     """Return what acts between the bodies of a system, or on its only one."""
     if system.interfaces:
-        return Contact(system)
+        return Contact(system, symmetric=symmetric)
     (body,) = system.model.bodies
     assert body.travelling is not None
     return Prescribed(body.travelling, system.full(body.name).period)

@@ -13,28 +13,29 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval, Unit
 
-from solver.contact.state import Converged
-from solver.contact.system import System
 from solver.errors import ModelError
-from solver.loading.path import Path
-from solver.loading.stepper import PathControl
+from solver.loading.program import Program, load_and_release
 from solver.mesh import graded, grid
 from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.results.audit import cut_force
-from solver.results.harvest import End, Harvest, Layout
-from solver.results.record import Record
+from solver.results.contact import contact
+from solver.results.fields import maps, profiles, surfaces
+from solver.results.figures import cost, extremes
+from solver.results.look import Look, Values
+from solver.results.quantities import Quantity, declare
+from solver.results.record import Status
+from solver.results.view import View
 from solver.scenes.parameters import ContactParameters, Length, Ratio, described
-from solver.scenes.scene import Monitor, Scene
+from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -137,14 +138,19 @@ def model(parameters: PunchParameters) -> Model:
     return Model(bodies=(punch, half_plane), contacts=(contact,))
 
 
-def layout(parameters: PunchParameters) -> Layout:
+def program(parameters: PunchParameters) -> Program:
+    """Return the history: the pressure is raised, then taken away with the punch."""
+    return load_and_release(parameters.load_ratio, parameters.load_step, parameters.unload_steps)
+
+
+def view(parameters: PunchParameters) -> View:
     """Return where the punch is looked at: a function of its dimensions, not of its mesh."""
     a = parameters.half_width
     height = min(0.6, parameters.punch_height) * a
     inside = np.unique(np.concatenate([[0.005, 0.01, 0.028, 0.05, 0.1],
                                        np.geomspace(5e-4, 1.0, 67)]))  # fmt: skip
     outside = np.geomspace(5e-4, 0.98, 40)
-    return Layout(
+    return View(
         # centres of cells, so that no row or column lies on a boundary of the bodies
         x=a * (np.arange(160) + 0.5) / 100,
         y=a * (np.arange(-100, round(100 * height / a)) + 0.5) / 100,
@@ -153,59 +159,55 @@ def layout(parameters: PunchParameters) -> Layout:
         s=a * np.concatenate([1.0 - inside[::-1], [1.0], 1.0 + outside]),
         profile_body="half_plane",
         surfaces={"punch": "bottom", "half_plane": "top"},
+        symmetric=True,
     )
 
 
-def _figures(harvest: Harvest, unloaded: Converged) -> dict[str, float]:
+RESIDUAL_X = {
+    "half_plane": declare(
+        "residual_x_half_plane",
+        "residual stress xx on the half-plane, 0.005 half-widths inside the corner", "MPa",
+    ),
+    "punch": declare(
+        "residual_x_punch",
+        "residual stress xx on the punch, 0.028 half-widths inside the corner", "MPa",
+    ),
+}  # fmt: skip
+MAX_PLASTIC_STRAIN = {
+    "punch": declare("max_plastic_strain_punch", "largest equivalent plastic strain in the punch"),
+    "half_plane": declare(
+        "max_plastic_strain_half_plane", "largest equivalent plastic strain in the half-plane"
+    ),
+}
+FREE_SURFACE = declare("audit_free_surface", "residual stress across the free side / yield stress")
+SELF_EQUILIBRIUM = declare("audit_self_equilibrium", "net residual force on a cut plane, relative")
+_INSIDE = {"half_plane": 0.005, "punch": 0.028}
+"""Where residual stress is read, from the corner / a: as published."""
+
+
+def figures(look: Look) -> Values:
     """Return the figures this scene is judged by."""
-    system = harvest.system
-    a = float(system.interfaces[0].slave_surface.X[0].max())
-    s = harvest.layout.s
-    out = {}
-    for body, distance in (("half_plane", 0.005), ("punch", 0.028)):
-        sigma = harvest.on_surface(body, unloaded)[0]
+    samples, system, unloaded = look.samples, look.system, look.unloaded
+    a, s = look.parameters.half_width, look.view.s
+    out: dict[Quantity, float] = {}
+    for body, distance in _INSIDE.items():
+        sigma = samples.on_surface(body, unloaded)[0]
         at = int(np.argmin(np.abs(s - a * (1 - distance))))
-        out[f"residual_x_{body}"] = float(sigma[at])
-    for body in ("punch", "half_plane"):
+        out[RESIDUAL_X[body]] = float(sigma[at])
+    for body, quantity in MAX_PLASTIC_STRAIN.items():
         strain = system.response(body, unloaded).state.accumulated
-        out[f"max_plastic_strain_{body}"] = float(strain.max())
+        out[quantity] = float(strain.max())
     # the free side of the punch carries no sigma_x: what remains is error
     nodes = system.full("punch").boundary_nodes("right")
-    side = harvest.stress("punch", unloaded)[0, nodes]
-    below = system.full("half_plane")
-    out["audit_free_surface"] = float(np.abs(side).max() / below.body.material.yield_stress)
+    side = samples.stress("punch", unloaded)[0, nodes]
+    out[FREE_SURFACE] = float(np.abs(side).max() / look.parameters.yield_stress)
     # nothing pushes on the half-plane any more: no level cut carries a force
-    line = np.linspace(0.0, float(below.X[0].max()) * (1 - 1e-9), 8000)
+    width = float(system.full("half_plane").X[0].max())
+    line = np.linspace(0.0, width * (1 - 1e-9), 8000)
     cut = np.stack([line, np.full_like(line, -0.5 * a)])
     stress = system.response("half_plane", unloaded).stress
-    out["audit_self_equilibrium"] = abs(cut_force(system, "half_plane", stress, cut))
+    out[SELF_EQUILIBRIUM] = abs(cut_force(system, "half_plane", stress, cut))
     return out
-
-
-def path(
-    parameters: PunchParameters, values: Sequence[float], monitor: Monitor
-) -> Iterator[Record]:
-    """Yield one record for each load ratio, in increasing order."""
-    ratios = sorted(replace(parameters, load_ratio=v).load_ratio for v in values)
-    system = System(model(parameters))
-    harvest = Harvest(system, layout(parameters))
-    control = PathControl(load_step=parameters.load_step, unload_steps=parameters.unload_steps)
-    expected = ratios[-1] / control.load_step + len(ratios) * (control.unload_steps + 1)
-    done = 0
-
-    def report() -> None:
-        nonlocal done
-        done += 1
-        monitor(min(done / expected, 0.99))
-
-    for ratio, branch in zip(ratios, Path(system, control, report).branches(ratios), strict=True):
-        loaded, unloaded = branch.loaded, branch.unloaded
-        end = End(tally=branch.tally, error=branch.error, loaded=loaded, unloaded=unloaded)
-        if loaded is not None and unloaded is not None:
-            stages = ((loaded, 0.0), (unloaded, 0.0))
-            end = replace(end, stages=stages, scalars=_figures(harvest, unloaded))
-        yield harvest.record(replace(parameters, load_ratio=ratio), end)
-    monitor(1.0)
 
 
 PUNCH = Scene(
@@ -213,5 +215,14 @@ PUNCH = Scene(
     summary="elastic-plastic punch pressed on an elastic-plastic half-plane, and released",
     parameters=PunchParameters,
     branch="load_ratio",
-    path=path,
+    refining=frozenset({"element", "smallest_element", "growth", "load_step", "unload_steps"}),
+    model=model,
+    program=program,
+    view=view,
+    outputs=(maps, profiles, surfaces, contact, extremes, figures),
+    costs=(cost,),
+    advice={
+        Status.LIMIT_LOAD: "lower load_ratio, or let the material harden",
+        Status.NOT_CONVERGED: "reduce load_step, or refine the mesh by smallest_element or growth",
+    },
 )

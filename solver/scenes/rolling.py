@@ -15,31 +15,100 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.2.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.system import System
-from solver.errors import LimitLoad
 from solver.fem.wheel import Wheel
-from solver.loading.passes import PassResult
-from solver.loading.stepper import Tally
+from solver.loading.walker import Settling
+from solver.results.contact import contact
+from solver.results.fields import maps, surfaces
+from solver.results.figures import cost, extremes
 from solver.results.free_surface import FreeSurface
-from solver.results.harvest import End, Harvest, Layout
-from solver.results.record import Record
-from solver.results.trace import Trace, fields, shakedown
+from solver.results.passes import Trace, passes, shakedown
+from solver.results.quantities import declare
+from solver.results.record import Status
+from solver.results.shakedown import State
+from solver.results.view import View
 from solver.scenes.rolling_model import RollingParameters, model
-from solver.scenes.scene import Monitor, Scene
-from solver.scenes.settling import Settling
+from solver.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.loading.program import Program
+    from solver.results.look import Look, Values
+    from solver.results.quantities import Quantity
+
+CREEPAGE = declare("creepage", "creepage of the last pass")
+TRAVEL = declare("travel", "length rolled in the last pass", "mm")
+ADVANCE = declare("advance", "advance of an increment that was taken", "mm")
+ADVANCE_ERROR = declare(
+    "advance_error",
+    "estimated error of residual stress under mid-track that the advance leaves", "MPa",
+)  # fmt: skip
+SURFACE, FIRST_ROW, FREE_SURFACE, LOWEST, DEPTH_OF_LOWEST = (
+    {
+        axis: declare(name.format(axis), words.format(2 * axis), units)
+        for axis in "xz"
+    }
+    for name, words, units in (
+        ("surface_residual_{}",
+         "residual stress {} at the surface, mid-track, extrapolated to its nodes", "MPa"),
+        ("first_row_residual_{}",
+         "residual stress {} at the first row of integration points, mid-track", "MPa"),
+        ("free_surface_residual_{}",
+         "residual stress {} at the surface, mid-track, by the conditions of a free surface",
+         "MPa"),
+        ("lowest_residual_{}", "smallest residual stress {} under mid-track", "MPa"),
+        ("depth_of_lowest_residual_{}", "depth of the smallest residual stress {}", "mm"),
+    )
+)  # fmt: skip
+FIRST_ROW_DEPTH = declare(
+    "first_row_depth", "depth of the first row of integration points, mid-track", "mm"
+)
+SURFACE_PLASTIC_STRAIN = declare(
+    "surface_plastic_strain", "equivalent plastic strain at the surface, mid-track"
+)
+HIGHEST_PLASTIC_STRAIN = declare(
+    "highest_plastic_strain", "largest equivalent plastic strain under mid-track"
+)
+DEPTH_OF_HIGHEST_PLASTIC_STRAIN = declare(
+    "depth_of_highest_plastic_strain",
+    "depth of the largest plastic strain under mid-track", "mm",
+)  # fmt: skip
+UNSTEADINESS = declare(
+    "unsteadiness",
+    "largest difference of residual stress between stations / largest residual stress",
+)
+LONGITUDINAL_FORCE = declare(
+    "longitudinal_force", "longitudinal force on the track along x, mid-track", "N"
+)
+AXLE_HEIGHT = declare("axle_height", "displacement of the axle at mid-track", "mm")
+AXLE_ROTATION = declare(
+    "axle_rotation",
+    "rotation of the wheel at mid-track, counter-clockwise, from how it is meshed there", "rad",
+)  # fmt: skip
+SHAKEDOWN_STATE = declare("shakedown_state", "shakedown state that the passes tend to", flags=State)
+STEADY_PLASTIC_INCREMENT = declare(
+    "steady_plastic_increment", "plastic strain accumulated in a cycle, in the end"
+)
+STEADY_NET_INCREMENT = declare(
+    "steady_net_increment", "signed plastic strain a cycle leaves, in the end"
+)
 
 
-def layout(parameters: RollingParameters) -> Layout:
+def program(parameters: RollingParameters) -> Program:
+    """Return the passes."""
+    return parameters.schedule.program
+
+
+def view(parameters: RollingParameters) -> View:
     """Return where rolling is looked at: a function of its dimensions, not of its mesh."""
     half, a = parameters.track / 2, parameters.half_width
     depth = 5 * a
     edge = math.ceil(half + 2 * a)
-    return Layout(
+    return View(
         x=np.linspace(-edge, edge, 2 * edge * 2 + 1),
         y=-(np.arange(120) + 0.5) * depth / 120,
         depth=np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)]),
@@ -48,142 +117,104 @@ def layout(parameters: RollingParameters) -> Layout:
         profile_body="half_space",
         surfaces={"half_space": "top"},
         stages=("loaded", "mid_track", "unloaded"),
+        loaded="mid_track",
+        following=("loaded",),
     )
 
 
-def _figures(harvest: Harvest, trace: Trace, result: PassResult) -> dict[str, float]:
-    """Return the figures of the last pass under mid-track that rolling is judged by."""
-    assert result.mid_track is not None
-    stress, strain = trace.stress, trace.strain
-    depth = harvest.layout.depth
-    middle = len(stress) // 2
-    out = {"creepage": result.creepage, "travel": result.travel}
-    for name, component in (("x", 0), ("z", 2)):
-        profile = stress[middle, component]
-        out[f"surface_residual_{name}"] = float(profile[0])
-        out[f"lowest_residual_{name}"] = float(profile.min())
-        out[f"depth_of_lowest_residual_{name}"] = float(depth[profile.argmin()])
-    out |= _surface(harvest.system, result)
-    out["surface_plastic_strain"] = float(strain[middle, 0])
-    out["highest_plastic_strain"] = float(strain[middle].max())
-    out["depth_of_highest_plastic_strain"] = float(depth[strain[middle].argmax()])
-    spread = np.ptp(stress[:, [0, 2]], axis=0).max()
-    out["unsteadiness"] = float(spread / max(np.abs(stress[:, [0, 2]]).max(), 1e-30))
-    out["longitudinal_force"] = harvest.touch.force(result.mid_track)
-    part = harvest.system.parts[0]
-    if isinstance(part, Wheel):
-        wheel = result.mid_track.state.u[0]
-        out["axle_height"] = float(wheel[-2])
-        out["axle_rotation"] = float(wheel[-1]) / part.radius
-    return out
+def settling(parameters: RollingParameters) -> Settling | None:
+    """Return how the advance is chosen: as given, or halved until residual stress settles."""
+    tolerance = parameters.advance_tolerance * parameters.yield_stress
+    return Settling(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
 
 
-def _surface(system: System, result: PassResult) -> dict[str, float]:
-    """Return residual stress at mid-track that is not extrapolated to the surface."""
-    assert result.unloaded is not None
-    surface = FreeSurface.of(system.full("half_space"), "top")
-    response = system.response("half_space", result.unloaded)
-    u = system.displacement("half_space", result.unloaded.state)
-    free = surface.at(0.0, surface.stress(u, response.state.plastic_strain))
-    row = surface.at(0.0, surface.first_row(response.stress))
+def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
+    """Return the residual stress xx and zz under mid-track (2, depth) [MPa]."""
+    return trace.stress[len(trace.stress) // 2, [0, 2]]
+
+
+def progress(look: Look) -> Values:
+    """Return how far the wheel came in its last pass, and in what increments."""
+    schedule, settled = look.parameters.schedule, look.outcome.settled
     return {
-        "first_row_residual_x": float(row[0]),
-        "first_row_residual_z": float(row[1]),
-        "first_row_depth": float(surface.at(0.0, surface.depth)),
-        "free_surface_residual_x": float(free[0]),
-        "free_surface_residual_z": float(free[1]),
+        TRAVEL: schedule.travel(look.outcome.last.state.time),
+        ADVANCE: schedule.advance / settled.times,
+        ADVANCE_ERROR: settled.error,
     }
 
 
-def beyond_strength(parameters: RollingParameters) -> LimitLoad | None:
-    """Return why a prescribed shear has no equilibrium, if so.
-
-    No stress in or inside the yield surface has a shear above the shear yield stress, and the
-    traction is the stress at the surface: without hardening nothing can balance more.
-    """
-    shear = abs(parameters.friction * parameters.traction) * parameters.peak_pressure
-    strength = parameters.yield_stress / math.sqrt(3)
-    hardens = parameters.material().plastic_modulus > 0
-    if parameters.load != "hertz" or hardens or shear <= strength:
-        return None
-    return LimitLoad(
-        f"the prescribed shear, {shear:.4g} MPa, is above the shear yield stress, "
-        f"{strength:.4g} MPa: no equilibrium without hardening",
-        strength / shear,
-        1.0,
-    )
-
-
-def path(
-    parameters: RollingParameters, values: Sequence[float], monitor: Monitor
-) -> Iterator[Record]:
-    """Yield one record for each number of passes, in increasing order."""
-    wanted = sorted(replace(parameters, passes=int(v)).passes for v in values)
-    parameters = replace(parameters, passes=wanted[-1])
-    schedule = parameters.schedule
-    system = System(model(parameters))
-    harvest = Harvest(system, layout(parameters))
-    if error := beyond_strength(parameters):
-        for n in wanted:
-            end = End(tally=Tally(), error=error, scalars={"travel": 0.0})
-            yield harvest.record(replace(parameters, passes=n), end)
-        return
-    increments = 2 * schedule.half_steps + schedule.press + schedule.release
-    expected, done = increments * schedule.n, 0
-
-    def report() -> None:
-        nonlocal done
-        done += 1
-        monitor(min(done / expected, 0.99))
-
-    tolerance = parameters.advance_tolerance * parameters.yield_stress
-    rolled = Settling(harvest, schedule, tolerance, report)
-    traces: list[Trace] = []
-    for result in rolled.results():
-        if result.unloaded is not None:
-            traces.append(Trace.of(harvest, result))
-        for n in wanted:
-            if n == result.number + 1 or (result.unloaded is None and n > result.number):
-                here = replace(parameters, passes=n)
-                yield _record(harvest, here, result, traces, rolled)
-    monitor(1.0)
+def profile_figures(look: Look) -> Values:
+    """Return the figures of the last pass under mid-track that rolling is judged by."""
+    trace: Trace = look.outcome.traces[-1]
+    stress, strain = trace.stress, trace.strain
+    depth = look.view.depth
+    middle = len(stress) // 2
+    out: dict[Quantity, float] = {CREEPAGE: trace.creepage}
+    for axis, component in (("x", 0), ("z", 2)):
+        profile = stress[middle, component]
+        out[SURFACE[axis]] = float(profile[0])
+        out[LOWEST[axis]] = float(profile.min())
+        out[DEPTH_OF_LOWEST[axis]] = float(depth[profile.argmin()])
+    out[SURFACE_PLASTIC_STRAIN] = float(strain[middle, 0])
+    out[HIGHEST_PLASTIC_STRAIN] = float(strain[middle].max())
+    out[DEPTH_OF_HIGHEST_PLASTIC_STRAIN] = float(depth[strain[middle].argmax()])
+    spread = np.ptp(stress[:, [0, 2]], axis=0).max()
+    out[UNSTEADINESS] = float(spread / max(np.abs(stress[:, [0, 2]]).max(), 1e-30))
+    return out
 
 
-def _record(
-    harvest: Harvest,
-    parameters: RollingParameters,
-    last: PassResult,
-    traces: Sequence[Trace],
-    rolled: Settling,
-) -> Record:
-    accuracy = {"advance": rolled.advance, "advance_error": rolled.error}
-    if last.unloaded is None or last.mid_track is None or last.loaded is None:
-        scalars = accuracy | {"travel": last.travel}
-        return harvest.record(parameters, End(tally=last.tally, error=last.error, scalars=scalars))
+def wheel(look: Look) -> Values:
+    """Return the longitudinal force at mid-track and, where there is a wheel, how it stands."""
+    out: dict[Quantity, float] = {LONGITUDINAL_FORCE: look.touch.force(look.loaded)}
+    for part, u in zip(look.system.parts, look.loaded.state.u, strict=True):
+        if isinstance(part, Wheel):
+            hub = part.hub(u)
+            out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
+    return out
+
+
+def surface(look: Look) -> Values:
+    """Return residual stress at mid-track that is not extrapolated to the surface."""
+    found = FreeSurface.of(look.system.full("half_space"), "top")
+    response = look.system.response("half_space", look.unloaded)
+    u = look.system.displacement("half_space", look.unloaded.state)
+    free = found.at(0.0, found.stress(u, response.state.plastic_strain))
+    row = found.at(0.0, found.first_row(response.stress))
+    return {
+        **{FIRST_ROW[axis]: float(value) for axis, value in zip("xz", row, strict=True)},
+        FIRST_ROW_DEPTH: float(found.at(0.0, found.depth)),
+        **{FREE_SURFACE[axis]: float(value) for axis, value in zip("xz", free, strict=True)},
+    }
+
+
+def cycles(look: Look) -> Values:
+    """Return what every pass left, and what the cycles tend to."""
+    parameters = look.parameters
     cycle = parameters.schedule.cycle
-    state = shakedown(
-        traces, cycle, parameters.yield_stress / parameters.youngs_modulus,
+    found = shakedown(
+        look.outcome.traces, cycle, parameters.yield_stress / parameters.youngs_modulus,
         periodic=parameters.periodic, hardens=parameters.material().plastic_modulus > 0,
     )  # fmt: skip
-    end_of_track = parameters.schedule.directions[-1] * parameters.track / 2
-    return harvest.record(
-        parameters,
-        End(
-            tally=last.tally,
-            loaded=last.mid_track,
-            unloaded=last.unloaded,
-            stages=((last.loaded, end_of_track), (last.mid_track, 0.0), (last.unloaded, 0.0)),
-            warnings=rolled.warnings,
-            coordinates={"pass": np.arange(1, len(traces) + 1)},
-            fields=fields(traces, cycle),
-            scalars=_figures(harvest, traces[-1], last)
-            | accuracy
-            | {
-                "shakedown_state": state.state,
-                "steady_plastic_increment": state.accumulated,
-                "steady_net_increment": state.net,
-            },
-        ),
+    return {
+        **passes(look.outcome.traces, cycle),
+        SHAKEDOWN_STATE: found.state,
+        STEADY_PLASTIC_INCREMENT: found.accumulated,
+        STEADY_NET_INCREMENT: found.net,
+    }
+
+
+def warnings(look: Look) -> tuple[str, ...]:
+    """Return what there is to say of the error that the advance leaves."""
+    settled, tolerance = look.outcome.settled, settling(look.parameters)
+    if tolerance is None or settled.error <= tolerance.tolerance:
+        return ()
+    advance = look.parameters.schedule.advance
+    known = not np.isnan(settled.error)
+    error = f"an error of {settled.error:.3g} MPa" if known else "an unknown error"
+    failed = f"; one of {advance / settled.failed:.3g} mm failed" if settled.failed else ""
+    return (
+        f"an advance of {advance / settled.times:.3g} mm still leaves {error}, "
+        f"above the tolerance of {tolerance.tolerance:.3g} MPa{failed}",
     )
 
 
@@ -192,5 +223,22 @@ ROLLING = Scene(
     summary="elastic cylinder rolling on an elastic-plastic half-space, pass after pass",
     parameters=RollingParameters,
     branch="passes",
-    path=path,
-)
+    refining=frozenset(
+        {
+            "element_size", "growth", "advance_step", "advance_tolerance", "press_steps",
+            "unload_steps",
+        }
+    ),
+    model=model,
+    program=program,
+    view=view,
+    outputs=(maps, surfaces, contact, extremes, profile_figures, surface, wheel, cycles),
+    costs=(cost, progress),
+    trace=Trace.of,
+    settling=settling,
+    warnings=warnings,
+    advice={
+        Status.LIMIT_LOAD: "lower load_ratio or traction, or let the material harden",
+        Status.NOT_CONVERGED: "reduce advance_step, or refine the mesh by element_size or growth",
+    },
+)  # fmt: skip

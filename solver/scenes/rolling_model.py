@@ -10,14 +10,15 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.loading.passes import Schedule
+from solver.loading.walker import HALVINGS
 from solver.materials.material import Material
 from solver.mesh import graded, grid, mapped, merged
+from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
-from solver.model.motion import Axle, AxleProgram, TravellingPressure
+from solver.model.motion import Axle, TravellingPressure
 from solver.scenes.parameters import ContactParameters, Friction, Length, described
-from solver.scenes.settling import HALVINGS
+from solver.scenes.schedule import Schedule
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -224,17 +225,15 @@ def _half_space(parameters: RollingParameters) -> Body:
     y = -np.concatenate([deep, deeper])[::-1]
     travelling = None
     if parameters.load == "hertz":
-        knots = parameters.schedule.knots()
+        schedule = parameters.schedule
         ratio = parameters.friction * parameters.traction
-        ways = np.repeat(parameters.schedule.directions, len(knots["time"]) // parameters.passes)
         travelling = TravellingPressure(
             boundary="top",
             half_width=a,
             peak=parameters.peak_pressure,
-            time=knots["time"],
-            amplitude=knots["load"],
-            position=knots["position"],
-            shear_ratio=ratio * ways,
+            amplitude=schedule.load,
+            position=schedule.position,
+            shear_ratio=schedule.way.times(ratio),
         )
     return Body(
         name="half_space",
@@ -261,22 +260,15 @@ def _wheel(parameters: RollingParameters) -> Body:
         return np.stack([-p[1] * np.sin(angle), R - p[1] * np.cos(angle)])
 
     schedule = parameters.schedule
-    knots = schedule.knots()
-    way = np.repeat(schedule.directions, len(knots["time"]) // parameters.passes)
+    position = schedule.position
     full_slip = parameters.friction * parameters.force
-    rotation = None
+    rotation: Amplitude | None = None
     if parameters.traction == 1.0:  # locked
-        rotation = np.full_like(knots["time"], -turned)
+        rotation = Amplitude(position.time, np.full_like(position.value, -turned))
     elif parameters.control == "creepage" or parameters.frictionless:
         # without friction nothing turns the wheel: it is turned to roll
-        rotation = -turned - (1 - parameters.given_creepage) * knots["position"] / R
-    program = AxleProgram(
-        time=knots["time"],
-        force=parameters.force * knots["load"],
-        moment=R * parameters.traction * full_slip * way * knots["moment"],
-        advance=knots["position"],
-        rotation=rotation,
-    )
+        turning = (1 - parameters.given_creepage) * position.value / R
+        rotation = Amplitude(position.time, -turned - turning)
     return Body(
         name="wheel",
         mesh=merged(mapped(ring, around)),
@@ -285,7 +277,15 @@ def _wheel(parameters: RollingParameters) -> Body:
             poisson_ratio=parameters.poisson_ratio,
         ),
         supports={"bottom": "xy"},
-        axle=Axle(centre=(0.0, R), radius=R, program=program, turned=-turned),
+        axle=Axle(
+            centre=(0.0, R),
+            radius=R,
+            force=schedule.load.times(parameters.force),
+            moment=schedule.drive.times(R * parameters.traction * full_slip),
+            advance=position,
+            rotation=rotation,
+            turned=-turned,
+        ),
     )
 
 

@@ -1,12 +1,25 @@
-"""What a scene is."""
+"""A scene is data; one driver walks every scene."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
 from typing import Any
 
-from solver.results.record import Record
+from solver.contact.system import System
+from solver.errors import LimitLoad
+from solver.loading.control import Control
+from solver.loading.program import Program, shared
+from solver.loading.walker import Settling, Walker
+from solver.model.model import Model
+from solver.results.audit import AUDIT, audit
+from solver.results.look import Look, Output, Values
+from solver.results.record import Record, Status
+from solver.results.samples import Samples
+from solver.results.touch import touch_of
+from solver.results.view import View
 
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the path done (0-1).
@@ -24,13 +37,108 @@ class Scene:
     parameters : frozen, keyword-only dataclass; every field has a default, an
         ``annotated_types`` constraint where it has a range, an ``annotated_types.Unit`` and a
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
-    branch : the parameter along which one loading path serves many runs
-    path : ``path(parameters, values, monitor)`` yields one record for each value of the
-        branch parameter, in increasing order, as each becomes known; failures are records too
+    branch : the parameter along which one loading path serves many runs: a larger value goes on
+        where a smaller one ends, or leaves the same path later
+    refining : parameters that change how accurate a result is, not what it is the result of
+    model : (parameters) -> bodies and contact; the same for all values of ``branch``
+    program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
+    view : (parameters) -> where it is looked at
+    outputs : what is computed of a run that came to its end
+    costs : what is known of every run, also of one that did not
+    trace : (samples, states of a lap) -> what is kept of each lap
+    settling : (parameters) -> how increments are chosen, or None to take those of the program
+    warnings : (run) -> what its user must be told
+    advice : what to do about an outcome
     """
 
     name: str
     summary: str
     parameters: type[Any]
     branch: str
-    path: Callable[[Any, Sequence[float], Monitor], Iterator[Record]]
+    model: Callable[[Any], Model]
+    program: Callable[[Any], Program]
+    view: Callable[[Any], View]
+    outputs: tuple[Output, ...]
+    costs: tuple[Output, ...]
+    refining: frozenset[str] = frozenset()
+    trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
+    settling: Callable[[Any], Settling | None] | None = None
+    warnings: Callable[[Look], tuple[str, ...]] | None = None
+    advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
+
+    def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
+        """Yield one record for each value of the branch parameter, in increasing order.
+
+        Each is yielded as it becomes known; failures are records too.
+        """
+        kind = type(getattr(parameters, self.branch))
+        runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
+        system = System(self.model(runs[-1]))
+        samples = Samples(system, self.view(runs[-1]))
+        touch = touch_of(system, symmetric=samples.view.symmetric)
+        programs = [self.program(run) for run in runs]
+        walker = Walker(
+            system,
+            Control(),
+            trace=partial(self.trace, samples) if self.trace else None,
+            settling=self.settling(runs[-1]) if self.settling else None,
+            report=_counted(programs, monitor),
+        )
+        for run, outcome in zip(runs, walker.walk(programs), strict=True):
+            yield self.record(Look(parameters=run, samples=samples, touch=touch, outcome=outcome))
+        monitor(1.0)
+
+    def record(self, look: Look) -> Record:
+        """Return the record of a run."""
+        cost = _merged(look, self.costs)
+        if not look.complete:
+            limit = isinstance(look.outcome.error, LimitLoad)
+            status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
+            messages: tuple[str, ...] = (str(look.outcome.error),)
+            return self._labelled(look, status, messages, cost)
+        tally = look.outcome.tally
+        check = audit(look.system, look.loaded, look.unloaded, tally.dissipation)
+        figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
+        return self._labelled(
+            look,
+            Status.OK if check.passed else Status.AUDIT_FAILED,
+            check.violations + check.warnings + (self.warnings(look) if self.warnings else ()),
+            {**cost, **figures, **_merged(look, self.outputs)},
+        )
+
+    def _labelled(
+        self, look: Look, status: Status, messages: tuple[str, ...], values: Values
+    ) -> Record:
+        if advice := self.advice.get(status):
+            messages += (advice,)
+        own = {q.name: value for q, value in values.items() if q.coordinate}
+        return Record(
+            parameters=look.parameters,
+            status=status,
+            message="; ".join(messages),
+            coordinates={**look.view.coordinates, **own},
+            fields={
+                q.name: (q.dims, value)
+                for q, value in values.items()
+                if q.dims and not q.coordinate
+            },
+            scalars={q.name: value for q, value in values.items() if not q.dims},
+        )
+
+
+def _merged(look: Look, outputs: Sequence[Output]) -> Values:
+    return {quantity: value for output in outputs for quantity, value in output(look).items()}
+
+
+def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:
+    """Return what tells a monitor, after each increment, the share of all of them."""
+    before = [0, *(shared(one, other) for one, other in pairwise(programs))]
+    expected = sum(len(p.targets) - first for p, first in zip(programs, before, strict=True))
+    done = 0
+
+    def report() -> None:
+        nonlocal done
+        done += 1
+        monitor(min(done / expected, 0.99))
+
+    return report

@@ -28,14 +28,16 @@ def square(element="quad8", **fields):
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_pressure_has_its_resultant(element):
     """100 MPa on a top 2 long and 3 thick pushes down with 600 N."""
-    load = Discretisation(square(element, pressure={"top": 100.0}, thickness=3.0)).load
+    load = Discretisation(square(element, pressure={"top": 100.0}, thickness=3.0)).load_vector
     assert load[1::2].sum() == pytest.approx(-600.0)
     assert load[0::2].sum() == pytest.approx(0.0, abs=1e-10)
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_axisymmetric_pressure_acts_on_the_whole_disc(element):
-    load = Discretisation(square(element, pressure={"top": 100.0}, state="axisymmetric")).load
+    load = Discretisation(
+        square(element, pressure={"top": 100.0}, state="axisymmetric")
+    ).load_vector
     assert load[1::2].sum() == pytest.approx(-100.0 * np.pi * 4.0)
 
 

@@ -108,7 +108,7 @@ def test_friction_within_rounding_is_none():
         (interface,) = System(model(parameters)).interfaces
         assert interface.friction == solved
         assert parameters.frictionless == (solved == 0.0)
-        turned = model(parameters).body("wheel").axle.program.rotation
+        turned = model(parameters).body("wheel").axle.rotation
         assert (turned is None) == (solved > 0.0)
     with pytest.raises(ModelError, match="traction"):
         replace(COARSE, friction=LEAST_FRICTION, traction=0.5)

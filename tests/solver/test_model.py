@@ -8,13 +8,13 @@ import pytest
 from solver import Body, ContactPair, Material, Model, ModelError
 from solver.fem.discretisation import Discretisation
 from solver.mesh import grid
+from solver.model.amplitude import Amplitude
 from solver.model.motion import TravellingPressure
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
-KNOTS = np.zeros(1)
+NONE = Amplitude(np.zeros(1), np.zeros(1))
 TRAVELLING = TravellingPressure(
-    boundary="seam", half_width=0.5, peak=1.0, time=KNOTS, amplitude=KNOTS, position=KNOTS,
-    shear_ratio=KNOTS,
+    boundary="seam", half_width=0.5, peak=1.0, amplitude=NONE, position=NONE, shear_ratio=NONE,
 )  # fmt: skip
 
 

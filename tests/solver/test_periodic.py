@@ -11,6 +11,7 @@ from solver import Body, ContactPair, Material, Model, ModelError, solve
 from solver.fem.discretisation import Discretisation
 from solver.fem.surface import extract
 from solver.mesh import grid
+from solver.model.amplitude import Amplitude
 from solver.model.motion import TravellingPressure
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
@@ -81,10 +82,10 @@ def test_what_cannot_repeat_itself_is_refused(fields, field):
 
 
 def test_a_travelling_pressure_wider_than_the_period_is_refused():
-    knots = np.zeros(1)
+    none = Amplitude(np.zeros(1), np.zeros(1))
     load = TravellingPressure(
-        boundary="top", half_width=2.5, peak=1.0, time=knots, amplitude=knots, position=knots,
-        shear_ratio=knots,
+        boundary="top", half_width=2.5, peak=1.0, amplitude=none, position=none,
+        shear_ratio=none,
     )  # fmt: skip
     with pytest.raises(ModelError, match="travelling"):
         _ = Discretisation(strip(pressure={}, travelling=load))

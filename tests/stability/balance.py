@@ -123,7 +123,7 @@ def _left_over(system: System, name: str, converged: Converged) -> tuple[float, 
     """Return the force at free nodes, and by how much resultants at surfaces differ [N]."""
     part = system.full(name)
     force = part.internal_force(system.response(name, converged).stress)
-    force -= part.external(converged.state.load)
+    force -= part.external(converged.state.time)
     rest = force.copy()
     rest[np.setdiff1d(np.arange(part.n), part.free)] = 0.0
     held = np.setdiff1d(np.arange(part.n), part.free)

@@ -99,7 +99,7 @@ def in_heavy(tamper: Tamper) -> Callable[[tuple], tuple]:
 
 def rolled(tamper: Tamper) -> Callable[[rolling.Rolled], rolling.Rolled]:
     """Apply to the state at mid-track."""
-    return lambda r: replace(r, end=replace(r.end, loaded=tamper(r.end.loaded)))
+    return lambda r: replace(r, loaded=tamper(r.loaded))
 
 
 def recorded(
@@ -127,9 +127,7 @@ def last_stressed(converged: Converged) -> Converged:
 
 def not_lifted(rolled: rolling.Rolled) -> rolling.Rolled:
     """Leave the wheel on the track, and take back what flowed."""
-    end, first = rolled.end, rolled.end.loaded.responses[-1]
+    loaded, first = rolled.loaded, rolled.loaded.responses[-1]
     state = replace(first.state, accumulated=first.state.accumulated + 1.0)
-    flowed = replace(
-        end.loaded, responses=(*end.loaded.responses[:-1], first._replace(state=state))
-    )
-    return replace(rolled, end=replace(end, loaded=flowed, unloaded=end.loaded))
+    flowed = replace(loaded, responses=(*loaded.responses[:-1], first._replace(state=state)))
+    return replace(rolled, loaded=flowed, unloaded=loaded)

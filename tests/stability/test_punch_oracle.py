@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver import Branch, Path, PathControl, System
+from solver import Outcome, PathControl, System, Walker
 from solver.contact.state import Converged
 from solver.scenes.punch import PunchParameters, model
 from tests.stability.kinds.punch_oracle import LIMITS, judge
@@ -18,11 +19,11 @@ PARAMETERS = PunchParameters(
 
 
 @pytest.fixture(scope="module")
-def solved() -> tuple[System, Branch]:
+def solved() -> tuple[System, Outcome]:
     system = System(model(PARAMETERS))
-    path = Path(system, PathControl(load_step=0.1, unload_steps=2))
-    (branch,) = path.branches([PARAMETERS.load_ratio])
-    return system, branch
+    control = PathControl(load_step=0.1, unload_steps=2)
+    (outcome,) = Walker(system, control).walk([control.program(PARAMETERS.load_ratio)])
+    return system, outcome
 
 
 def _contact(converged: Converged, normal=1.0, tangential=1.0, least=None) -> Converged:
@@ -55,47 +56,49 @@ def _swollen(converged: Converged) -> Converged:
     return replace(converged, responses=(changed, *others))
 
 
+def _with(outcome: Outcome, **points: Converged) -> Outcome:
+    return replace(outcome, points={**outcome.points, **points})
+
+
+def _under_load(change: Callable[..., Converged], *args: float, **options: float):
+    """Return what replaces the state under load of an outcome by a changed one."""
+    return lambda outcome: _with(outcome, loaded=change(outcome.points["loaded"], *args, **options))
+
+
 TAMPERED = {
-    "more contact force": (lambda b: _loaded(b, _contact(b.loaded, normal=1.001)), {"force"}),
-    "friction the other way": (lambda b: _loaded(b, _contact(b.loaded, tangential=-1)), {"work_x"}),
-    "more friction": (lambda b: _loaded(b, _contact(b.loaded, tangential=1.01)), {"cone"}),
-    "a point pulls": (lambda b: _loaded(b, _contact(b.loaded, least=-1e-6)), {"tension"}),
-    "punch too low": (lambda b: _loaded(b, _moved(b.loaded, -1e-6)), {"overlap"}),
-    "punch too high": (lambda b: _loaded(b, _moved(b.loaded, 1e-6)), {"complementarity"}),
-    "more stress": (
-        lambda b: _loaded(b, _stressed(b.loaded, factor=1.001)),
-        {"work_y", "law", "yield"},
+    "more contact force": (_under_load(_contact, normal=1.001), {"force"}),
+    "friction the other way": (_under_load(_contact, tangential=-1), {"work_x"}),
+    "more friction": (_under_load(_contact, tangential=1.01), {"cone"}),
+    "a point pulls": (_under_load(_contact, least=-1e-6), {"tension"}),
+    "punch too low": (_under_load(_moved, -1e-6), {"overlap"}),
+    "punch too high": (_under_load(_moved, 1e-6), {"complementarity"}),
+    "more stress": (_under_load(_stressed, factor=1.001), {"work_y", "law", "yield"}),
+    "stress out of plane": (_under_load(_stressed, out_of_plane=1e-3), {"state"}),
+    "plastic volume": (_under_load(_swollen), {"state", "law"}),
+    "not unloaded": (
+        lambda outcome: _with(outcome, unloaded=outcome.points["loaded"]),
+        {"residual_work", "left_over"},
     ),
-    "stress out of plane": (
-        lambda b: _loaded(b, _stressed(b.loaded, out_of_plane=1e-3)),
-        {"state"},
-    ),
-    "plastic volume": (lambda b: _loaded(b, _swollen(b.loaded)), {"state", "law"}),
-    "not unloaded": (lambda b: replace(b, unloaded=b.loaded), {"residual_work", "left_over"}),
     "energy for nothing": (
-        lambda b: replace(b, tally=replace(b.tally, plastic_work=-1.0)),
+        lambda outcome: replace(outcome, tally=replace(outcome.tally, plastic_work=-1.0)),
         {"dissipation"},
     ),
 }
 
 
-def _loaded(branch: Branch, loaded: Converged) -> Branch:
-    return replace(branch, loaded=loaded)
-
-
-def test_a_right_answer_passes(solved: tuple[System, Branch]) -> None:
+def test_a_right_answer_passes(solved: tuple[System, Outcome]) -> None:
     figures = judge(PARAMETERS, *solved)
     assert figures.keys() == LIMITS.keys()
     assert not {name: value for name, value in figures.items() if not value <= LIMITS[name]}
-    assert np.abs(solved[1].loaded.state.contacts[0].tangential).max() > 0
+    assert np.abs(solved[1].points["loaded"].state.contacts[0].tangential).max() > 0
     assert solved[1].tally.plastic_work > 0
 
 
 @pytest.mark.parametrize("fault", TAMPERED)
-def test_a_wrong_answer_does_not(fault: str, solved: tuple[System, Branch]) -> None:
-    system, branch = solved
+def test_a_wrong_answer_does_not(fault: str, solved: tuple[System, Outcome]) -> None:
+    system, outcome = solved
     tamper, noticed = TAMPERED[fault]
-    figures = judge(PARAMETERS, system, tamper(branch))
+    figures = judge(PARAMETERS, system, tamper(outcome))
     assert noticed <= {name for name, value in figures.items() if not value <= LIMITS[name]}
 
 

@@ -21,7 +21,7 @@ from solver.contact.problem import OPEN, STICK, ContactSolution
 from solver.fem import discretisation, kinematics, substructure
 from solver.fem.discretisation import Discretisation
 from solver.fem.wheel import Wheel
-from solver.loading.outcome import Tolerances
+from solver.loading.control import Tolerances
 from solver.materials import PlasticState
 from solver.model.model import effective_friction
 
@@ -212,7 +212,7 @@ def loads_times(kind: type, factor: float) -> Fault:
     external = kind.external  # type: ignore[attr-defined]
 
     def fault(patch: Patch) -> None:
-        patch.setattr(kind, "external", lambda self, load: factor * external(self, load))
+        patch.setattr(kind, "external", lambda self, time: factor * external(self, time))
 
     return fault
 

@@ -9,9 +9,9 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.errors import NotConverged
-from solver.loading.passes import PassResult
+from solver.loading.outcome import PathEnded
+from solver.loading.stepper import Stepper
 from solver.scenes.rolling_model import RollingParameters
-from solver.scenes.settling import Settling
 
 COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
 
@@ -194,15 +194,15 @@ def test_advance_is_taken_as_given_without_a_tolerance():
 
 def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch):
     fields = SLIDING | {"element_size": 4.0, "advance_step": 6.0}
-    rolls = Settling._passes
+    advance = Stepper.advance
 
-    def fails_below_3_mm(self, schedule, tally):
-        if schedule.advance < 3.0:
-            return iter([PassResult(number=0, tally=tally, travel=0.0, error=stuck)])
-        return rolls(self, schedule, tally)
+    def fails_below_3_mm(self, point, target, **options):
+        # rolling begins when the wheel has been set down and driven
+        if point.now.state.time >= 2.0 and 0.0 < target - point.now.state.time < 3.0:
+            raise PathEnded(NotConverged("stuck", 0.0, 1.0), point)
+        return advance(self, point, target, **options)
 
-    stuck = NotConverged("stuck", 0.0, 1.0)
-    monkeypatch.setattr(Settling, "_passes", fails_below_3_mm)
+    monkeypatch.setattr(Stepper, "advance", fails_below_3_mm)
     record = roll.__wrapped__(**fields, advance_tolerance=1e-6)
     assert record.scalars["advance"] == 3.0
     assert np.array_equal(

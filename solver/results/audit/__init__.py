@@ -9,6 +9,7 @@ states what a law demands instead of solving it, `surfaces` measures contact on 
 from __future__ import annotations
 
 from solver.results.audit.cut import cut_force
+from solver.results.audit.figures import AUDIT
 from solver.results.audit.report import Audit, audit
 
-__all__ = ["Audit", "audit", "cut_force"]
+__all__ = ["AUDIT", "Audit", "audit", "cut_force"]

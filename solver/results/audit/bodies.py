@@ -66,12 +66,12 @@ class AuditedBody:
         """Nodal forces (n_nodes, 2) that contact and supports must add to the loads [N]."""
         whole = self.plain.part
         wheel = self.plain.body.axle is not None  # its load acts on the hub
-        external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.load)
+        external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
         return self.plain.forces(self.stress) - external.reshape(-1, 2)
 
     def applied(self) -> Array:
         """Return the resultant of the loads (2,) [N]."""
-        load, travelling = self._converged.state.load, self.plain.body.travelling
+        load, travelling = self._converged.state.time, self.plain.body.travelling
         if travelling is None:
             return self.plain.applied(load)
         share, _, ratio = travelling.now(load)

@@ -111,7 +111,7 @@ def reactions(
         total = contact.sum(axis=0)
         if isinstance(body.part, Wheel):
             # the advance is prescribed: what it takes along x is not known beforehand
-            force = body.part.program.at(converged.state.load, "force")
+            force = body.part.axle.force.at(converged.state.time)
             total = np.array([0.0, total[1] - force])
         else:
             held = np.where(body.held, contact - body.lacking, 0.0)

@@ -41,10 +41,10 @@ def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
     d = system.displacement(name, state).reshape(-1, 2).T
     if not isinstance(part, Wheel):
         return whole.X + d, np.eye(2)
-    u = state.u[system.part(name)]
-    angle, centre = u[part.rim + 2] / part.radius, part.centre[:, None]
+    at = part.hub(state.u[system.part(name)])
+    angle, centre = at.rotation, part.centre[:, None]
     Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    hub = u[part.rim : part.rim + 2, None]
+    hub = np.array([[at.x], [at.y]])
     return centre + hub + Q @ (whole.X - centre + d), Q
 
 

@@ -20,7 +20,7 @@ from solver.mesh.elements import element_type
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver import Branch, System
+    from solver import Outcome, System
     from solver.contact.state import Converged
     from solver.scenes.punch import PunchParameters
 
@@ -43,11 +43,9 @@ LIMITS = {
 }
 
 
-def judge(parameters: PunchParameters, system: System, branch: Branch) -> dict[str, float]:
-    """Return the figures of `LIMITS` for a branch that was loaded and unloaded."""
-    loaded, unloaded = branch.loaded, branch.unloaded
-    assert loaded is not None
-    assert unloaded is not None
+def judge(parameters: PunchParameters, system: System, outcome: Outcome) -> dict[str, float]:
+    """Return the figures of `LIMITS` for a punch that was loaded and unloaded."""
+    loaded, unloaded = outcome.points["loaded"], outcome.points["unloaded"]
     a = parameters.half_width
     axial = parameters.state == "axisymmetric"
     force = parameters.load_ratio * parameters.yield_stress * a * (np.pi * a if axial else 1.0)
@@ -75,7 +73,7 @@ def judge(parameters: PunchParameters, system: System, branch: Branch) -> dict[s
             float(np.abs([c.normal, c.tangential]).max()) for c in unloaded.state.contacts
         ),
         **{name: max(law[name] for law in laws) for name in laws[0]},
-        "dissipation": max(0.0, -branch.tally.plastic_work) / (force * travel),
+        "dissipation": max(0.0, -outcome.tally.plastic_work) / (force * travel),
     }
 
 

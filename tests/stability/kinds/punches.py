@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
-import pytest
 
-from solver import SCENES, Branch, Path, Record, Status, System
-from solver.scenes import punch
-from solver.scenes.punch import PunchParameters
+from solver import Outcome, Record, Status, System
+from solver.scenes.punch import PUNCH, PunchParameters
 from tests.stability.kinds.collapse import BLOCK_SIZE, PUNCH_HEIGHT, collapse
+from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.punch_oracle import LIMITS, judge
 from tests.stability.trial import Figure, Scene, tells
 
@@ -83,7 +81,7 @@ class Pressed:
     parameters: PunchParameters
     record: Record
     system: System
-    branch: Branch
+    outcome: Outcome
 
 
 def hardens(parameters: PunchParameters) -> bool:
@@ -93,25 +91,14 @@ def hardens(parameters: PunchParameters) -> bool:
 
 def press(parameters: PunchParameters) -> Pressed:
     """Run the scene, or raise what ended it."""
-    seen: list[tuple[System, Branch]] = []
-
-    class Watched(Path):
-        def branches(self, loads: Sequence[float]) -> Iterator[Branch]:
-            for branch in super().branches(loads):
-                seen.append((self.system, branch))
-                yield branch
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(punch, "Path", Watched)
-        (record,) = SCENES["punch"].path(parameters, [parameters.load_ratio], lambda share: None)
-    ((system, branch),) = seen
-    if branch.error is not None:
-        raise branch.error
-    return Pressed(parameters=parameters, record=record, system=system, branch=branch)
+    look, record = looked_at(PUNCH, parameters)
+    if look.outcome.error is not None:
+        raise look.outcome.error
+    return Pressed(parameters=parameters, record=record, system=look.system, outcome=look.outcome)
 
 
 def _figures(pressed: Pressed) -> dict[str, Figure]:
-    found = judge(pressed.parameters, pressed.system, pressed.branch)
+    found = judge(pressed.parameters, pressed.system, pressed.outcome)
     audit = Figure(float(pressed.record.status is not Status.OK), 0.0)
     return {"audit": audit} | {name: Figure(found[name], LIMITS[name]) for name in LIMITS}
 

@@ -9,7 +9,9 @@ import numpy as np
 
 from solver import Body, ContactPair, Material, Model, PathControl, Solution, System, solve
 from solver.contact.state import Converged
-from solver.loading.stepper import Stepper, Stopped
+from solver.loading.control import Control
+from solver.loading.outcome import PathEnded
+from solver.loading.stepper import Stepper
 from solver.mesh import grid
 from tests.stability.balance import mean_gaps
 from tests.stability.closed import QUICK, STEEL, passed
@@ -54,7 +56,7 @@ class Cycles:
 def bend(model: Model, steps: int, low: float) -> Cycles:
     """Load the model and release it, again and again, without taking the bodies apart."""
     system = System(model)
-    stepper = Stepper(system, PathControl(load_step=1.0))
+    stepper = Stepper(system, Control())
     point = stepper.rest(system.initial())
     up, down = [], []
     try:
@@ -65,8 +67,8 @@ def bend(model: Model, steps: int, low: float) -> Cycles:
             for load in np.linspace(1, low, steps + 1)[1:]:
                 point = stepper.advance(point, float(load))
             down.append(point.now)
-    except Stopped as stopped:
-        raise stopped.error from stopped
+    except PathEnded as ended:
+        raise ended.error from ended
     return Cycles(system=system, up=up, down=down)
 
 

@@ -9,15 +9,12 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-import pytest
 
-from solver import SCENES, LimitLoad, NotConverged, Record, Status, System
-from solver.contact.state import State
-from solver.loading import passes
-from solver.loading.stepper import Point, Stepper, Stopped
-from solver.results.harvest import End, Harvest
-from solver.scenes import rolling
+from solver import LimitLoad, NotConverged, Record, Status, System
+from solver.contact.state import Converged, State
+from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_model import RollingParameters
+from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure, Scene, tells
 
@@ -52,7 +49,8 @@ class Rolled:
     parameters: RollingParameters
     record: Record
     system: System
-    end: End
+    loaded: Converged
+    unloaded: Converged
 
 
 def parameters_of(number: int, rng: np.random.Generator) -> RollingParameters:
@@ -86,31 +84,17 @@ def parameters_of(number: int, rng: np.random.Generator) -> RollingParameters:
 
 def roll(parameters: RollingParameters) -> Rolled:
     """Run the scene, or raise what ended it."""
-    seen: list[tuple[System, End]] = []
-
-    class Watched(Harvest):
-        def record(self, parameters: object, end: End) -> Record:
-            seen.append((self.system, end))
-            return super().record(parameters, end)
-
-    last: list[State] = []
-
-    class Stepping(Stepper):
-        def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
-            try:
-                return super().advance(point, target, contact=contact)
-            except Stopped as stopped:
-                last.append(stopped.point.now.state)
-                raise
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rolling, "Harvest", Watched)
-        patch.setattr(passes, "Stepper", Stepping)
-        (record,) = SCENES["rolling"].path(parameters, [1], lambda share: None)
-    ((system, end),) = seen
-    if end.error is not None:
-        raise _judged(parameters, system, end.error, last[-1])
-    return Rolled(parameters=parameters, record=record, system=system, end=end)
+    look, record = looked_at(ROLLING, parameters)
+    outcome = look.outcome
+    if outcome.error is not None:
+        raise _judged(parameters, look.system, outcome.error, outcome.last.state)
+    return Rolled(
+        parameters=parameters,
+        record=record,
+        system=look.system,
+        loaded=look.loaded,
+        unloaded=look.unloaded,
+    )
 
 
 def _judged(
@@ -185,15 +169,14 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
     are one in the continuum; on about eight points of contact the middle of the pressure is known
     to some hundredths of the half-width.
     """
-    p, end = rolled.parameters, rolled.end
-    assert end.loaded is not None
+    p, loaded = rolled.parameters, rolled.loaded
     system = rolled.system
     track = system.full("half_space")
     nodes = track.boundary_nodes("top")
-    left = track.internal_force(system.response("half_space", end.loaded).stress)
+    left = track.internal_force(system.response("half_space", loaded).stress)
     force = left.reshape(-1, 2)[nodes].T
-    u = system.displacement("half_space", end.loaded.state).reshape(-1, 2)[nodes].T
-    hub = np.array([0.0, p.radius]) + end.loaded.state.u[0][-3:-1]
+    u = system.displacement("half_space", loaded.state).reshape(-1, 2)[nodes].T
+    hub = np.array([0.0, p.radius]) + loaded.state.u[0][-3:-1]
     arm = track.X[:, nodes] + u - hub[:, None]
     turning = -float((arm[0] * force[1] - arm[1] * force[0]).sum())
     figures = {"vertical force": Figure(abs(float(force[1].sum()) / p.force + 1), 1e-7)}
@@ -205,17 +188,13 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
 
 
 def _laws(rolled: Rolled) -> dict[str, Figure]:
-    end, system = rolled.end, rolled.system
-    assert end.loaded is not None
-    assert end.unloaded is not None
-    (contact,) = end.loaded.state.contacts
+    loaded, unloaded, system = rolled.loaded, rolled.unloaded, rolled.system
+    (contact,) = loaded.state.contacts
     N, T = contact.normal, contact.tangential
     surface, p = system.interfaces[0].slave_surface, rolled.parameters
     touching = np.abs(surface.X[0, surface.vertices])[N > 0]
-    laws = [law(system, "half_space", c) for c in (end.loaded, end.unloaded)]
-    first, last = (
-        system.response("half_space", c).state.accumulated for c in (end.loaded, end.unloaded)
-    )
+    laws = [law(system, "half_space", c) for c in (loaded, unloaded)]
+    first, last = (system.response("half_space", c).state.accumulated for c in (loaded, unloaded))
     largest = max(float(last.max()), 1e-12)
     return {
         **{k: Figure(max(found[k] for found in laws), 1e-7) for k in laws[0]},
@@ -227,7 +206,7 @@ def _laws(rolled: Rolled) -> dict[str, Figure]:
         "force tension": Figure(-float(N.min()) / float(N.sum()), 0.0),
         "plastic strain shrinks": Figure(float((first - last).max()) / largest, 1e-12),
         "left over": Figure(
-            float(max(np.abs(c.normal).max() for c in end.unloaded.state.contacts)), 0.0
+            float(max(np.abs(c.normal).max() for c in unloaded.state.contacts)), 0.0
         ),
     }
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from solver.errors import ModelError
-from solver.loading.passes import Schedule
+from solver.scenes.schedule import Schedule
 
 
 def schedule(**fields):
@@ -42,13 +43,32 @@ def test_there_and_back_is_a_cycle_of_two_passes():
     assert schedule(directions=(1, 1)).cycle == 1
 
 
-def test_a_refined_timetable_has_more_increments_over_the_same_track():
-    plain = schedule(step=0.9)
+def test_a_refined_program_has_more_increments_over_the_same_track_and_as_many_elsewhere():
+    plain = schedule(step=0.9).program
     fine = plain.refined(2)
-    assert plain.half_steps == 28
-    assert fine.half_steps == 2 * plain.half_steps
-    assert fine.advance == pytest.approx(plain.advance / 2)
-    assert fine.marks == plain.marks
+    assert schedule(step=0.9).half_steps == 28
+    assert len(fine.targets) - len(plain.targets) == 2 * 2 * 28
+    times = [{target.time for target in program.targets} for program in (plain, fine)]
+    assert times[0] < times[1]
+
+
+def test_every_pass_keeps_the_same_states_and_begins_where_it_must():
+    timetable = schedule()
+    first, second = timetable.program.laps
+    names = ["set_down", "driven", "mid_track", "loaded", "unloaded"]
+    assert [stage.name for stage in first.stages] == names
+    assert [stage.name for stage in second.stages] == names
+    assert (first.start, second.start) == (0.0, timetable.duration)
+    assert timetable.position.at(second.start) == 25.0
+    assert timetable.travel(second.start + 2.0 + 7.5) == 7.5
+
+
+def test_loads_and_ways_are_amplitudes_over_the_same_time():
+    timetable = schedule()
+    back = timetable.duration + 20.0
+    assert [a.at(20.0) for a in (timetable.load, timetable.drive, timetable.way)] == [1, 1, 1]
+    assert [a.at(back) for a in (timetable.load, timetable.drive, timetable.way)] == [1, -1, -1]
+    assert schedule(driven=False).drive.value.any() == np.False_
 
 
 def test_an_advance_beyond_half_the_track_is_refused():

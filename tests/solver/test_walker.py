@@ -1,4 +1,4 @@
-"""Paths: increments, cuts, branches, limits; and that solvers and elements agree."""
+"""Programs walked: increments, cuts, branches, limits; and that solvers and elements agree."""
 
 from __future__ import annotations
 
@@ -15,16 +15,20 @@ from solver import (
     Model,
     ModelError,
     NotConverged,
-    Path,
     PathControl,
+    Program,
+    Stage,
     System,
     Tolerances,
+    Walker,
     solve,
 )
 from solver.fem.fields import Sampler
 from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
+from solver.loading.program import Lap, shared
 from solver.mesh import grid
+from solver.model.amplitude import Amplitude
 from solver.scenes.punch import PunchParameters, model
 
 COARSE = PunchParameters(smallest_element=0.05, growth=1.8, friction=0.3)
@@ -36,9 +40,13 @@ def system():
     return System(model(COARSE))
 
 
-def branch_at(system, load, control=CONTROL):
-    (branch,) = Path(system, control).branches([load])
-    return branch
+def outcome_at(system, load, control=CONTROL):
+    (outcome,) = Walker(system, control).walk([control.program(load)])
+    return outcome
+
+
+def walked(system, loads, control=CONTROL, **options):
+    return Walker(system, control, **options).walk([control.program(load) for load in loads])
 
 
 def arrays(converged):
@@ -82,47 +90,60 @@ def bar(**material):
 
 def test_branches_of_one_path_equal_separate_runs_bit_for_bit(system):
     loads = [0.3, 0.55, 0.6]
-    together = list(Path(system, CONTROL).branches(loads))
+    together = list(walked(system, loads))
     for branch, load in zip(together, loads, strict=True):
-        alone = branch_at(system, load)
-        assert branch.load == load
+        alone = outcome_at(system, load)
         for stage in ("loaded", "unloaded"):
-            ours, theirs = getattr(branch, stage), getattr(alone, stage)
-            assert ours.state.load == (load if stage == "loaded" else 0.0)
+            ours, theirs = branch.points[stage], alone.points[stage]
+            assert ours.state.time == (load if stage == "loaded" else 0.0)
             assert all(map(np.array_equal, arrays(ours), arrays(theirs)))
         assert branch.tally.iterations == alone.tally.iterations
         assert branch.tally.plastic_work == alone.tally.plastic_work
 
 
-def test_branches_come_in_increasing_order_of_load(system):
-    assert [b.load for b in Path(system, CONTROL).branches([0.5, 0.3])] == [0.3, 0.5]
+def test_programs_in_any_order_give_the_same(system):
+    up, down = (list(walked(system, loads)) for loads in ([0.3, 0.55], [0.55, 0.3]))
+    for ours, theirs in zip(up, reversed(down), strict=True):
+        pairs = zip(arrays(ours.points["unloaded"]), arrays(theirs.points["unloaded"]), strict=True)
+        assert all(np.array_equal(one, other) for one, other in pairs)
+
+
+def test_what_programs_share_is_walked_once(system):
+    done = []
+    list(walked(system, [0.55, 0.6], report=lambda: done.append(1)))
+    programs = [CONTROL.program(load) for load in (0.55, 0.6)]
+    common = shared(*programs)
+    assert common == 5
+    assert len(done) == sum(len(program.targets) for program in programs) - common
 
 
 def test_states_given_away_are_never_changed(system):
     """Later increments replace states, they do not write into them."""
     kept = []
-    for branch in Path(system, CONTROL).branches([0.35, 0.45, 0.55]):
-        kept += [(c, fingerprint(c).hexdigest()) for c in (branch.loaded, branch.unloaded)]
+    for branch in walked(system, [0.35, 0.45, 0.55]):
+        kept += [(c, fingerprint(c).hexdigest()) for c in branch.points.values()]
     assert all(fingerprint(c).hexdigest() == before for c, before in kept)
     assert len({before for _, before in kept}) == len(kept)
 
 
 def test_a_load_that_never_yields_takes_one_increment_and_leaves_nothing():
     system = System(model(replace(COARSE, yield_stress=1e6)))
-    branch = branch_at(system, 1e-3)
+    branch = outcome_at(system, 1e-3)
     assert len(branch.tally.iterations) == 1
     assert branch.tally.plastic_work == 0.0
-    assert branch.loaded.state.contacts[0].normal.sum() > 0
-    assert not any(np.asarray(a, float).any() for a in arrays(branch.unloaded)[: len(system.parts)])
+    assert branch.points["loaded"].state.contacts[0].normal.sum() > 0
+    assert not any(
+        np.asarray(a, float).any() for a in arrays(branch.points["unloaded"])[: len(system.parts)]
+    )
     for name in ("punch", "half_plane"):
-        assert not system.response(name, branch.unloaded).stress.any()
-        assert not system.response(name, branch.unloaded).state.accumulated.any()
+        assert not system.response(name, branch.points["unloaded"]).stress.any()
+        assert not system.response(name, branch.points["unloaded"]).state.accumulated.any()
 
 
 def test_an_elastic_load_in_one_increment_equals_the_same_load_in_ten():
     """A conforming contact with friction grows in proportion while nothing yields."""
     system = System(model(replace(COARSE, yield_stress=1e5, load_ratio=1.0)))
-    one = branch_at(system, 0.002).loaded.state.contacts[0]
+    one = outcome_at(system, 0.002).points["loaded"].state.contacts[0]
     state = system.initial()
     for load in 2e-4 * np.arange(1, 11):
         state = Increment(system, state, load).solve().state
@@ -136,22 +157,21 @@ def test_an_elastic_load_in_one_increment_equals_the_same_load_in_ten():
 
 def test_an_increment_that_needs_more_iterations_is_cut_and_ends_at_the_same_load(system):
     tight = replace(CONTROL, load_step=0.3, tolerances=Tolerances(iterations=4), max_cuts=6)
-    cut = branch_at(system, 0.6, tight)
+    cut = outcome_at(system, 0.6, tight)
     assert cut.error is None
     assert cut.tally.cuts > 0
-    assert cut.loaded.state.load == 0.6
-    whole = branch_at(system, 0.6)
+    assert cut.points["loaded"].state.time == 0.6
+    whole = outcome_at(system, 0.6)
     assert whole.tally.cuts == 0
     assert cut.tally.plastic_work == pytest.approx(whole.tally.plastic_work, rel=0.02)
 
 
 def test_an_impossible_tolerance_is_not_converged_and_says_where(system):
     control = replace(CONTROL, tolerances=Tolerances(residual=1e-30, iterations=3), max_cuts=2)
-    branch = branch_at(system, 0.6, control)
+    branch = outcome_at(system, 0.6, control)
     assert isinstance(branch.error, NotConverged)
     assert not isinstance(branch.error, LimitLoad)
-    assert branch.loaded is None
-    assert branch.unloaded is None
+    assert not branch.points
     assert branch.tally.cuts == 3
     assert branch.error.reached == 0.0
     assert branch.error.attempted == pytest.approx(0.1 / 2**2)
@@ -177,12 +197,13 @@ def test_a_hardening_bar_follows_its_curve_and_keeps_no_stress():
 
 
 def test_a_path_past_the_limit_keeps_the_branches_below_it():
-    path = Path(System(bar(yield_stress=300.0)), PathControl(load_step=0.25))
-    below, above = path.branches([0.9, 1.2])
+    system = System(bar(yield_stress=300.0))
+    below, above = walked(system, [0.9, 1.2], PathControl(load_step=0.25))
     assert below.error is None
-    assert below.unloaded is not None
+    assert below.points.keys() == {"loaded", "unloaded"}
     assert isinstance(above.error, LimitLoad)
-    assert above.loaded is None
+    assert not above.points
+    assert above.last.state.time == above.error.reached
 
 
 def test_the_monitor_may_stop_a_path(system):
@@ -193,7 +214,7 @@ def test_the_monitor_may_stop_a_path(system):
         raise StopHere
 
     with pytest.raises(StopHere):
-        list(Path(system, CONTROL, report).branches([0.6]))
+        list(walked(system, [0.6], report=report))
 
 
 @pytest.mark.parametrize(("field", "value"), [("load_step", 0.0), ("unload_steps", 0)])
@@ -208,6 +229,96 @@ def test_bad_loads_are_refused_by_name(load):
         solve(bar(), load=load)
 
 
+# -- programs ----------------------------------------------------------------------------------
+
+
+def pulled(*peaks):
+    """A bar pressed again and again: its pressure over time, and the laps that walk it."""
+    time = np.arange(2.0 * len(peaks) + 1)
+    value = np.zeros_like(time)
+    value[1::2] = peaks
+    laps = tuple(
+        Lap(
+            (
+                Stage(name="loaded", target=2.0 * k + 1, steps=3),
+                Stage(name="unloaded", target=2.0 * k + 2, steps=2),
+            ),
+            2.0 * k,
+        )
+        for k in range(len(peaks))
+    )
+    return Amplitude(time, value), laps
+
+
+def test_a_pressure_follows_its_amplitude_through_every_lap():
+    """Isotropic hardening: a lap yields only above the load of all laps before it."""
+    amplitude, laps = pulled(1.2, 1.1, 1.5)
+    material = {"yield_stress": 300.0, "hardening": "isotropic", "hardening_ratio": 0.1}
+    (body,) = bar(**material).bodies
+    system = System(Model(bodies=(replace(body, amplitude=amplitude),)))
+    strains = []
+    (outcome,) = Walker(
+        system,
+        CONTROL,
+        trace=lambda points: strains.append(
+            [points[name].state.plastic[0].accumulated.max() for name in ("loaded", "unloaded")]
+        ),
+    ).walk([Program(laps=laps)])
+    assert outcome.error is None
+    assert outcome.last.state.time == 6.0
+    per_stress = 1 / 2e4 - 1 / 2e5
+    expected = [300.0 * (peak - 1) * per_stress for peak in (1.2, 1.2, 1.5)]
+    assert np.array(strains) == pytest.approx(np.transpose([expected, expected]), rel=1e-7)
+
+
+def test_laps_after_a_quiet_cycle_are_not_walked():
+    done = []
+    amplitude, laps = pulled(0.5, 0.5, 0.5)
+    (body,) = bar(yield_stress=300.0).bodies
+    system = System(Model(bodies=(replace(body, amplitude=amplitude),)))
+    program = Program(laps=laps, cycle=1)
+    walker = Walker(
+        system, CONTROL, trace=lambda points: points["loaded"], report=lambda: done.append(1)
+    )
+    (outcome,) = walker.walk([program])
+    assert len(done) == len(program.targets) / 3
+    assert len(outcome.traces) == 3
+    assert outcome.traces[2] is outcome.traces[0]
+
+
+def test_a_program_of_fewer_laps_is_the_beginning_of_one_with_more():
+    amplitude, laps = pulled(1.2, 1.4)
+    (body,) = bar(yield_stress=300.0, hardening="kinematic", hardening_ratio=0.1).bodies
+    system = System(Model(bodies=(replace(body, amplitude=amplitude),)))
+    programs = [Program(laps=laps[:1]), Program(laps=laps)]
+    assert shared(*programs) == len(programs[0].targets)
+    one, both = Walker(system, CONTROL).walk(programs)
+    (alone,) = Walker(system, CONTROL).walk(programs[1:])
+    assert one.points["unloaded"].state.time == 2.0
+    for ours, theirs in zip(arrays(both.last), arrays(alone.last), strict=True):
+        assert np.array_equal(ours, theirs)
+
+
+def test_multiples_of_a_step_end_at_the_target():
+    stage = Stage(name="loaded", target=0.25, step=0.1)
+    assert stage.times(0.0) == [0.1, 0.2, 0.25]
+    assert Stage(name="loaded", target=0.2, step=0.1).times(0.0) == [0.1, 0.2]
+    assert Stage(name="unloaded", target=0.0, steps=2).times(0.25) == [0.125, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("knots", "message"),
+    [
+        (([0.0, 1.0], [0.0]), "as long as each other"),
+        (([0.0, np.nan], [0.0, 1.0]), "must be finite"),
+        (([1.0, 0.0], [0.0, 1.0]), "must not decrease"),
+    ],
+)
+def test_bad_amplitudes_are_refused(knots, message):
+    with pytest.raises(ModelError, match=message):
+        Amplitude(*map(np.array, knots))
+
+
 # -- solvers and elements ----------------------------------------------------------------------
 
 
@@ -215,11 +326,13 @@ def test_superlu_and_pardiso_agree():
     if mkl.library() is None:
         pytest.skip("MKL is not installed")
     first, second = (
-        branch_at(System(model(COARSE), linear_solver=name), 0.55)
+        outcome_at(System(model(COARSE), linear_solver=name), 0.55)
         for name in ("superlu", "pardiso")
     )
     assert first.tally.iterations == second.tally.iterations
-    for ours, theirs in zip(first.unloaded.responses, second.unloaded.responses, strict=True):
+    for ours, theirs in zip(
+        first.points["unloaded"].responses, second.points["unloaded"].responses, strict=True
+    ):
         # increments end at 1e-8 of the force, which the plastic zone amplifies
         assert np.abs(ours.stress - theirs.stress).max() < 1e-3
 

@@ -1,0 +1,34 @@
+"""Prescribed shear that no body can bear."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import LimitLoad
+
+if TYPE_CHECKING:
+    from solver.contact.system import System
+
+
+def unbearable(system: System) -> LimitLoad | None:
+    """Return why a prescribed shear has no equilibrium, if so.
+
+    No stress in or inside the yield surface has a shear above the shear yield stress, and the
+    traction is the stress at the surface: without hardening nothing can balance more.
+    """
+    for body in system.model.bodies:
+        travelling, material = body.travelling, body.material
+        if travelling is None or material.plastic_modulus > 0:
+            continue
+        shear = float(np.abs(travelling.shear_ratio.value).max()) * travelling.peak
+        strength = material.shear_yield_stress
+        if shear > strength:
+            return LimitLoad(
+                f"the prescribed shear, {shear:.4g} MPa, is above the shear yield stress, "
+                f"{strength:.4g} MPa: no equilibrium without hardening",
+                strength / shear,
+                1.0,
+            )
+    return None

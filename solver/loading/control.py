@@ -1,0 +1,64 @@
+"""How increments are judged, and how a path is cut into them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from solver.errors import ModelError
+from solver.loading.program import Program, load_and_release
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """When an increment counts as converged.
+
+    Attributes
+    ----------
+    residual : out-of-balance force over the largest force level met so far
+    contact : violation of the contact conditions as a force, over the same level
+    iterations : most Newton iterations before the increment is given up
+    """
+
+    residual: float = 1e-8
+    contact: float = 1e-7
+    iterations: int = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """How a program is walked.
+
+    Attributes
+    ----------
+    max_cuts : times an increment may be halved before the path ends
+    tolerances : of an increment
+    """
+
+    max_cuts: int = 4
+    tolerances: Tolerances = field(default_factory=Tolerances)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathControl(Control):
+    """How a load factor is raised and taken away.
+
+    Attributes
+    ----------
+    load_step : increments of loading end at the multiples of it, in load factor
+    unload_steps : equal increments from full load to none; the last takes the bodies apart
+    max_cuts : times an increment may be halved before the path ends
+    tolerances : of an increment
+    """
+
+    load_step: float = 0.05
+    unload_steps: int = 5
+
+    def __post_init__(self) -> None:
+        if not self.load_step > 0:
+            raise ModelError("load_step", self.load_step, "must be positive")
+        if self.unload_steps < 1:
+            raise ModelError("unload_steps", self.unload_steps, "must be at least 1")
+
+    def program(self, load: float) -> Program:
+        """Return the program that raises the load factor to ``load`` and takes it away."""
+        return load_and_release(load, self.load_step, self.unload_steps)

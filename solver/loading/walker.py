@@ -1,0 +1,247 @@
+"""Walks programs over one system: lap by lap, stage by stage.
+
+Programs that begin alike are walked together as far as they are alike: a **branch** leaves the path
+before it at the last increment both have. What a program gives does not depend on which others are
+walked with it, so a sweep on one path gives bit for bit what separate runs give.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.errors import LimitLoad
+from solver.loading.bearing import unbearable
+from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
+from solver.loading.program import shared
+from solver.loading.stepper import Stepper, turned
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.errors import NotConverged
+    from solver.loading.control import Control
+    from solver.loading.outcome import Point
+    from solver.loading.program import Program, Target
+    from solver.loading.stepper import Report
+
+    Points = Mapping[str, Converged]
+
+HALVINGS = 6
+"""Most times that `Settling` halves the increments."""
+_NOTHING = 1e-6
+"""Plastic work of a lap over all of it so far, below which nothing has yielded."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settling:
+    """Increments small enough: halved until the first lap leaves the same.
+
+    Backward Euler in the plastic strain is of first order in the increment, so the change that
+    halving makes estimates the error that is left.
+
+    Attributes
+    ----------
+    measure : (trace of a lap) -> numbers that must not change
+    tolerance : largest change that is accepted
+    """
+
+    measure: Callable[[Any], NDArray[np.float64]]
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Walk:
+    """Where a walk has come to.
+
+    ``points`` are those of the lap, ``work`` is the plastic work before it [N mm]; ``past`` are the
+    points of the laps before, and whether anything yielded in them.
+    """
+
+    point: Point
+    points: Points = field(default_factory=dict)
+    traces: tuple[Any, ...] = ()
+    work: float = 0.0
+    past: tuple[tuple[Points, bool], ...] = ()
+    error: NotConverged | None = None
+
+
+class Walker:
+    """Walks programs over a system.
+
+    Parameters
+    ----------
+    trace : (states at the ends of a lap's stages, by name) -> what is taken of it
+    settling : how increments are chosen; those of the program as they are when absent
+    report : called after every increment
+    """
+
+    def __init__(
+        self,
+        system: System,
+        control: Control,
+        *,
+        trace: Callable[[Points], Any] | None = None,
+        settling: Settling | None = None,
+        report: Report | None = None,
+    ) -> None:
+        self._system = system
+        self._trace = trace
+        self._settling = settling
+        self._stepper = Stepper(system, control, report)
+
+    def walk(self, programs: Sequence[Program]) -> Iterator[Outcome]:
+        """Yield the outcome of each program, as each becomes known.
+
+        Programs in an order in which each shares as much as it can with the one before it cost
+        least; those of growing loads do.
+        """
+        last, settled = programs[0], Settled()
+        self._stepper.place = last.place
+        if self._settling is None:
+            known = {0: self._start(last)}
+        else:
+            settled, first = self._settle(last)
+            programs = [program.refined(settled.times) for program in programs]
+            last = programs[0]
+            known = {len(_first_lap(last)): first}
+        for program, following in zip(programs, [*programs[1:], None], strict=True):
+            alike = shared(last, program)
+            known = {at: walk for at, walk in known.items() if at <= alike}
+            if not known:
+                known = {0: self._start(program)}
+            walk = self._directly(program, known.get(0))
+            if walk is None:
+                at = max(known)
+                fork = shared(program, following) if following else 0
+                if fork > at:
+                    known = {min(known): known[min(known)],
+                             fork: self._along(known[at], program, at, fork)}  # fmt: skip
+                    at = fork
+                walk = self._along(known[at], program, at, len(program.targets))
+                last = program
+            yield Outcome(
+                tally=walk.point.tally,
+                last=walk.point.now,
+                points=walk.points,
+                traces=walk.traces,
+                error=walk.error,
+                settled=settled,
+            )
+
+    def _start(self, program: Program, tally: Tally | None = None) -> _Walk:
+        """Return the walk at the beginning of a program."""
+        try:
+            point = self._stepper.begin(self._system.initial(), program.laps[0].start, tally)
+        except PathEnded as ended:
+            return _Walk(point=ended.point, error=ended.error)
+        error = unbearable(self._system)
+        return _Walk(point=point, work=point.tally.plastic_work, error=error)
+
+    def _directly(self, program: Program, start: _Walk | None) -> _Walk | None:
+        """Return the walk of a program that yields nothing, in one increment, or None.
+
+        Without yielding, unloading restores the state before any load exactly.
+        """
+        if not program.retraces or start is None or start.error is not None:
+            return None
+        stages = program.laps[0].stages
+        reached = self._stepper.elastic(start.point, stages[0].target)
+        if reached is None:
+            return None
+        back = replace(start.point, tally=reached.tally)
+        points = {stages[0].name: reached.now, stages[-1].name: start.point.now}
+        return self._closed(replace(start, point=back, points=points), program)
+
+    def _along(self, walk: _Walk, program: Program, first: int, end: int) -> _Walk:
+        """Return the walk over the targets of a program from one number to another."""
+        at = first
+        targets = program.targets
+        while at < end and walk.error is None:
+            quiet = len(walk.past) == program.cycle and not any(y for _, y in walk.past)
+            if targets[at].begins is not None and program.cycle and quiet:
+                walk = _repeated(walk, program.cycle)
+                at += next(k for k, t in enumerate(targets[at:], 1) if t.closes)
+                continue
+            try:
+                walk = self._to(walk, targets[at])
+            except PathEnded as ended:
+                return replace(walk, point=ended.point, error=ended.error)
+            if targets[at].closes:
+                walk = self._closed(walk, program)
+            at += 1
+        return walk
+
+    def _to(self, walk: _Walk, target: Target) -> _Walk:
+        """Return the walk at the next target."""
+        if target.begins is not None:
+            point = walk.point
+            if self._system.moves:
+                point = self._stepper.begin(point.now.state, target.begins, point.tally)
+            walk = replace(walk, point=point, points={}, work=point.tally.plastic_work)
+        point = turned(walk.point) if target.turns else walk.point
+        point = self._stepper.advance(point, target.time, contact=not target.apart)
+        points = {**walk.points, target.keeps: point.now} if target.keeps else walk.points
+        return replace(walk, point=point, points=points)
+
+    def _closed(self, walk: _Walk, program: Program) -> _Walk:
+        """Return the walk with its lap, which has come to its end, taken down."""
+        work = walk.point.tally.plastic_work
+        yielded = work - walk.work > _NOTHING * work
+        past = (*walk.past, (walk.points, yielded))[-program.cycle :] if program.cycle else ()
+        traces = (*walk.traces, self._trace(walk.points)) if self._trace else ()
+        return replace(walk, past=past, traces=traces)
+
+    def _settle(self, program: Program) -> tuple[Settled, _Walk]:
+        """Walk the first lap with ever smaller increments, until it leaves the same.
+
+        Where smaller increments fail, what the larger ones gave stands.
+        """
+        assert self._settling is not None
+        tolerance = self._settling.tolerance
+        settled, taken, coarse, tally = Settled(), None, None, Tally()
+        for halved in range(HALVINGS + 1 if tolerance else 1):
+            times = 2**halved
+            fine = program.refined(times)
+            walk = self._along(self._start(fine, tally), fine, 0, len(_first_lap(fine)))
+            failed = walk.error is not None and not isinstance(walk.error, LimitLoad)
+            if failed and coarse is not None:
+                settled = replace(settled, failed=times)
+                break
+            taken, settled = walk, replace(settled, times=times)
+            if walk.error is None:
+                left = self._settling.measure(walk.traces[0])
+                if coarse is not None:
+                    settled = replace(settled, error=float(np.abs(left - coarse).max()))
+                if settled.error <= tolerance:
+                    break
+                coarse = left
+            elif not failed:
+                break
+            # what larger increments have cost stays in the tally
+            tally = Tally(seconds=walk.point.tally.seconds)
+        assert taken is not None
+        return settled, taken
+
+
+def _first_lap(program: Program) -> Sequence[Target]:
+    """Return the targets of the first lap."""
+    end = next(k for k, target in enumerate(program.targets, 1) if target.closes)
+    return program.targets[:end]
+
+
+def _repeated(walk: _Walk, cycle: int) -> _Walk:
+    """Return the walk after a lap that is like the one a cycle before it."""
+    points, _ = walk.past[0]
+    return replace(
+        walk,
+        points=points,
+        traces=(*walk.traces, walk.traces[-cycle]) if walk.traces else (),
+        past=(*walk.past[1:], (points, False)),
+    )

@@ -1,0 +1,44 @@
+"""What the audit finds of every run; `docs/audit.md` tells how."""
+
+from __future__ import annotations
+
+from solver.results.quantities import Quantity, declare
+
+_DECLARED = [
+    declare("audit_residual", "force out of balance / largest force"),
+    declare("audit_reactions", "loads, contact and reactions of a body out of balance / force"),
+    declare(
+        "audit_action_reaction",
+        "contact force less what the stress of either body holds / contact force",
+    ),
+    declare("audit_law", "stress off the material law, stated anew / yield stress"),
+    declare(
+        "audit_increment_error",
+        "change of stress that four steps for one make in the last increment / yield stress",
+    ),
+    declare(
+        "audit_overlap", "mean overlap of the deformed bodies, or mean gap where they press", "mm"
+    ),
+    declare("audit_closed_gap", "mean gap or overlap where the bodies press", "mm"),
+    declare("audit_slip", "friction work that slip lacks / friction work"),
+    declare("audit_energy", "work of the loads not found again / work"),
+    declare("audit_tension", "largest tensile contact force", "N"),
+    declare("audit_friction_excess", "largest tangential force beyond friction", "N"),
+    declare("audit_surface_shear", "largest contact shear / shear yield stress"),
+    declare(
+        "audit_friction_over_strength",
+        "friction times contact pressure / shear yield stress: above 1 the surface shears instead "
+        "of slipping",
+    ),
+    declare("audit_yield", "largest stress beyond the yield surface / yield stress"),
+    declare(
+        "audit_dissipation",
+        "smallest plastic dissipation of an increment in a unit of volume", "MPa",
+    ),
+    declare("audit_contact_after_unloading", "contact force left after unloading", "N"),
+    declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
+    declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),
+]  # fmt: skip
+
+AUDIT: dict[str, Quantity] = {figure.name: figure for figure in _DECLARED}
+"""The figures, by name."""

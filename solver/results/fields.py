@@ -1,0 +1,66 @@
+"""Maps, profiles and lines of stress and plastic strain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.quantities import declare
+from solver.tensors import to_tensor, von_mises
+
+if TYPE_CHECKING:
+    from solver.results.look import Look, Values
+
+_MAP = ("y", "x")
+
+RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("component", *_MAP))
+RESIDUAL_MISES = declare(
+    "residual_mises", "von Mises stress of the residual stress", "MPa", dims=_MAP
+)
+PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain", dims=_MAP)
+MISES_LOADED = declare("mises_loaded", "von Mises stress under load", "MPa", dims=_MAP)
+RESIDUAL_PROFILE = declare(
+    "residual_profile", "residual stress along depth", "MPa",
+    dims=("station", "component", "depth"),
+)  # fmt: skip
+PLASTIC_STRAIN_PROFILE = declare(
+    "plastic_strain_profile", "equivalent plastic strain along depth", dims=("station", "depth")
+)
+SURFACE_RESIDUAL = declare(
+    "surface_residual", "residual stress at the contact surface", "MPa",
+    dims=("body", "component", "s"),
+)  # fmt: skip
+SURFACE_MISES = declare(
+    "surface_mises", "von Mises stress at the surface of the lower body", "MPa",
+    dims=("stage", "s"),
+)  # fmt: skip
+
+
+def maps(look: Look) -> Values:
+    """Return what is left, and what is under load, around the contact."""
+    samples = look.samples
+    residual = samples.on_map(lambda body: samples.stress(body, look.unloaded))
+    under_load = samples.on_map(lambda body: samples.stress(body, look.loaded))
+    strain = samples.on_map(lambda body: samples.plastic_strain(body, look.unloaded))
+    return {
+        RESIDUAL_STRESS: to_tensor(residual),
+        RESIDUAL_MISES: von_mises(residual),
+        PLASTIC_STRAIN: strain,
+        MISES_LOADED: von_mises(under_load),
+    }
+
+
+def profiles(look: Look) -> Values:
+    """Return what is left below the surface."""
+    stress, strain = look.samples.profile(look.unloaded)
+    return {RESIDUAL_PROFILE: stress, PLASTIC_STRAIN_PROFILE: strain}
+
+
+def surfaces(look: Look) -> Values:
+    """Return what is left along the contact surfaces, and how far the lower one yields."""
+    samples, bodies = look.samples, look.view.surfaces
+    return {
+        SURFACE_RESIDUAL: np.stack([samples.on_surface(body, look.unloaded) for body in bodies]),
+        SURFACE_MISES: np.stack([samples.surface_mises(c, x) for c, x in look.stages]),
+    }

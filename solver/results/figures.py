@@ -1,0 +1,69 @@
+"""Numbers that every run has: extremes, and what the run has cost."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.quantities import declare
+
+if TYPE_CHECKING:
+    from solver.results.look import Look, Values
+
+MAX_PLASTIC_STRAIN = declare("max_plastic_strain", "largest equivalent plastic strain")
+DEPTH_OF_MAX_PLASTIC_STRAIN = declare(
+    "depth_of_max_plastic_strain",
+    "depth of the largest plastic strain; negative in the upper body", "mm",
+)  # fmt: skip
+PEAK_RESIDUAL_TENSION = declare(
+    "peak_residual_tension", "largest normal component of the residual stress", "MPa"
+)
+PEAK_RESIDUAL_COMPRESSION = declare(
+    "peak_residual_compression", "smallest normal component of the residual stress", "MPa"
+)
+PLASTIC_WORK = declare("plastic_work", "plastic work of the computed part of the bodies", "N mm")
+
+INCREMENTS = declare("increments", "load increments", count=True)
+CUT_INCREMENTS = declare("cut_increments", "load increments that were cut", count=True)
+ITERATIONS = declare("iterations", "Newton iterations", count=True)
+MEDIAN_ITERATIONS = declare("median_iterations", "median Newton iterations an increment")
+INNER_FALLBACKS = declare(
+    "inner_fallbacks", "iterations whose contact problem needed pivoting", count=True
+)
+BLENDED_TANGENTS = declare("blended_tangents", "iterations with a stiffened tangent", count=True)
+CPU_SECONDS = declare("cpu_seconds", "processor time", "s")
+DEGREES_OF_FREEDOM = declare("degrees_of_freedom", "degrees of freedom", count=True)
+
+
+def extremes(look: Look) -> Values:
+    """Return the largest plastic strain, the extreme residual stresses, and the plastic work."""
+    system = look.system
+    names = [body.name for body in system.model.bodies]
+    strains = {n: system.response(n, look.unloaded).state.accumulated for n in names}
+    most = max(names, key=lambda name: strains[name].max())
+    points = system.full(most).points.reshape(2, -1)
+    where = points[1, strains[most].argmax()]
+    residual = [look.samples.stress(name, look.unloaded)[:3] for name in names]
+    return {
+        MAX_PLASTIC_STRAIN: float(strains[most].max()),
+        DEPTH_OF_MAX_PLASTIC_STRAIN: float(-where) if strains[most].max() > 0 else np.nan,
+        PEAK_RESIDUAL_TENSION: float(max(r.max() for r in residual)),
+        PEAK_RESIDUAL_COMPRESSION: float(min(r.min() for r in residual)),
+        PLASTIC_WORK: look.outcome.tally.plastic_work,
+    }
+
+
+def cost(look: Look) -> Values:
+    """Return what the run has cost."""
+    tally = look.outcome.tally
+    return {
+        INCREMENTS: len(tally.iterations),
+        CUT_INCREMENTS: tally.cuts,
+        ITERATIONS: sum(tally.iterations),
+        MEDIAN_ITERATIONS: float(np.median(tally.iterations)) if tally.iterations else 0.0,
+        INNER_FALLBACKS: tally.pivoted,
+        BLENDED_TANGENTS: tally.blended,
+        CPU_SECONDS: tally.seconds,
+        DEGREES_OF_FREEDOM: float(look.system.n_unknowns),
+    }

@@ -1,0 +1,74 @@
+"""A run that has come to its end, as outputs look at it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from solver.results.quantities import Quantity
+
+if TYPE_CHECKING:
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.loading.outcome import Outcome
+    from solver.results.samples import Samples
+    from solver.results.touch import Touch
+    from solver.results.view import View
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """One run.
+
+    Attributes
+    ----------
+    parameters : of the scene, of exactly this run
+    samples : of its system where the scene is looked at
+    touch : what acts between its bodies
+    outcome : what came of its program
+    """
+
+    parameters: Any
+    samples: Samples
+    touch: Touch
+    outcome: Outcome
+
+    @property
+    def system(self) -> System:
+        """The discretised model."""
+        return self.samples.system
+
+    @property
+    def view(self) -> View:
+        """Where it is looked at."""
+        return self.samples.view
+
+    @property
+    def complete(self) -> bool:
+        """Whether the program was walked to its end."""
+        return self.outcome.error is None
+
+    @property
+    def loaded(self) -> Converged:
+        """The state under load."""
+        return self.outcome.points[self.view.loaded]
+
+    @property
+    def unloaded(self) -> Converged:
+        """The state that is left."""
+        return self.outcome.points["unloaded"]
+
+    @property
+    def stages(self) -> list[tuple[Converged, float]]:
+        """States whose contact is recorded, with where s counts from [mm]."""
+        states = [(name, self.outcome.points[name]) for name in self.view.stages]
+        following = self.view.following
+        return [(c, self.touch.centre(c) if name in following else 0.0) for name, c in states]
+
+
+Values = Mapping[Quantity, Any]
+"""What an output gives: a number or an array for each quantity, over its dimensions."""
+
+Output = Callable[[Look], Values]
+"""Computes some quantities of a run."""

@@ -1,0 +1,152 @@
+"""What each pass leaves under the track, and what becomes of it from cycle to cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.wheel import Wheel
+from solver.results.fields import PLASTIC_STRAIN_PROFILE, RESIDUAL_PROFILE
+from solver.results.quantities import declare
+from solver.results.shakedown import Shakedown, State, classify
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.results.look import Values
+    from solver.results.samples import Samples
+
+    Array = NDArray[np.float64]
+
+_EACH = ("pass",)
+
+PASS = declare("pass", "number of the pass", dims=_EACH, count=True)
+PLASTIC_FLOW_PROFILE = declare(
+    "plastic_flow_profile", "signed plastic strain along depth",
+    dims=("station", "component", "depth"),
+)  # fmt: skip
+PASS_CREEPAGE = declare(
+    "pass_creepage", "creepage of a pass: 1 + R d(rotation) / d(advance)", dims=_EACH
+)
+PASS_MAX_PLASTIC_STRAIN = declare(
+    "pass_max_plastic_strain", "largest equivalent plastic strain after a pass", dims=_EACH
+)
+PASS_PLASTIC_INCREMENT = declare(
+    "pass_plastic_increment",
+    "largest equivalent plastic strain accumulated in a cycle, mid-track", dims=_EACH,
+)  # fmt: skip
+PASS_NET_INCREMENT = declare(
+    "pass_net_increment",
+    "largest equivalent of the signed plastic strain a cycle leaves, mid-track", dims=_EACH,
+)  # fmt: skip
+PASS_NET_SHEAR = declare(
+    "pass_net_shear", "largest plastic shear (engineering) a cycle leaves, mid-track", dims=_EACH
+)
+PASS_SURFACE_ADVANCE = declare(
+    "pass_surface_advance", "displacement along x a cycle gives the surface", "mm", dims=_EACH
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One pass, under the stations of a view.
+
+    Attributes
+    ----------
+    stress : (station, 4, depth) residual stress, tensor components [MPa]
+    strain : (station, depth) equivalent plastic strain
+    flow : (station, 4, depth) signed plastic strain, tensor components
+    surface : (2, station) displacement of the surface [mm]
+    creepage : 1 + R d(rotation) / d(advance) over the second half of the track
+    peak : largest equivalent plastic strain anywhere
+    """
+
+    stress: Array
+    strain: Array
+    flow: Array
+    surface: Array
+    creepage: float
+    peak: float
+
+    @classmethod
+    def of(cls, samples: Samples, points: Mapping[str, Converged]) -> Trace:
+        """Take the trace of a pass from its states ``mid_track``, ``loaded`` and ``unloaded``."""
+        left = points["unloaded"]
+        return cls(
+            *samples.profile(left),
+            samples.flow(left),
+            samples.displacement(left),
+            _creepage(samples, points["mid_track"], points["loaded"]),
+            float(left.responses[-1].state.accumulated.max()),
+        )
+
+
+def _creepage(samples: Samples, first: Converged, last: Converged) -> float:
+    """Return the creepage of the wheel between two states, NaN without a wheel."""
+    for number, part in enumerate(samples.system.parts):
+        if isinstance(part, Wheel):
+            before, now = part.hub(first.state.u[number]), part.hub(last.state.u[number])
+            return float(1 + (now.arc - before.arc) / (now.x - before.x))
+    return np.nan
+
+
+def passes(traces: Sequence[Trace], cycle: int) -> Values:
+    """Return the variables over passes; increments are those of the cycle a pass ends."""
+    middle = len(traces[0].strain) // 2
+    accumulated, left = _increments(traces, cycle)
+    shear = 2 * left[:, 3]
+    largest = np.abs(shear).argmax(axis=1)
+    surface = np.stack([t.surface[0, middle] for t in traces])
+    return {
+        PASS: np.arange(1, len(traces) + 1),
+        RESIDUAL_PROFILE.over("pass"): np.stack([t.stress for t in traces]),
+        PLASTIC_STRAIN_PROFILE.over("pass"): np.stack([t.strain for t in traces]),
+        PLASTIC_FLOW_PROFILE.over("pass"): np.stack([t.flow for t in traces]),
+        PASS_CREEPAGE: np.array([t.creepage for t in traces]),
+        PASS_MAX_PLASTIC_STRAIN: np.array([t.peak for t in traces]),
+        PASS_PLASTIC_INCREMENT: accumulated.max(axis=1),
+        PASS_NET_INCREMENT: _equivalent(left).max(axis=1),
+        PASS_NET_SHEAR: shear[np.arange(len(shear)), largest],
+        PASS_SURFACE_ADVANCE: _differences(surface, cycle),
+    }
+
+
+def shakedown(
+    traces: Sequence[Trace], cycle: int, yield_strain: float, *, periodic: bool, hardens: bool
+) -> Shakedown:
+    """Return the state the passes tend to.
+
+    On a track with ends only a body that stays elastic is decided: the ends hold back the layer
+    that ratchetting moves, until it looks like a closed cycle.
+    """
+    accumulated, left = _increments(traces, cycle)
+    last = slice((len(traces) - 1) % cycle, None, cycle)
+    found = classify(accumulated[last], _equivalent(left)[last], yield_strain, hardens=hardens)
+    if periodic or found.state is State.ELASTIC:
+        return found
+    return Shakedown(State.UNDECIDED, found.accumulated, found.net)
+
+
+def _increments(traces: Sequence[Trace], cycle: int) -> tuple[Array, Array]:
+    """Return accumulated (pass, depth) and signed (pass, 4, depth) strain of each cycle."""
+    middle = len(traces[0].strain) // 2
+    accumulated = np.stack([t.strain[middle] for t in traces])
+    flow = np.stack([t.flow[middle] for t in traces])
+    return _differences(accumulated, cycle), _differences(flow, cycle)
+
+
+def _differences(values: Array, cycle: int) -> Array:
+    """Return the change of values (pass, ...) over the last cycle, from zero at first."""
+    before = np.concatenate([np.zeros((cycle, *values.shape[1:])), values[:-cycle]])
+    return values - before[: len(values)]
+
+
+def _equivalent(flow: Array) -> Array:
+    """Return the equivalent of signed strain (pass, 4, depth), tensor components."""
+    square = (flow[:, :3] ** 2).sum(axis=1) + 2 * flow[:, 3] ** 2
+    return np.asarray(np.sqrt(2 / 3 * square))

@@ -1,0 +1,70 @@
+"""Where a scene is looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.results.quantities import declare
+from solver.tensors import COMPONENTS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+X = declare("x", "position along the surface from its middle", "mm", dims=("x",))
+Y = declare("y", "height above the surface", "mm", dims=("y",))
+DEPTH = declare("depth", "depth below the surface", "mm", dims=("depth",), standard_name="depth")
+STATION = declare(
+    "station", "position of a depth profile along the surface", "mm", dims=("station",)
+)
+S = declare(
+    "s", "distance along the surface from the middle, of the contact if loaded", "mm", dims=("s",)
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """Where a scene is looked at; independent of its mesh, so that runs can be compared.
+
+    Attributes
+    ----------
+    x, y : map grid [mm]
+    depth, station : profiles go down to ``depth`` below the surface at x = ``station`` [mm]
+    s : positions along the contact surface from its centre [mm]
+    profile_body : the body whose profiles are taken
+    surfaces : body -> boundary that is its contact surface, in the order of the dimension
+    stages : states whose contact is recorded, by the names that the program gives them
+    loaded : the one of them that is looked at as the state under load
+    following : those of them at which ``s`` counts from where the load is, not from x = 0
+    symmetric : whether the bodies are one half of what is symmetric about x = 0
+    """
+
+    x: Array
+    y: Array
+    depth: Array
+    station: Array
+    s: Array
+    profile_body: str
+    surfaces: dict[str, str]
+    stages: tuple[str, ...] = ("loaded", "unloaded")
+    loaded: str = "loaded"
+    following: tuple[str, ...] = ()
+    symmetric: bool = False
+
+    @property
+    def coordinates(self) -> dict[str, Any]:
+        """The record's coordinates."""
+        return {
+            "component": np.array(COMPONENTS),
+            "stage": np.array(self.stages),
+            "body": np.array(list(self.surfaces)),
+            "x": self.x,
+            "y": self.y,
+            "depth": self.depth,
+            "station": self.station,
+            "s": self.s,
+        }
