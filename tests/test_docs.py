@@ -1,9 +1,10 @@
 """What the pages show works, as a reader would try it.
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies ready to run. ``python`` blocks are programs; in ``console`` blocks each line
-``$ residua …`` runs and must succeed. A block after ``<!-- no-test -->`` is left out, which only
-those may be that need a server or compute for minutes.
+studies ready to run; so do those of every page that has any. ``python`` blocks are programs; in
+``console`` blocks each line ``$ residua …`` runs and must succeed. A block after
+``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
+minutes. Links lead to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
@@ -20,19 +21,21 @@ from pathlib import Path
 import pytest
 
 from solver.results.quantities import QUANTITIES
-from tests.architecture.sources import PACKAGES, ROOT
+from tests.architecture.sources import ROOT, tracked
+from tests.architecture.test_layers import LAYERS
 
-PAGES = [
-    page
-    for page in (ROOT / "README.md", *(ROOT / package / "README.md" for package in PACKAGES))
-    if page.is_file()
-]
+TEXTS = [path for path in tracked() if path.suffix == ".md"]
 BLOCK = re.compile(
     r"(?P<skip><!-- no-test -->\n+)?^```(?P<language>python|console)\n(?P<text>.*?)^```",
     re.DOTALL | re.MULTILINE,
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
 COMMAND = "import sys; from studies.command.cli import main; sys.exit(main())"
+CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
+NAMED = re.compile(r"`((?:solver|studies|service|tests|data|docs|examples)/[a-z0-9_./-]*)`")
+TWO_SCREENS = 110
+"""Lines of Markdown that the first page may have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,11 +69,19 @@ def blocks(text: str) -> list[Block]:
     ]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+PAGES = [page for page in TEXTS if blocks((ROOT / page).read_text())]
+
+
+def test_the_first_page_is_run_and_fits_two_screens() -> None:
+    assert Path("README.md") in PAGES
+    assert len((ROOT / "README.md").read_text().splitlines()) <= TWO_SCREENS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "data" / "studies", tmp_path / "data" / "studies")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    for block in blocks(page.read_text()):
+    for block in blocks((ROOT / page).read_text()):
         for program in [] if block.skipped else block.programs():
             done = subprocess.run(
                 [sys.executable, *program],
@@ -85,9 +96,9 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
             assert done.returncode == 0, f"{page}:{block.line}\n{done.stdout}\n{done.stderr}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", PAGES, ids=str)
 def test_only_costly_blocks_are_left_out(page: Path) -> None:
-    left_out = [block for block in blocks(page.read_text()) if block.skipped]
+    left_out = [block for block in blocks((ROOT / page).read_text()) if block.skipped]
     assert not [block.line for block in left_out if not COSTLY.search(block.text)]
 
 
@@ -107,3 +118,71 @@ def test_the_page_of_the_audit_names_every_figure_and_no_other():
     named = set(re.findall(r"`(audit_\w+)`", (ROOT / "docs/audit.md").read_text()))
     stored = {name for name in QUANTITIES if name.startswith("audit_")}
     assert named - {"audit_failed"} == stored
+
+
+def anchors(text: str) -> set[str]:
+    """Return the anchors of a page's headings, as GitHub makes them."""
+    found: list[str] = []
+    for heading in re.findall(
+        r"^#+ (.+)$", re.sub(r"^```.*?^```", "", text, flags=re.S | re.M), re.M
+    ):
+        plain = re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+        times = sum(re.fullmatch(rf"{re.escape(plain)}(-\d+)?", each) is not None for each in found)
+        found.append(f"{plain}-{times}" if times else plain)
+    return set(found)
+
+
+def broken_links(page: Path, root: Path) -> list[str]:
+    """Return the links of a page to files or headings that do not exist below ``root``."""
+    broken = []
+    for match in LINK.finditer(CODE.sub("", (root / page).read_text())):
+        name, _, anchor = match["target"].partition("#")
+        if ":" in name:
+            continue
+        target = (root / page.parent / name).resolve() if name else root / page
+        inside = target.is_relative_to(root.resolve()) and target.exists()
+        if not inside or (anchor and anchor not in anchors(target.read_text())):
+            broken.append(match["target"])
+    return broken
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=str)
+def test_links_of_a_page_lead_somewhere(page: Path) -> None:
+    assert not broken_links(page, ROOT)
+
+
+def test_a_broken_link_is_found(tmp_path: Path) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "other.md").write_text("# One `name`, twice\n\n## A\n\n## A\n")
+    page = Path("docs/page.md")
+    (tmp_path / page).write_text(
+        "[a](../other.md) [b](../other.md#one-name-twice) [c](../other.md#a-1) [d](https://x.y/z)\n"
+        "## Here\n[e](#here) `[code](nowhere)` [f](gone.md) [g](../other.md#a-2) [h](#there)\n"
+        "[i](../../outside.md) [two\nlines](also-gone.md)\n```\n[j](nowhere.md)\n```\n"
+    )
+    wrong = ["gone.md", "../other.md#a-2", "#there", "../../outside.md", "also-gone.md"]
+    assert broken_links(page, tmp_path) == wrong
+
+
+@pytest.mark.parametrize("page", [p for p in TEXTS if p.name != "CHANGELOG.md"], ids=str)
+def test_files_named_in_a_page_exist(page: Path) -> None:
+    named = NAMED.findall((ROOT / page).read_text())
+    assert not [name for name in named if not (ROOT / name).exists()]
+
+
+def test_the_page_of_the_architecture_has_every_layer_in_its_place() -> None:
+    rows = re.findall(
+        r"^\| `(\w+)/(\w+)(?:/|\.py)` \|", (ROOT / "docs/architecture.md").read_text(), re.MULTILINE
+    )
+    found = {
+        package: tuple(layer for name, layer in dict.fromkeys(rows) if name == package)
+        for package in LAYERS
+    }
+    assert found == LAYERS
+
+
+def test_the_glossary_is_in_order_and_has_each_word_once() -> None:
+    text = (ROOT / "docs/glossary.md").read_text()
+    words = [word.lower() for word in re.findall(r"^\*\*(.+?)\*\*", text, re.MULTILINE)]
+    assert len(words) > 50
+    assert words == sorted(set(words))

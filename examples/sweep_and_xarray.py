@@ -1,0 +1,65 @@
+"""A small study in Python: computed on two workers, opened with xarray, drawn.
+
+Run it with ``python examples/sweep_and_xarray.py``; it writes the runs and their data set to the
+directory ``sweep``, and ``sweep.png``. Run it again: it finds the runs and computes nothing.
+"""
+
+from matplotlib.figure import Figure
+
+from studies import Store, Study, open_study, run_study
+
+# What a study file says, as a dictionary. The scene is a punch pressed on a half-plane; what is
+# not named has the scene's default (`residua scenes punch` lists the parameters). This mesh is
+# coarse, so that the example takes seconds.
+STUDY = Study.from_dict(
+    {
+        "name": "friction-and-load",
+        "scene": "punch",
+        "parameters": {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"},
+        "sweep": {"load_ratio": [0.5, 0.7, 0.9], "friction": [0.0, 0.1, 0.3]},
+    }
+)
+
+
+def compute() -> None:
+    """Compute the runs that the store does not hold yet."""
+    outcome = run_study(STUDY, Store("sweep"), workers=2)
+    print(f"{len(outcome.computed)} of {STUDY.size} runs computed: {dict(outcome.counts)}")
+    assert outcome.ok, outcome.failed
+
+
+def look() -> None:
+    """Read the data set, print a table and draw a line for each load."""
+    with open_study("sweep") as dataset:
+        # Every axis of the sweep is a dimension. One that is not swept, such as hardening here,
+        # has one value; squeeze takes it away.
+        runs = dataset.squeeze("hardening")
+        assert runs.sizes["load_ratio"] == 3
+        assert runs.sizes["friction"] == 3
+
+        # A variable of one value a run is a table over the sweep. Its unit is in its attributes.
+        tension = runs["peak_residual_tension"]
+        print(tension.to_pandas().round(1).to_string())
+        assert (tension > 0.0).all(), "every load leaves tension somewhere"
+        assert (runs["plastic_work"].diff("load_ratio") > 0.0).all(), "more load, more plastic work"
+
+        # A field has dimensions of its own after those of the sweep. sel picks by value or label.
+        surface = runs["surface_residual"].sel(body="half_plane", component="xx", friction=0.3)
+        figure = Figure(figsize=(6, 3.5), layout="constrained")
+        axes = figure.add_subplot()
+        for ratio in runs["load_ratio"].values:
+            line = surface.sel(load_ratio=ratio).dropna("s")
+            axes.plot(line["s"], line, label=f"{ratio:g} of the yield stress")
+        unit = surface.attrs["units"]
+        axes.set(
+            xlabel="distance from the middle of the contact [mm]",
+            ylabel=f"residual stress xx [{unit}]",
+        )
+        axes.legend(title="mean pressure, friction 0.3", fontsize=8)
+        figure.savefig("sweep.png", dpi=150)
+
+
+# Worker processes import this script anew. Without this line each of them would start the study.
+if __name__ == "__main__":
+    compute()
+    look()
