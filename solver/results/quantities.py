@@ -155,7 +155,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "audit_dissipation": Quantity(
         "smallest plastic dissipation of an increment in a unit of volume", "MPa"
     ),
-    "audit_contact_after_unloading": Quantity("contact force left after unloading", "N"),
+    "audit_contact_after_unloading": Quantity(
+        "force that the stress of the released bodies still needs from loads or contact", "N"
+    ),
     "audit_error_loaded": Quantity("estimated relative error of stress under load, energy norm"),
     "audit_error_residual": Quantity("estimated relative error of residual stress, energy norm"),
     "audit_free_surface": Quantity("residual stress across the free side / yield stress"),
