@@ -6,7 +6,8 @@ converged. Arrays have their components first and their points last, and the num
 is that of the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
 
 A law of one's own gives `elasticity`, `flow_stress` and `respond`. The rest follows from them for
-associated flow on a surface of von Mises, and may be replaced piece by piece.
+associated flow on a surface of von Mises, and may be replaced piece by piece; what is written as an
+attribute may be a property, or a field of a dataclass.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.attribute import attribute
 from solver.materials.state import PlasticState
 from solver.materials.yield_surface import VonMises
 
@@ -37,12 +39,12 @@ class Law(ABC):
 
     # -- its parts -----------------------------------------------------------------------------
 
-    @property
-    @abstractmethod
+    @attribute
     def elasticity(self) -> Elasticity:
         """How it answers below yield."""
+        raise NotImplementedError(f"{type(self).__name__} must give its elasticity")
 
-    @property
+    @attribute
     def surface(self) -> YieldSurface:
         """The shape of its yield surface."""
         return VonMises()
@@ -81,25 +83,25 @@ class Law(ABC):
 
     # -- its strength --------------------------------------------------------------------------
 
-    @property
+    @attribute
     def yield_stress(self) -> float:
         """Tension at first yield [MPa]; inf if it never yields."""
         return float(self.flow_stress(self.initial(1, 4))[0])
 
-    @property
+    @attribute
     def shear_yield_stress(self) -> float:
         """Shear stress at first yield [MPa]."""
         return self.surface.shear(self.yield_stress)
 
-    @property
+    @attribute
     def elastic(self) -> bool:
         """Whether it can never yield."""
         return math.isinf(self.yield_stress)
 
-    @property
-    @abstractmethod
+    @attribute
     def hardens(self) -> bool:
-        """Whether stress goes on growing with plastic strain, so that there is no limit load."""
+        """Whether stress grows with plastic strain without end, so that there is no limit load."""
+        return False
 
     def strength(self, state: PlasticState) -> Array:
         """Return the tension (n_points,) that one loading to this plastic strain reaches [MPa]."""

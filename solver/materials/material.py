@@ -76,6 +76,16 @@ class Material(Law):
         )
 
     @property
+    def shear_modulus(self) -> float:
+        """G [MPa]."""
+        return self.elasticity.shear_modulus
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K [MPa]."""
+        return self.elasticity.bulk_modulus
+
+    @property
     def plastic_modulus(self) -> float:
         """H = E Eu / (E - Eu): slope of stress over plastic strain in tension [MPa]."""
         if self.hardening == "none":

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
 
-from solver.materials import Elasticity, PlasticState, VonMises
-from tests.solver.laws import HARDENING, LAWS, steel
+from solver.materials import Elasticity, Law, PlasticState, VonMises
+from tests.solver.laws import HARDENING, LAWS, StoredCentre, steel
 
 every_law = pytest.mark.parametrize(("law", "n_components"), LAWS.values(), ids=LAWS)
 
@@ -144,6 +144,44 @@ def test_a_law_that_never_yields_fits_whatever_its_stress():
     assert law.shear_yield_stress == math.inf
     assert law.misfit(strain, found.stress, found.state, found.state).max() < 1e-8
     assert law.misfit(strain, 1.001 * found.stress, found.state, found.state).min() > 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rigidly(Law):
+    """A law whose attributes are fields; it flows nowhere."""
+
+    elasticity: Elasticity
+    yield_stress: float
+    hardens: bool = True
+
+    def flow_stress(self, state):
+        return np.full(state.accumulated.shape, self.yield_stress)
+
+    def respond(self, strain, state):
+        raise NotImplementedError
+
+
+def test_attributes_of_a_law_may_be_fields():
+    steel_like = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
+    with pytest.raises(TypeError, match="yield_stress"):
+        Rigidly(elasticity=steel_like)
+    law = Rigidly(elasticity=steel_like, yield_stress=70.0)
+    assert law.elasticity is steel_like
+    assert law.hardens
+    assert law.shear_yield_stress == 70.0 / math.sqrt(3)
+    assert law.stiffness(4) == pytest.approx(steel().stiffness(4))
+
+
+def test_attributes_that_a_law_does_not_give_are_computed():
+    class Least(Law):
+        flow_stress = Rigidly.flow_stress
+        respond = Rigidly.respond
+
+    least = Least()
+    assert not least.hardens
+    with pytest.raises(NotImplementedError, match="Least must give its elasticity"):
+        least.stiffness(4)
+    assert StoredCentre(steel("kinematic")).yield_stress == 350.0
 
 
 # -- the parts ---------------------------------------------------------------------------------
