@@ -67,7 +67,7 @@ class Material(Law):
         return Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
 
     @property
-    def rule(self) -> LinearHardening:
+    def hardening_rule(self) -> LinearHardening:
         """How its yield surface grows and moves."""
         return LinearHardening(
             yield_stress=self.yield_stress,
@@ -112,20 +112,20 @@ class Material(Law):
 
     def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
         """Return the yield stress plus its isotropic growth (n_points,) [MPa]."""
-        return self.rule.flow_stress(state.accumulated)
+        return self.hardening_rule.flow_stress(state.accumulated)
 
     def back_stress(self, state: PlasticState) -> NDArray[np.float64]:
         """Return Prager's back stress (n_components, n_points), Mandel [MPa]."""
-        return self.rule.back_stress(state.plastic_strain)
+        return self.hardening_rule.back_stress(state.plastic_strain)
 
     def strength(self, state: PlasticState) -> NDArray[np.float64]:
         """Return the stress of the uniaxial curve at this plastic strain (n_points,) [MPa]."""
-        return self.rule.strength(state.accumulated)
+        return self.hardening_rule.strength(state.accumulated)
 
     def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
         """Return stress, tangent and new state by the radial return."""
-        return radial_return(strain, state, self.elasticity, self.rule)
+        return radial_return(strain, state, self.elasticity, self.hardening_rule)
 
     def in_plane_stress(self) -> ProjectedReturn:
         """Return this law in plane stress, by the projected return."""
-        return ProjectedReturn(self, self.rule)
+        return ProjectedReturn(self, self.hardening_rule)

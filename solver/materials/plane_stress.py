@@ -41,7 +41,7 @@ def condensed(stiffness: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Law):
-    """A law in plane stress; the zz row of the strain it is given is not read.
+    """A law in plane stress, of four components; the zz row of strain is not read.
 
     1. zz strain from the elastic stiffness, plastic strain frozen
     2. Newton on stress zz, which grows with strain zz; where a step leaves the bracket of
@@ -54,8 +54,8 @@ class PlaneStress(Law):
 
     References
     ----------
-    R. de Borst, Int. J. Numer. Meth. Engng 32 (1991) 1017-1036, there with one iteration in each
-    of the body's; here to the end, so that the body's tangent is consistent.
+    E.A. de Souza Neto, D. Peric, D.R.J. Owen, Computational Methods for Plasticity (2008),
+    section 9.2.2: the constraint solved at the point, and its consistent tangent.
     """
 
     law: Law

@@ -36,10 +36,10 @@ class ProjectedReturn(PlaneStress):
     Attributes
     ----------
     law : the law where all strains are given
-    rule : how its yield surface grows and moves
+    hardening : how its yield surface grows and moves
     """
 
-    rule: LinearHardening
+    hardening: LinearHardening
 
     def _modal_stiffness(self) -> Array:
         elasticity = self.elasticity
@@ -81,7 +81,7 @@ class ProjectedReturn(PlaneStress):
         if self.elastic:
             return Response(stress, tangent, state, np.zeros(n_points, dtype=bool))
 
-        rule = self.rule
+        rule = self.hardening
         Hi, Hk, prager = rule.isotropic_modulus, rule.kinematic_modulus, rule.prager_modulus
         radius = SQRT23 * rule.flow_stress(state.accumulated)
         # P back = prager * plastic strain, P diagonal in the modes
