@@ -1,9 +1,10 @@
 """Components of symmetric tensors, and their scaling.
 
 Inside the solver strain and stress are Mandel vectors, components first, points last:
-``(xx, yy, zz, sqrt(2) xy)``, so that the dot product of two vectors is the double contraction of
-the tensors, the norm is the tensor norm and every tangent is a symmetric matrix. Tensor
-components (``xy`` without the factor) appear only in what leaves the solver: `to_tensor`.
+``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three,
+so that the dot product of two vectors is the double contraction of the tensors, the norm is the
+tensor norm and every tangent is a symmetric matrix. Tensor components (``xy`` without the factor)
+appear only in what leaves the solver: `to_tensor`.
 """
 
 from __future__ import annotations
@@ -20,14 +21,26 @@ SQRT2 = float(np.sqrt(2.0))
 
 
 def to_tensor(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return tensor components ``(4, ...)`` from Mandel components ``(4, ...)``."""
+    """Return tensor components ``(n_components, ...)`` from Mandel components of that shape."""
     tensor = np.array(mandel, dtype=float)
     tensor[3:] /= SQRT2
     return tensor
 
 
+def identity(n_components: int) -> NDArray[np.float64]:
+    """Return the Mandel components (n_components,) of the unit tensor."""
+    one = np.zeros(n_components)
+    one[:3] = 1.0
+    return one
+
+
+def deviator(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the deviator (n_components, ...) of Mandel components of that shape."""
+    out = np.array(mandel)
+    out[:3] -= mandel[:3].mean(axis=0)
+    return out
+
+
 def von_mises(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the von Mises stress of Mandel components (4, ...) [MPa]."""
-    deviator = np.array(mandel)
-    deviator[:3] -= mandel[:3].mean(axis=0)
-    return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=0)))
+    """Return the von Mises stress (...) of Mandel components (n_components, ...) [MPa]."""
+    return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))

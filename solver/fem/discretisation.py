@@ -13,13 +13,13 @@ from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part
 from solver.fem.surface import pressure_forces, travelling_forces
-from solver.materials import PlasticState, Response, elastic_stiffness, respond
 from solver.mesh.elements import element_type
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.surface import Surface
+    from solver.materials import PlasticState, Response
     from solver.model.body import Body
 
 
@@ -109,16 +109,16 @@ class Discretisation(Nodes, Part):
 
     def virgin(self) -> PlasticState:
         """Return the state of the body before any load."""
-        return PlasticState.virgin(self.weights.size)
+        return self.body.law.initial(self.weights.size, self.B.shape[2])
 
     def strain(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return Mandel strain (4, n_points) for displacements (n,)."""
         flat = np.matmul(self._flat_B, u[self.dofs][:, :, None])
-        return np.asarray(flat.reshape(-1, 4).T)
+        return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
 
     def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
         """Return stress, tangent and new state at all points."""
-        return respond(self.strain(u), state, self.body.material, self.body.state)
+        return self.body.law.respond(self.strain(u), state)
 
     def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
@@ -137,7 +137,7 @@ class Discretisation(Nodes, Part):
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return the tangent and the elastic quadratic form of a step [N mm]."""
         strain, weight = self.strain(step), self.weights.ravel()
-        C = elastic_stiffness(self.body.material, self.body.state)
+        C = self.body.law.stiffness(len(strain))
         tangent = np.einsum("ap,abp,bp->p", strain, response.tangent, strain) @ weight
         elastic = (strain * (C @ strain)).sum(axis=0) @ weight
         return float(tangent), float(elastic)
@@ -151,9 +151,8 @@ class Discretisation(Nodes, Part):
     def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
         """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
         flow = response.state.plastic_strain - before.plastic_strain
-        back = 2 / 3 * self.body.material.kinematic_modulus * response.state.plastic_strain
         work = (response.stress * flow).sum(axis=0) @ self.weights.ravel()
-        return float(work), float(((response.stress - back) * flow).sum(axis=0).min())
+        return float(work), float(self.body.law.dissipation(before, response).min())
 
     # -- stiffness ---------------------------------------------------------------------------
 
@@ -198,8 +197,8 @@ class Discretisation(Nodes, Part):
 
     @cached_property
     def _elastic_elements(self) -> NDArray[np.float64]:
-        C = elastic_stiffness(self.body.material, self.body.state)
-        return self._element_stiffness(slice(None), np.broadcast_to(C, (1, 1, 4, 4)))
+        C = self.body.law.stiffness(self.B.shape[2])
+        return self._element_stiffness(slice(None), C[None, None])
 
     @cached_property
     def elastic_data(self) -> NDArray[np.float64]:
@@ -222,6 +221,7 @@ class Discretisation(Nodes, Part):
         elements = np.flatnonzero(response.yielding.reshape(shape).any(axis=1))
         if len(elements) == 0:
             return self.elastic_data
-        tangent = response.tangent.reshape(4, 4, *shape)[:, :, elements].transpose(2, 3, 0, 1)
+        tangent = response.tangent.reshape(*response.tangent.shape[:2], *shape)
+        tangent = tangent[:, :, elements].transpose(2, 3, 0, 1)
         change = self._element_stiffness(elements, tangent) - self._elastic_elements[elements]
         return self.elastic_data + self._scatter(elements, change)

@@ -140,7 +140,5 @@ def error_estimate(part: Discretisation, stress: NDArray[np.float64]) -> tuple[f
 
 
 def elastic_energy(part: Part, stress: NDArray[np.float64]) -> float:
-    """Return the elastic energy of a Mandel stress (4, n_points) at a part's points [N mm]."""
-    nu, E = part.body.material.poisson_ratio, part.body.material.youngs_modulus
-    density = (1 + nu) * (stress**2).sum(axis=0) - nu * stress[:3].sum(axis=0) ** 2
-    return float(density @ part.volumes) / (2 * E)
+    """Return the elastic energy of Mandel stress (n_components, n_points) in a part [N mm]."""
+    return float(part.body.law.elasticity.energy_density(stress) @ part.volumes)

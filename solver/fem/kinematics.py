@@ -1,4 +1,8 @@
-"""From nodal displacements to strain: operators, B-bar, rigid motions."""
+"""From nodal displacements to strain: operators, B-bar, rigid motions.
+
+The number of dimensions is that of the arrays. Mandel components are xx, yy, zz, sqrt(2) xy, and in
+three dimensions sqrt(2) yz and sqrt(2) zx.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,9 @@ from solver.tensors import SQRT2
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+_SHEARS = ((0, 1), (1, 2), (2, 0))
+"""Axes of the shear components xy, yz, zx."""
 
 
 def strain_operator(
@@ -23,24 +30,27 @@ def strain_operator(
     Parameters
     ----------
     values : (n_nodes, n_elements, n_points) shape functions
-    gradients : (2, n_nodes, n_elements, n_points) their global derivatives [1/mm]
+    gradients : (dim, n_nodes, n_elements, n_points) their global derivatives [1/mm]
     radius : (n_elements, n_points) first coordinate of the points [mm]
-    state : one of `solver.model.kinematics.STATES`
+    state : one of `solver.model.kinematics.STATES`; not read in three dimensions
 
     Returns
     -------
-    (n_elements, n_points, 4, 2 n_nodes), unknowns ordered node by node (x, y).
+    (n_elements, n_points, 4 or 6, dim n_nodes), unknowns ordered node by node (x, y or x, y, z).
     """
     n_nodes, n_elements, n_points = values.shape
-    B = np.zeros((n_elements, n_points, 4, n_nodes, 2))
-    dx, dy = np.moveaxis(gradients, 1, -1)
-    B[:, :, 0, :, 0] = dx
-    B[:, :, 1, :, 1] = dy
-    B[:, :, 3, :, 0] = dy / SQRT2
-    B[:, :, 3, :, 1] = dx / SQRT2
-    if state == "axisymmetric":
+    dim = len(gradients)
+    shears = _SHEARS[: 1 if dim == 2 else 3]
+    B = np.zeros((n_elements, n_points, 3 + len(shears), n_nodes, dim))
+    along = np.moveaxis(gradients, 1, -1)
+    for axis in range(dim):
+        B[:, :, axis, :, axis] = along[axis]
+    for row, (a, b) in enumerate(shears, start=3):
+        B[:, :, row, :, a] = along[b] / SQRT2
+        B[:, :, row, :, b] = along[a] / SQRT2
+    if dim == 2 and state == "axisymmetric":
         B[:, :, 2, :, 0] = np.moveaxis(values, 0, -1) / radius[..., None]
-    return B.reshape(n_elements, n_points, 4, 2 * n_nodes)
+    return B.reshape(n_elements, n_points, 3 + len(shears), dim * n_nodes)
 
 
 def mean_dilatation(B: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,18 +67,21 @@ def mean_dilatation(B: NDArray[np.float64], weights: NDArray[np.float64]) -> NDA
 
 
 def rigid_motions(x: NDArray[np.float64], state: str) -> NDArray[np.float64]:
-    """Return the rigid motions of nodes ``x`` (2, n_nodes) as columns (2 n_nodes, 3 or 1).
+    """Return the rigid motions of nodes ``x`` (dim, n_nodes) as columns (dim n_nodes, n_rigid).
 
-    Translations along x and y and the rotation about the centroid (scaled to unit size); in
-    the axisymmetric state only the translation along the axis is rigid.
+    Translations along the axes, then the rotations about the centroid (scaled to unit size): in
+    the plane of x and y, in three dimensions also of y and z and of z and x. In the axisymmetric
+    state only the translation along the axis is rigid.
     """
-    n = x.shape[1]
-    modes = np.zeros((n, 2, 3))
-    modes[:, 0, 0] = 1.0
-    modes[:, 1, 1] = 1.0
+    dim, n = x.shape
+    planes = _SHEARS[: 1 if dim == 2 else 3]
+    modes = np.zeros((n, dim, dim + len(planes)))
+    for axis in range(dim):
+        modes[:, axis, axis] = 1.0
     arm = x - x.mean(axis=1, keepdims=True)
     arm /= np.abs(arm).max()
-    modes[:, 0, 2] = -arm[1]
-    modes[:, 1, 2] = arm[0]
-    flat = modes.reshape(2 * n, 3)
-    return flat[:, 1:2] if state == "axisymmetric" else flat
+    for mode, (a, b) in enumerate(planes, start=dim):
+        modes[:, a, mode] = -arm[b]
+        modes[:, b, mode] = arm[a]
+    flat = modes.reshape(dim * n, dim + len(planes))
+    return flat[:, 1:2] if dim == 2 and state == "axisymmetric" else flat

@@ -21,13 +21,12 @@ from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear import solvers as linear
-from solver.materials import PlasticState, Response
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
-    from solver.model.body import Body
+    from solver.materials import PlasticState, Response
 
 _KEPT_IN_MEMORY = 8
 _BLOCK = 64
@@ -101,13 +100,13 @@ class Substructure(Part):
         return Fixed(Dense(S, self.active, self.n))
 
     def virgin(self) -> PlasticState:
-        """Return the empty state: nothing here can yield."""
-        return PlasticState.virgin(0)
+        """Return the law's state at no points: nothing here can yield."""
+        return self.body.law.initial(0, self.whole.B.shape[2])
 
     def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
-        """Return the empty response."""
+        """Return the law's response at no points."""
         del u
-        return Response(np.zeros((4, 0)), np.zeros((4, 4, 0)), state, np.zeros(0, dtype=bool))
+        return self.body.law.respond(np.zeros_like(state.plastic_strain), state)
 
     def residual(
         self, time: float, u: NDArray[np.float64], response: Response
@@ -141,16 +140,15 @@ class Substructure(Part):
         return self._condensed.expand(u[self.elastic], factor, self.whole.n)[self.whole.copied]
 
 
-def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:
+def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> str:
     """Return a content key: equal bodies share their condensation."""
-    digest = sha256()
-    for array in (body.mesh.doflocs, body.mesh.t, nodes):
+    digest, body = sha256(), part.body
+    elastic = body.law.stiffness(part.B.shape[2])
+    for array in (body.mesh.doflocs, body.mesh.t, nodes, elastic):
         digest.update(np.ascontiguousarray(array).tobytes())
-    material = body.material
     digest.update(
         repr((
-            linear_solver, material.youngs_modulus, material.poisson_ratio,
-            body.state, body.element,
+            linear_solver, body.state, body.element,
             body.full_integration, body.thickness, body.periodic,
             sorted((name, held, body.facets(name).tobytes())
                    for name, held in body.supports.items()),
@@ -162,7 +160,7 @@ def _key(body: Body, nodes: NDArray[np.int64], linear_solver: str) -> str:
 
 
 def _condense(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> _Condensed:
-    key = _key(part.body, nodes, linear_solver)
+    key = _key(part, nodes, linear_solver)
     if key in _CACHE:
         _CACHE.move_to_end(key)
     else:

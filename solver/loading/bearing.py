@@ -20,7 +20,7 @@ def unbearable(system: System) -> LimitLoad | None:
     """
     for body in system.model.bodies:
         travelling, material = body.travelling, body.material
-        if travelling is None or material.plastic_modulus > 0:
+        if travelling is None or material.hardens:
             continue
         shear = float(np.abs(travelling.shear_ratio.value).max()) * travelling.peak
         strength = material.shear_yield_stress

@@ -73,7 +73,7 @@ def softer(
         stiffness=max(float(tangent / elastic), 0.0),  # below it is rounding
         body=parts[most].body.name,
         place=parts[most].most_strained(step[most]),
-        hardens=parts[most].body.material.plastic_modulus > 0,
+        hardens=parts[most].body.material.hardens,
     )
 
 

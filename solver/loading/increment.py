@@ -89,7 +89,7 @@ class Increment:
         self.elastic_first = elastic_first
         self.elastic_only = elastic_only
         materials = [part.body.material for part in system.parts]
-        self.patient = patient and all(m.elastic or m.plastic_modulus > 0 for m in materials)
+        self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
         self._pivoted = 0
         self._blended = 0

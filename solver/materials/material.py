@@ -1,18 +1,29 @@
-"""Material = linear elasticity + von Mises yield stress + linear hardening."""
+"""Material = linear elasticity + von Mises yield surface + linear hardening."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from solver.errors import ModelError
+from solver.materials.elasticity import Elasticity
+from solver.materials.hardening import LinearHardening
+from solver.materials.law import Law
+from solver.materials.projected_return import ProjectedReturn
+from solver.materials.radial_return import radial_return
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.materials.state import PlasticState, Response
 
 Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Material:
+class Material(Law):
     """An isotropic elastic, linearly hardening von Mises material.
 
     Attributes
@@ -48,25 +59,31 @@ class Material:
         if not 0 <= self.isotropic_fraction <= 1:
             raise ModelError("isotropic_fraction", self.isotropic_fraction, "must be in [0, 1]")
 
-    @property
-    def elastic(self) -> bool:
-        """Whether the material can never yield."""
-        return math.isinf(self.yield_stress)
+    # -- its parts -----------------------------------------------------------------------------
 
     @property
-    def shear_yield_stress(self) -> float:
-        """Shear stress at first yield, k = yield stress / sqrt(3) [MPa]."""
-        return self.yield_stress / math.sqrt(3)
+    def elasticity(self) -> Elasticity:
+        """Hooke's law."""
+        return Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
+
+    @property
+    def hardening_rule(self) -> LinearHardening:
+        """How its yield surface grows and moves."""
+        return LinearHardening(
+            yield_stress=self.yield_stress,
+            isotropic_modulus=self.isotropic_modulus,
+            kinematic_modulus=self.kinematic_modulus,
+        )
 
     @property
     def shear_modulus(self) -> float:
         """G [MPa]."""
-        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
+        return self.elasticity.shear_modulus
 
     @property
     def bulk_modulus(self) -> float:
         """K [MPa]."""
-        return self.youngs_modulus / (3 * (1 - 2 * self.poisson_ratio))
+        return self.elasticity.bulk_modulus
 
     @property
     def plastic_modulus(self) -> float:
@@ -85,3 +102,30 @@ class Material:
     def kinematic_modulus(self) -> float:
         """Part of the plastic modulus that moves the yield surface [MPa]."""
         return self.plastic_modulus - self.isotropic_modulus
+
+    # -- the law, see `Law` --------------------------------------------------------------------
+
+    @property
+    def hardens(self) -> bool:
+        """Whether stress goes on growing with plastic strain."""
+        return self.plastic_modulus > 0
+
+    def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
+        """Return the yield stress plus its isotropic growth (n_points,) [MPa]."""
+        return self.hardening_rule.flow_stress(state.accumulated)
+
+    def back_stress(self, state: PlasticState) -> NDArray[np.float64]:
+        """Return Prager's back stress (n_components, n_points), Mandel [MPa]."""
+        return self.hardening_rule.back_stress(state.plastic_strain)
+
+    def strength(self, state: PlasticState) -> NDArray[np.float64]:
+        """Return the stress of the uniaxial curve at this plastic strain (n_points,) [MPa]."""
+        return self.hardening_rule.strength(state.accumulated)
+
+    def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
+        """Return stress, tangent and new state by the radial return."""
+        return radial_return(strain, state, self.elasticity, self.hardening_rule)
+
+    def in_plane_stress(self) -> ProjectedReturn:
+        """Return this law in plane stress, by the projected return."""
+        return ProjectedReturn(self, self.hardening_rule)

@@ -1,124 +1,173 @@
-"""Von Mises plasticity in plane stress: the projected return of Simo and Taylor.
-
-In the modes ``(xx + yy, xx - yy) / sqrt(2)`` and ``sqrt(2) xy`` the elastic stiffness and the
-deviatoric projection P are diagonal together, and the return is one scalar equation a point.
-"""
+"""Plane stress of any law: the thickness strain is solved for at each point."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.materials.state import PlasticState, Response
-from solver.materials.von_mises import SQRT23
+from solver.materials.law import Law
+from solver.materials.state import Response
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.materials.material import Material
+    from solver.materials.elasticity import Elasticity
+    from solver.materials.state import PlasticState
+    from solver.materials.yield_surface import YieldSurface
 
-_IN_PLANE = np.array([0, 1, 3])
-_MODES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]]) / np.sqrt(2.0)
-_P = np.array([1 / 3, 1.0, 1.0])[:, None]
-_MAX_ITERATIONS = 50
+    Array = NDArray[np.float64]
 
-
-def _modal_stiffness(material: Material) -> NDArray[np.float64]:
-    G = material.shear_modulus
-    return np.array([material.youngs_modulus / (1 - material.poisson_ratio), 2 * G, 2 * G])
-
-
-def elastic_stiffness(material: Material) -> NDArray[np.float64]:
-    """Return the plane-stress stiffness (4, 4) on Mandel strain, row and column zz zero [MPa]."""
-    C = np.zeros((4, 4))
-    C[np.ix_(_IN_PLANE, _IN_PLANE)] = _MODES.T @ np.diag(_modal_stiffness(material)) @ _MODES
-    return C
+_ZZ = 2
+_ROUNDING = float(np.finfo(float).eps)
+"""Stress zz over the size of the terms it is a sum of, from which on it is rounding."""
+_SMALL = 1e-9
+"""The same for laws that solve an equation of their own and are less exact."""
+_MAX_ITERATIONS = 100
 
 
-def projected_return(
-    strain: NDArray[np.float64], state: PlasticState, material: Material
-) -> Response:
-    """Return in-plane stress (zz = 0) and consistent tangent.
+def condensed(stiffness: Array) -> Array:
+    """Return stiffnesses (n, n, ...) on Mandel strain with stress zz kept at zero.
 
-    With eta = stress - back stress in the modes, c the modal stiffness and g the multiplier:
+    ``D - d d' / D_zz`` with d the column zz of D: row and column zz of the result are zero.
+    """
+    D = stiffness
+    out = np.asarray(D - D[:, _ZZ, None] * D[None, _ZZ] / D[_ZZ, _ZZ])
+    out[_ZZ] = 0.0
+    out[:, _ZZ] = 0.0
+    return out
 
-    1. eta(g) = eta_trial / (1 + g (c P + 2/3 Hk)), phi(g) = sqrt(eta P eta)
-    2. solve sqrt(2/3) R(p) = phi(g), p = p_n + sqrt(2/3) g phi; written as
-       F(g) = sqrt(2/3) R_n / phi(g) + 2/3 Hi g - 1 = 0, which is increasing and concave, so
-       Newton's iteration from g = 0 approaches the root from the left without a safeguard
-    3. plastic strain += g P eta, its zz part is minus the sum of xx and yy
-    4. tangent = Xi - (Xi P eta)(Xi P eta)' / (eta P Xi P eta (1 + beta))
 
-    Parameters
+@dataclass(frozen=True, slots=True)
+class PlaneStress(Law):
+    """A law in plane stress, of four components; the zz row of strain is not read.
+
+    1. zz strain from the elastic stiffness, plastic strain frozen
+    2. Newton on stress zz, which grows with strain zz; where a step leaves the bracket of
+       strains known to be too small and too large, the bracket is halved instead
+    3. tangent condensed, stress zz set to zero
+
+    Attributes
     ----------
-    strain : (4, n_points) total Mandel strain; its zz row is not read
-    state : internal variables of the last converged state, left unchanged
+    law : which asks for all strains
 
     References
     ----------
-    J.C. Simo, R.L. Taylor, Int. J. Numer. Meth. Engng 22 (1986) 649-670;
-    Simo & Hughes (1998), box 3.3, p. 130-131.
+    E.A. de Souza Neto, D. Peric, D.R.J. Owen, Computational Methods for Plasticity (2008),
+    section 9.2.2: the constraint solved at the point, and its consistent tangent.
     """
-    n_points = strain.shape[1]
-    C = elastic_stiffness(material)
-    stress = C @ (strain - state.plastic_strain)
-    tangent = np.repeat(C[:, :, None], n_points, axis=2)
-    yielding = np.zeros(n_points, dtype=bool)
-    if material.elastic:
-        return Response(stress, tangent, state, yielding)
 
-    Hi, Hk = material.isotropic_modulus, material.kinematic_modulus
-    radius = SQRT23 * (material.yield_stress + Hi * state.accumulated)
-    modal_plastic = _MODES @ state.plastic_strain[_IN_PLANE]
-    # P back = 2/3 Hk plastic strain, P diagonal in the modes
-    trial = _MODES @ stress[_IN_PLANE] - 2 / 3 * Hk * modal_plastic / _P
-    yielding = np.sqrt((_P * trial**2).sum(axis=0)) > radius
-    if not yielding.any():
-        return Response(stress, tangent, state, yielding)
+    law: Law
 
-    at = np.flatnonzero(yielding)
-    c = _modal_stiffness(material)[:, None]
-    g, eta, phi = _multiplier(trial[:, at], radius[at], c * _P + 2 / 3 * Hk, Hi)
+    @property
+    def elasticity(self) -> Elasticity:
+        """That of the law."""
+        return self.law.elasticity
 
-    flow = _P * eta
-    increment = _MODES.T @ (g * flow)
-    plastic_strain = state.plastic_strain.copy()
-    accumulated = state.accumulated.copy()
-    plastic_strain[np.ix_(_IN_PLANE, at)] += increment
-    plastic_strain[2, at] -= increment[0] + increment[1]
-    accumulated[at] += SQRT23 * g * phi
-    stress[np.ix_(_IN_PLANE, at)] -= _MODES.T @ (c * g * flow)
+    @property
+    def surface(self) -> YieldSurface:
+        """That of the law."""
+        return self.law.surface
 
-    theta1 = 1 + 2 / 3 * Hk * g
-    theta2 = 1 - 2 / 3 * Hi * g
-    Xi = 1 / (1 / c + g / theta1 * _P)
-    Xi_flow = Xi * flow
-    along = (flow * Xi_flow).sum(axis=0)
-    beta = 2 / 3 * theta1 / theta2 * (Hi * theta1 + Hk * theta2) * phi**2 / along
-    modal = -Xi_flow[:, None] * Xi_flow[None] / (along * (1 + beta))
-    modal[np.arange(3), np.arange(3)] += Xi
-    rows, columns = np.ix_(_IN_PLANE, _IN_PLANE)
-    tangent[rows[..., None], columns[..., None], at] = np.einsum(
-        "ma,mnp,nb->abp", _MODES, modal, _MODES
-    )
-    return Response(stress, tangent, PlasticState(plastic_strain, accumulated), yielding)
+    @property
+    def yield_stress(self) -> float:
+        """That of the law."""
+        return self.law.yield_stress
 
+    @property
+    def hardens(self) -> bool:
+        """Whether the law hardens."""
+        return self.law.hardens
 
-def _multiplier(
-    trial: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    rate: NDArray[np.float64],
-    Hi: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Solve step 2 for each point; return the multiplier, eta and phi."""
-    g = np.zeros(trial.shape[1])
-    for _ in range(_MAX_ITERATIONS):
-        eta = trial / (1 + g * rate)
-        phi = np.sqrt((_P * eta**2).sum(axis=0))
-        F = radius / phi + 2 / 3 * Hi * g - 1
-        if np.abs(F).max() < 1e-13:
-            break
-        slope = radius / phi**3 * (_P * eta**2 * rate / (1 + g * rate)).sum(axis=0) + 2 / 3 * Hi
-        g = g - F / slope
-    return g, eta, phi
+    def initial(self, n_points: int, n_components: int) -> PlasticState:
+        """Return the initial state of the law."""
+        return self.law.initial(n_points, n_components)
+
+    def flow_stress(self, state: PlasticState) -> Array:
+        """Return that of the law."""
+        return self.law.flow_stress(state)
+
+    def back_stress(self, state: PlasticState) -> Array:
+        """Return that of the law."""
+        return self.law.back_stress(state)
+
+    def strength(self, state: PlasticState) -> Array:
+        """Return that of the law."""
+        return self.law.strength(state)
+
+    def shear_strength(self, state: PlasticState) -> Array:
+        """Return that of the law."""
+        return self.law.shear_strength(state)
+
+    def yield_value(self, stress: Array, state: PlasticState) -> Array:
+        """Return that of the law."""
+        return self.law.yield_value(stress, state)
+
+    def flow_direction(self, stress: Array, state: PlasticState) -> Array:
+        """Return that of the law."""
+        return self.law.flow_direction(stress, state)
+
+    def dissipation(self, before: PlasticState, response: Response) -> Array:
+        """Return that of the law."""
+        return self.law.dissipation(before, response)
+
+    def stiffness(self, n_components: int) -> Array:
+        """Return the elastic stiffness, row and column zz zero [MPa]."""
+        return condensed(self.law.stiffness(n_components))
+
+    def respond(self, strain: Array, state: PlasticState) -> Response:
+        """Return the law's response at the thickness strain that leaves no stress zz.
+
+        Where none is found stress is NaN, which no increment takes for an equilibrium.
+        """
+        C = self.law.stiffness(len(strain))
+        elastic = strain - state.plastic_strain
+        elastic[_ZZ] = 0.0
+        whole = strain.copy()
+        whole[_ZZ] = state.plastic_strain[_ZZ] - C[_ZZ] @ elastic / C[_ZZ, _ZZ]
+        scale = C[_ZZ, _ZZ] * (np.abs(whole) + np.abs(state.plastic_strain)).sum(axis=0)
+        response = self.law.respond(whole, state)
+        open_ = np.flatnonzero(~(np.abs(response.stress[_ZZ]) <= _ROUNDING * scale))
+        failed = open_
+        if len(open_):
+            some = whole[:, open_], state.at(open_), scale[open_]
+            whole[_ZZ, open_], solved = self._thickness_strain(*some, C[_ZZ, _ZZ])
+            failed = open_[~solved]
+            response = self.law.respond(whole, state)
+        stress, tangent = response.stress.copy(), response.tangent.copy()
+        stress[_ZZ] = 0.0
+        stress[:, failed] = np.nan
+        tangent[:, :, failed] = C[:, :, None]
+        return Response(stress, condensed(tangent), response.state, response.yielding)
+
+    def _thickness_strain(
+        self, strain: Array, state: PlasticState, scale: Array, stiff: float
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the strain zz (n,) of points, and where it leaves no stress zz."""
+        zz = strain[_ZZ].copy()
+        n = len(zz)
+        low, high = np.full(n, -np.inf), np.full(n, np.inf)
+        best, least = zz.copy(), np.full(n, np.inf)
+        going = np.arange(n)
+        for _ in range(_MAX_ITERATIONS):
+            trial = strain[:, going]
+            trial[_ZZ] = zz[going]
+            found = self.law.respond(trial, state.at(going))
+            off, slope = found.stress[_ZZ], found.tangent[_ZZ, _ZZ]
+            better = np.abs(off) < least[going]
+            best[going] = np.where(better, zz[going], best[going])
+            low[going] = np.where(off < 0, zz[going], low[going])
+            high[going] = np.where(off > 0, zz[going], high[going])
+            small = np.minimum(np.abs(off), least[going]) <= _SMALL * scale[going]
+            done = (np.abs(off) <= _ROUNDING * scale[going]) | (small & ~better)
+            least[going] = np.where(better, np.abs(off), least[going])
+            # uphill everywhere: where the tangent is not, the elastic stiffness gives the way
+            step = zz[going] - off / np.where(slope > 0, slope, stiff)
+            inside = (step > low[going]) & (step < high[going])
+            middle = 0.5 * (low[going] + high[going])
+            zz[going] = np.where(inside | ~np.isfinite(middle), step, middle)
+            going = going[~done]
+            if not len(going):
+                break
+        return best, least <= _SMALL * scale

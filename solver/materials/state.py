@@ -1,13 +1,15 @@
-"""What a yielding material remembers."""
+"""What a material remembers, and what it answers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from typing import Self
+
     from numpy.typing import NDArray
 
 
@@ -15,10 +17,14 @@ if TYPE_CHECKING:
 class PlasticState:
     """Internal variables at the points of a body; never changed, only replaced.
 
+    A law that remembers more inherits from this class and adds its own arrays, points last.
+
     Attributes
     ----------
-    plastic_strain : (n_components, n_points) Mandel, traceless
-    accumulated : (n_points,) equivalent plastic strain, the sum of sqrt(2/3) |d plastic_strain|
+    plastic_strain : (n_components, n_points) Mandel
+    accumulated : (n_points,) sum of the plastic multipliers: plastic strain grows by the
+        multiplier times `Law.flow_direction`. With von Mises it is the equivalent plastic
+        strain, the sum of sqrt(2/3) |d plastic_strain|
     """
 
     plastic_strain: NDArray[np.float64]
@@ -27,14 +33,19 @@ class PlasticState:
     @classmethod
     def virgin(cls, n_points: int, n_components: int = 4) -> PlasticState:
         """Return the state of a material that has never yielded."""
-        return cls(np.zeros((n_components, n_points)), np.zeros(n_points))
+        return PlasticState(np.zeros((n_components, n_points)), np.zeros(n_points))
+
+    def at(self, points: NDArray[np.int64]) -> Self:
+        """Return the internal variables of some points."""
+        return replace(self, **{f.name: getattr(self, f.name)[..., points] for f in fields(self)})
 
 
 class Response(NamedTuple):
-    """What a law returns.
+    """What a law answers to a strain.
 
     ``stress`` (n_components, n_points) Mandel [MPa]; ``tangent`` (n_components, n_components,
-    n_points) [MPa]; ``state`` the new internal variables; ``yielding`` (n_points,) bool.
+    n_points), the derivative of stress by strain [MPa]; ``state`` the new internal variables;
+    ``yielding`` (n_points,) bool, where the tangent is not the elastic stiffness.
     """
 
     stress: NDArray[np.float64]

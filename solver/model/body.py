@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.materials import PlaneStress
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
 from solver.model.kinematics import STATES, State
@@ -16,7 +18,7 @@ from solver.model.kinematics import STATES, State
 if TYPE_CHECKING:
     from skfem import Mesh
 
-    from solver.materials.material import Material
+    from solver.materials import Law
     from solver.model.amplitude import Amplitude
     from solver.model.motion import Axle, TravellingPressure
 
@@ -29,7 +31,7 @@ class Body:
     ----------
     name : unique in its model
     mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
-    material : its law
+    material : its law, a `Material` or one of the user's own (`solver.materials.Law`)
     state : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
     element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
     full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
@@ -46,7 +48,7 @@ class Body:
 
     name: str
     mesh: Mesh
-    material: Material
+    material: Law
     state: State = "plane_strain"
     element: str = "quad8"
     full_integration: bool = False
@@ -96,6 +98,13 @@ class Body:
         for boundary, value in self.pressure.items():
             if not np.isfinite(value):
                 raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")
+
+    @cached_property
+    def law(self) -> Law:
+        """How its material answers in its two-dimensional state."""
+        if self.state != "plane_stress":
+            return self.material
+        return self.material.in_plane_stress() or PlaneStress(self.material)
 
     def load_factor(self, time: float) -> float:
         """Return the factor of the pressures at a time."""

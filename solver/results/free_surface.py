@@ -131,12 +131,11 @@ class FreeSurface:
         u : (n,) displacements [mm]
         plastic_strain : (4, n_points) Mandel
         """
-        material = self.part.body.material
-        E, nu = material.youngs_modulus, material.poisson_ratio
-        e_t, e_z = self.strain(u) - self.first_row(plastic_strain)
+        elasticity = self.part.body.material.elasticity
+        elastic = self.strain(u) - self.first_row(plastic_strain)
         if self.part.body.state == "plane_stress":
-            return np.stack([E * e_t, np.zeros_like(e_t)])
-        return E / (1 - nu**2) * np.stack([e_t + nu * e_z, e_z + nu * e_t])
+            return np.stack([elasticity.youngs_modulus * elastic[0], np.zeros_like(elastic[0])])
+        return elasticity.biaxial_stress(elastic)
 
     def at(self, x: float, values: Array) -> Array:
         """Return values (..., n) of the columns at ``x`` [mm]: linear between the nearest two.

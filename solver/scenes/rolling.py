@@ -193,7 +193,7 @@ def cycles(look: Look) -> Values:
     cycle = parameters.schedule.cycle
     found = shakedown(
         look.outcome.traces, cycle, parameters.yield_stress / parameters.youngs_modulus,
-        periodic=parameters.periodic, hardens=parameters.material().plastic_modulus > 0,
+        periodic=parameters.periodic, hardens=parameters.material().hardens,
     )  # fmt: skip
     return {
         **passes(look.outcome.traces, cycle),

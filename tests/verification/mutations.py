@@ -18,7 +18,7 @@ import solver.loading.step
 import solver.loading.stepper
 from solver.contact import candidates, complementarity
 from solver.contact.problem import OPEN, STICK, ContactSolution
-from solver.fem import discretisation, kinematics, substructure
+from solver.fem import kinematics, substructure
 from solver.fem.discretisation import Discretisation
 from solver.fem.wheel import Wheel
 from solver.loading.control import Tolerances
@@ -149,27 +149,27 @@ def master_stands_still(patch: Patch) -> None:
 
 
 def other_material(**changes: float) -> Fault:
-    respond = discretisation.respond
-
-    def with_other(strain: Any, state: Any, material: Any, kind: str) -> Any:
+    def with_other(self: Any, u: Any, state: Any) -> Any:
+        material = self.body.material
         fields = {name: factor * getattr(material, name) for name, factor in changes.items()}
-        return respond(strain, state, replace(material, **fields), kind)
+        other = replace(self.body, material=replace(material, **fields))
+        return other.law.respond(self.strain(u), state)
 
     def fault(patch: Patch) -> None:
-        patch.setattr(discretisation, "respond", with_other)
+        patch.setattr(Discretisation, "respond", with_other)
 
     return fault
 
 
 def more_flow(patch: Patch) -> None:
-    respond = discretisation.respond
+    respond = Discretisation.respond
 
-    def flowing(strain: Any, state: Any, material: Any, kind: str) -> Any:
-        found = respond(strain, state, material, kind)
+    def flowing(self: Any, u: Any, state: Any) -> Any:
+        found = respond(self, u, state)
         plastic = state.plastic_strain + 1.3 * (found.state.plastic_strain - state.plastic_strain)
         return found._replace(state=PlasticState(plastic, found.state.accumulated))
 
-    patch.setattr(discretisation, "respond", flowing)
+    patch.setattr(Discretisation, "respond", flowing)
 
 
 def forgotten_flow(patch: Patch) -> None:
@@ -254,6 +254,16 @@ def hasty_release(patch: Patch) -> None:
     patch.setattr(solver.loading.increment.Increment, "__init__", hasty)
 
 
+def load_left_on(patch: Patch) -> None:
+    """Instead of being released, the bodies keep a hundredth of the load, in equilibrium."""
+    advance = solver.loading.stepper.Stepper.advance
+
+    def kept(self: Any, point: Any, target: float, *, contact: bool = True) -> Any:
+        return advance(self, point, target if contact else 0.01 * point.now.state.time)
+
+    patch.setattr(solver.loading.stepper.Stepper, "advance", kept)
+
+
 MUTATIONS: dict[str, Mutation] = {
     "friction ignored": Mutation(fault=friction_times(0.0), breaks=("slip",)),
     "friction halved": Mutation(fault=friction_times(0.5), breaks=("slip",)),
@@ -295,6 +305,9 @@ MUTATIONS: dict[str, Mutation] = {
     "a support too many": Mutation(fault=one_support_more, breaks=("residual",)),
     "a condensed body too soft": Mutation(
         fault=soft_condensation, breaks=("residual", "action_reaction"), scene="rolling"
+    ),
+    "a hundredth of the load left on": Mutation(
+        fault=load_left_on, breaks=("contact_after_unloading",)
     ),
     "release not solved to the end": Mutation(fault=hasty_release, breaks=("residual",)),
 }

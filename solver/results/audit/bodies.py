@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.fem.substructure import Substructure
-from solver.results.audit.law import excess, hooke, increment_error, law_error, of_state
+from solver.results.audit.law import increment_error
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,8 +46,9 @@ class AuditedBody:
         return not isinstance(self.part, Substructure)
 
     def _strain(self, state: State) -> Array:
-        """Return strain (4, n_elements, n_points), from the displacements."""
-        return self.plain.strain(self._system.displacement(self.name, state))
+        """Return Mandel strain (4, n_points), from the displacements."""
+        strain = self.plain.strain(self._system.displacement(self.name, state))
+        return strain.reshape(len(strain), -1)
 
     @cached_property
     def _reached(self) -> Array:
@@ -55,11 +56,15 @@ class AuditedBody:
 
     @cached_property
     def stress(self) -> Array:
-        """Stress (4, n_elements, n_points): what the increment gave, or Hooke's."""
+        """Mandel stress (4, n_points): what the increment gave, or that of elastic strain."""
         if self.meshed:
-            return self.plain.stress(self._response.stress)
-        body = self.plain.body
-        return hooke(self._reached, body.material, body.state)
+            return self._response.stress
+        return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
+
+    @cached_property
+    def balancing(self) -> Array:
+        """Nodal forces (n_nodes, 2) that must act on the body for its stress to hold [N]."""
+        return self.plain.forces(self.stress)
 
     @cached_property
     def lacking(self) -> Array:
@@ -67,7 +72,7 @@ class AuditedBody:
         whole = self.plain.part
         wheel = self.plain.body.axle is not None  # its load acts on the hub
         external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
-        return self.plain.forces(self.stress) - external.reshape(-1, 2)
+        return self.balancing - external.reshape(-1, 2)
 
     def applied(self) -> Array:
         """Return the resultant of the loads (2,) [N]."""
@@ -104,33 +109,26 @@ class AuditedBody:
     @property
     def strength(self) -> float:
         """The yield stress, or the largest stress of a body that cannot yield [MPa]."""
-        material = self.plain.body.material
-        return float(np.abs(self.stress).max()) if material.elastic else material.yield_stress
+        law = self.plain.body.law
+        return float(np.abs(self.stress).max()) if law.elastic else law.yield_stress
 
     def law(self) -> tuple[float, float]:
         """Return how far the increment is from its law, and its stress beyond yield [MPa]."""
         if not self.meshed:
             return 0.0, 0.0
-        body, after = self.plain.body, of_state(self._response.state)
-        stress, strain = self.stress.reshape(4, -1), self._reached.reshape(4, -1)
-        before = of_state(self._before)
-        broken = law_error(strain, stress, before, after, body.material, body.state)
-        if body.material.elastic:
-            return broken, 0.0
-        return broken, float(excess(stress, *after, body.material).max(initial=0.0))
+        law, after = self.plain.body.law, self._response.state
+        broken = law.misfit(self._reached, self.stress, self._before, after)
+        beyond = law.yield_value(self.stress, after)
+        return float(broken.max(initial=0.0)), float(beyond.max(initial=0.0))
 
     def increment_error(self) -> float:
         """Return the change of stress that smaller steps make where it flows, over yield stress."""
-        body = self.plain.body
-        if not self.meshed or body.material.elastic:
+        law, after = self.plain.body.law, self._response.state
+        if not self.meshed or law.elastic:
             return 0.0
-        flowing = np.flatnonzero(self._response.state.accumulated > self._before.accumulated)
+        flowing = np.flatnonzero(after.accumulated > self._before.accumulated)
         if not len(flowing):
             return 0.0
         some = flowing[:: max(1, len(flowing) // _SAMPLE)]
-        first = self._strain(self._converged.start).reshape(4, -1)[:, some]
-        last = self._reached.reshape(4, -1)[:, some]
-        plastic, accumulated = of_state(self._before)
-        before = (plastic[:, some], accumulated[some])
-        stress = self.stress.reshape(4, -1)[:, some]
-        return increment_error((first, last), stress, before, body.material, body.state)
+        strains = self._strain(self._converged.start)[:, some], self._reached[:, some]
+        return increment_error(law, strains, self.stress[:, some], self._before.at(some))

@@ -35,7 +35,10 @@ _DECLARED = [
         "audit_dissipation",
         "smallest plastic dissipation of an increment in a unit of volume", "MPa",
     ),
-    declare("audit_contact_after_unloading", "contact force left after unloading", "N"),
+    declare(
+        "audit_contact_after_unloading",
+        "force that the stress of the released bodies still needs from loads or contact", "N",
+    ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),
 ]  # fmt: skip

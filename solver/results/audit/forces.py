@@ -49,6 +49,14 @@ def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converge
     return float(np.sqrt(square)) / (converged.state.force_scale or 1.0)
 
 
+def left_on(bodies: Sequence[AuditedBody]) -> float:
+    """Return the force that must act beside supports for the stress of the bodies to hold [N].
+
+    None does on bodies taken apart and unloaded, whatever shape they have kept.
+    """
+    return float(np.sqrt(sum((body.balancing[body.free] ** 2).sum() for body in bodies)))
+
+
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
     """Return the nodal forces (n_nodes, 2) the pairs exert on a body, in space, and its nodes."""
     whole = body.plain.part

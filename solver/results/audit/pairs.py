@@ -64,10 +64,10 @@ class AuditedPair:
         closed, area = self._closed & (self.touching.area > 0), self.touching.area
         if not closed.any():
             return 0.0
-        compliance = 0.0
-        for name in self.bodies:
-            material = self._system.model.body(name).material
-            compliance += (1 - material.poisson_ratio**2) / material.youngs_modulus
+        compliance = sum(
+            1 / self._system.model.body(name).material.elasticity.plane_strain_modulus
+            for name in self.bodies
+        )
         pressure = float((self.normal[closed] / area[closed]).max())
         return pressure * compliance * float(self.touching.edge[closed].sum())
 

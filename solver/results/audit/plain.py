@@ -2,7 +2,7 @@
 
 Nothing here uses the operators that increments are solved with: gradients come from the elements
 themselves, volumes from the quadrature, and the resultants of pressures from the shape of the
-boundary. Stress and strain have tensor components (xx, yy, zz, xy), elements and points last.
+boundary. Stress and strain are Mandel vectors, elements and points last.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.fem.surface import edges_of
 from solver.mesh.elements import element_type
-from solver.tensors import to_tensor
+from solver.tensors import SQRT2, to_tensor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,7 +78,7 @@ class PlainBody:
         return out
 
     def strain(self, u: Array) -> Array:
-        """Return strain (4, n_elements, n_points) for displacements (n,) [mm]."""
+        """Return Mandel strain (4, n_elements, n_points) for displacements (n,) [mm]."""
         at = u.reshape(-1, 2)[self._nodes]  # (n_element_nodes, n_elements, 2)
         xx = np.einsum("iep,ie->ep", self._gradients[:, 0], at[..., 0])
         yy = np.einsum("iep,ie->ep", self._gradients[:, 1], at[..., 1])
@@ -87,15 +87,12 @@ class PlainBody:
         zz = np.zeros_like(xx)
         if self.body.state == "axisymmetric":
             zz = np.einsum("iep,ie->ep", self._round, at[..., 0])
-        return self._level(np.array([xx, yy, zz, xy / 2]))
-
-    def stress(self, mandel: Array) -> Array:
-        """Return tensor components at elements and points from Mandel (4, n_points)."""
-        return to_tensor(mandel).reshape(4, *self.volume.shape)
+        return self._level(np.array([xx, yy, zz, xy / SQRT2]))
 
     def forces(self, stress: Array) -> Array:
-        """Return the nodal forces (n_nodes, 2) that balance a stress [N]."""
-        weighted = self._level(stress) * self.volume
+        """Return the nodal forces (n_nodes, 2) that balance a Mandel stress (4, n_points) [N]."""
+        tensor = to_tensor(stress).reshape(4, *self.volume.shape)
+        weighted = self._level(tensor) * self.volume
         G = self._gradients
         x = np.einsum("iep,ep->ie", G[:, 0], weighted[0])
         x += np.einsum("iep,ep->ie", G[:, 1], weighted[3])
@@ -124,8 +121,6 @@ class PlainBody:
         return total
 
     def elastic_energy(self, stress: Array) -> float:
-        """Return the energy of a stress [N mm]."""
-        E, nu = self.body.material.youngs_modulus, self.body.material.poisson_ratio
-        square = (stress[:3] ** 2).sum(axis=0) + 2 * stress[3] ** 2
-        density = ((1 + nu) * square - nu * stress[:3].sum(axis=0) ** 2) / (2 * E)
-        return float((density * self.volume).sum())
+        """Return the energy of a Mandel stress (4, n_points) [N mm]."""
+        density = self.body.law.elasticity.energy_density(stress)
+        return float((density * self.volume.ravel()).sum())

@@ -10,7 +10,7 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.fem.fields import error_estimate
 from solver.results.audit.bodies import AuditedBody
-from solver.results.audit.forces import action_reaction, imbalance, reactions
+from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 
@@ -80,10 +80,7 @@ def audit(
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_energy": _energy_error(bodies, loaded),
         "audit_dissipation": least_dissipation,
-        "audit_contact_after_unloading": float(
-            sum(np.abs(c.normal).sum() + np.abs(c.tangential).sum()
-                for c in unloaded.state.contacts)
-        ),
+        "audit_contact_after_unloading": left_on(released),
     }  # fmt: skip
     figures |= _strength(system, loaded) | _discretisation(system, states)
     violations = _violations(system, figures, loaded, pairs)
@@ -118,13 +115,10 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
     for k, interface in enumerate(system.interfaces):
         pressure, tangential = contact_pressure(system, loaded.state, k)
         for number, _, _ in interface.sides:
-            material = system.parts[number].body.material
-            if material.elastic:
+            law = system.parts[number].body.law
+            if law.elastic:
                 continue
-            hardened = material.plastic_modulus * float(
-                loaded.responses[number].state.accumulated.max()
-            )
-            strength = (material.yield_stress + hardened) / np.sqrt(3)
+            strength = float(law.shear_strength(loaded.responses[number].state).max())
             shear = max(shear, float(np.abs(tangential).max()) / strength)
             friction = max(friction, interface.friction * float(pressure.max()) / strength)
     return {"audit_surface_shear": shear, "audit_friction_over_strength": friction}

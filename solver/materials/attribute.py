@@ -1,0 +1,29 @@
+"""Attributes of a law that are computed unless a law has them as its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from builtins import property as attribute
+    from collections.abc import Callable
+else:
+
+    class attribute:  # noqa: N801
+        """A property that a subclass may also have as a field of its dataclass.
+
+        A plain property would be taken for the field's default value, and could not be set.
+        """
+
+        def __init__(self, compute: Callable[[Any], Any]) -> None:
+            self._compute = compute
+            self.__doc__ = compute.__doc__
+
+        def __get__(self, instance: Any, owner: type) -> Any:
+            """Return the value for an instance; the class itself has none."""
+            if instance is None:
+                raise AttributeError(f"{owner.__name__}.{self._compute.__name__}")
+            return self._compute(instance)
+
+
+__all__ = ["attribute"]

@@ -1,0 +1,64 @@
+"""Isotropic linear elasticity: the constants, the stiffness and the energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.tensors import identity
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Elasticity:
+    """Hooke's law of an isotropic material.
+
+    Attributes
+    ----------
+    youngs_modulus : E [MPa]
+    poisson_ratio : nu
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+
+    @property
+    def shear_modulus(self) -> float:
+        """G [MPa]."""
+        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K [MPa]."""
+        return self.youngs_modulus / (3 * (1 - 2 * self.poisson_ratio))
+
+    @property
+    def plane_strain_modulus(self) -> float:
+        """E / (1 - nu^2): stress over strain in a plate that cannot strain across [MPa]."""
+        return self.youngs_modulus / (1 - self.poisson_ratio**2)
+
+    def stiffness(self, n_components: int) -> NDArray[np.float64]:
+        """Return the stiffness (n_components, n_components) on Mandel strain [MPa]."""
+        one = identity(n_components)
+        deviator = np.eye(n_components) - np.outer(one, one) / 3.0
+        return self.bulk_modulus * np.outer(one, one) + 2 * self.shear_modulus * deviator
+
+    def energy_density(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the elastic energy (...) of Mandel stress (n_components, ...) [N mm/mm3]."""
+        E, nu = self.youngs_modulus, self.poisson_ratio
+        square = (1 + nu) * (stress**2).sum(axis=0) - nu * stress[:3].sum(axis=0) ** 2
+        return np.asarray(square / (2 * E))
+
+    def biaxial_stress(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the two normal stresses (2, n) of two normal elastic strains (2, n) [MPa].
+
+        The stress across both is zero, as at a free surface.
+        """
+        nu = self.poisson_ratio
+        return self.plane_strain_modulus * np.stack(
+            [strain[0] + nu * strain[1], strain[1] + nu * strain[0]]
+        )

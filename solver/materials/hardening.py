@@ -1,0 +1,48 @@
+"""How a yield surface grows and moves with plastic strain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearHardening:
+    """Linear isotropic and linear kinematic (Prager) hardening together.
+
+    Attributes
+    ----------
+    yield_stress : Re, uniaxial stress at first yield; inf means never [MPa]
+    isotropic_modulus : Hi, growth of the yield stress with equivalent plastic strain [MPa]
+    kinematic_modulus : Hk, growth of the back stress with plastic strain in tension [MPa]
+    """
+
+    yield_stress: float
+    isotropic_modulus: float = 0.0
+    kinematic_modulus: float = 0.0
+
+    @property
+    def modulus(self) -> float:
+        """H = Hi + Hk: slope of stress over plastic strain in tension [MPa]."""
+        return self.isotropic_modulus + self.kinematic_modulus
+
+    @property
+    def prager_modulus(self) -> float:
+        """2/3 Hk: back stress over plastic strain, as tensors [MPa]."""
+        return 2 / 3 * self.kinematic_modulus
+
+    def flow_stress(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the size Re + Hi p (n,) of the surface for equivalent plastic strain p (n,)."""
+        return self.yield_stress + self.isotropic_modulus * accumulated
+
+    def strength(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the stress Re + H p (n,) that tension reaches with plastic strain p (n,)."""
+        return self.yield_stress + self.modulus * accumulated
+
+    def back_stress(self, plastic_strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the centre of the surface (n_components, n) for Mandel plastic strain [MPa]."""
+        return self.prager_modulus * plastic_strain

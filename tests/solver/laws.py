@@ -1,0 +1,96 @@
+"""Laws that the tests of the contract run over, one of them written here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from solver.materials import (
+    Elasticity,
+    Law,
+    Material,
+    PlaneStress,
+    PlasticState,
+    Response,
+)
+
+HARDENING = ["none", "isotropic", "kinematic", "mixed"]
+
+
+def steel(hardening: str = "none", ratio: float = 0.024, **fields: Any) -> Material:
+    """Return a steel of Re = 350 MPa."""
+    given = {"youngs_modulus": 2e5, "poisson_ratio": 0.3, "yield_stress": 350.0} | fields
+    return Material(hardening=hardening, hardening_ratio=ratio, **given)
+
+
+@dataclass(frozen=True, slots=True)
+class Centred(PlasticState):
+    """Remembers the centre of its yield surface (n_components, n_points) [MPa]."""
+
+    centre: np.ndarray
+
+
+@dataclass(frozen=True)
+class StoredCentre(Law):
+    """Kinematic hardening whose back stress is an internal variable; ``like`` gives numbers."""
+
+    like: Material
+
+    @cached_property
+    def elasticity(self) -> Elasticity:
+        return self.like.elasticity
+
+    @property
+    def hardens(self) -> bool:
+        return True
+
+    def initial(self, n_points: int, n_components: int) -> Centred:
+        zero = np.zeros((n_components, n_points))
+        return Centred(zero, np.zeros(n_points), zero)
+
+    def flow_stress(self, state: PlasticState) -> np.ndarray:
+        return np.full(state.accumulated.shape, self.like.yield_stress)
+
+    def back_stress(self, state: Any) -> np.ndarray:
+        return state.centre
+
+    def respond(self, strain: np.ndarray, state: Any) -> Response:
+        G, Hk = self.elasticity.shear_modulus, self.like.kinematic_modulus
+        C = self.stiffness(len(strain))
+        trial = C @ (strain - state.plastic_strain)
+        f = self.yield_value(trial, state)
+        N = self.flow_direction(trial, state)
+        dp = np.maximum(f, 0.0) / (3 * G + Hk)
+        flow = dp * N
+        after = replace(
+            state,
+            plastic_strain=state.plastic_strain + flow,
+            accumulated=state.accumulated + dp,
+            centre=state.centre + 2 / 3 * Hk * flow,
+        )
+        n = np.sqrt(2 / 3) * N
+        q = f + self.like.yield_stress
+        shrunk = 2 * G * np.where(f > 0, 3 * G * dp / q, 0.0)
+        P = (C - self.elasticity.bulk_modulus * _ones(len(strain))) / (2 * G)
+        turned = np.where(f > 0, 2 * G * 3 * G / (3 * G + Hk), 0.0) - shrunk
+        tangent = C[:, :, None] - shrunk * P[:, :, None] - turned * n[:, None] * n[None]
+        return Response(trial - 2 * G * flow, tangent, after, f > 0)
+
+
+def _ones(n: int) -> np.ndarray:
+    one = (np.arange(n) < 3).astype(float)
+    return np.outer(one, one)
+
+
+LAWS: dict[str, tuple[Law, int]] = {
+    **{f"radial {h} {n}": (steel(h), n) for h in HARDENING for n in (4, 6)},
+    **{f"projected {h}": (steel(h).in_plane_stress(), 4) for h in HARDENING},
+    **{f"wrapped {h}": (PlaneStress(steel(h)), 4) for h in HARDENING},
+    "own 4": (StoredCentre(steel("kinematic")), 4),
+    "own 6": (StoredCentre(steel("kinematic")), 6),
+    "own, wrapped": (PlaneStress(StoredCentre(steel("kinematic"))), 4),
+}
+"""Name -> law and its number of components."""
