@@ -45,7 +45,11 @@ def _value(name: str, given: Any, parameters: Sequence[Parameter]) -> Any:
     """Return a value as the first of the parameters of this name that accepts it has it."""
     for parameter in parameters:
         try:
-            return parameter.normalise(plain(given, parameter.default), name)
+            value = parameter.normalise(plain(given, parameter.default), name)
         except StudyError as error:
             refusal = error
+        else:
+            if parameter.in_range(value):
+                return value
+            refusal = parameter.refusal(name, given)
     raise refusal

@@ -36,7 +36,7 @@ def is_id(text: str) -> bool:
 
 
 FORM = (
-    "definition/design.py",
+    "definition/cases.py",
     "definition/parameters.py",
     "definition/vocabulary.py",
     "storage/dataset.py",

@@ -16,7 +16,7 @@ from typing import Any
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
-from studies.definition import design
+from studies.definition.cases import Case, cases_of
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter, nearest
 from studies.errors import StudyError
@@ -95,7 +95,7 @@ def linked_values(axes: Axes) -> dict[str, tuple[str, list[Any]]]:
     }
 
 
-def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[design.Case]:
+def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[Case]:
     """Yield every point of the sweep, the last axis running fastest.
 
     Raises
@@ -112,7 +112,7 @@ def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[des
         for _, (_, settings) in point:
             given |= settings
         try:
-            for case in design.cases(scene, given, lists):
+            for case in cases_of(scene, given, lists):
                 yield replace(case, index=(*index, *case.index))
         except StudyError as error:
             raise _located(error, linked, labels) from error

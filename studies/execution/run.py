@@ -7,11 +7,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from solver.scenes import SCENES
-from studies.definition.design import Path
+from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
@@ -62,7 +62,7 @@ class StudyOutcome:
     counts: Mapping[str, int]
     failed: Sequence[tuple[str, str, str]]
     computed: Sequence[str]
-    dataset: FilePath
+    dataset: Path
     wall_seconds: float
     stopped: bool
 
@@ -183,9 +183,9 @@ class _Work:
                 else:
                     self._give_up(tasks[item.position], item.error)
 
-    def _rest(self, path: Path) -> Path:
+    def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)
-        return Path(path.id, path.parameters, cases)
+        return LoadingPath(path.id, path.parameters, cases)
 
     def _hear(self, content: Mapping[str, Any]) -> None:
         path = content["path"]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from solver.results.record import Record
 from solver.scenes import Scene
-from studies.definition.design import Case, Path
+from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
 from studies.storage import dataset as layout
 from studies.storage.store import Store
@@ -25,17 +25,17 @@ class PathTask:
     """
 
     scene: Scene
-    path: Path
-    directory: FilePath
+    path: LoadingPath
+    directory: Path
     source: str
 
 
-class Stopped(Exception):
-    """Raised inside a path to leave it, because the study was asked to stop."""
+class StopAsked(Exception):
+    """Raised inside a loading path to leave it, because the study was asked to stop."""
 
 
 def walk(
-    task: PathTask, report: Callable[[dict[str, Any]], None], stopped: Callable[[], bool]
+    task: PathTask, report: Callable[[dict[str, Any]], None], should_stop: Callable[[], bool]
 ) -> list[dict[str, Any]]:
     """Compute the runs of a path, and return their catalogue rows.
 
@@ -56,8 +56,8 @@ def walk(
 
     def monitor(fraction: float) -> None:
         report({"path": task.path.id, "fraction": float(fraction)})
-        if stopped():
-            raise Stopped
+        if should_stop():
+            raise StopAsked
 
     owed: dict[Any, Case] = {}
     for case in task.path.cases:
@@ -74,7 +74,7 @@ def walk(
                 row = _written(store, task.scene, owed[value], record)
                 del owed[value]
                 keep(row)
-    except Stopped:
+    except StopAsked:
         return rows
     except Exception as error:
         reason = _reason(error)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from solver.scenes import SCENES, Scene
-from studies.definition.design import Case
+from studies.definition.cases import Case
 from studies.definition.parameters import parameters_of
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, STATUSES
@@ -24,7 +24,7 @@ SAME = 1e-9
 """Relative difference below which two runs are taken to have the same grid."""
 
 
-def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
+def combine(study: Study, store: Store, cases: Sequence[Case]) -> Path:
     """Write the combined data set of `study` and return its path.
 
     Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is

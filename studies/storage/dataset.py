@@ -18,7 +18,7 @@ import solver
 from solver.results.quantities import QUANTITIES
 from solver.results.record import Record
 from solver.scenes import Scene
-from studies.definition.design import USUAL_AXES, Case
+from studies.definition.cases import USUAL_AXES, Case
 from studies.definition.identity import solver_hash
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from studies.definition.design import USUAL_AXES
+from studies.definition.cases import USUAL_AXES
 from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped

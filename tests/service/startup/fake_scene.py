@@ -16,6 +16,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.results.record import Record, Status
+from solver.scenes.parameters import check
 
 LOG = "FAKE_SCENE_LOG"
 """Environment variable: file that gets a line for each record computed, its parameters."""
@@ -44,6 +45,7 @@ class FakeParameters:
     )
 
     def __post_init__(self) -> None:
+        check(self)
         if self.behaviour == "limit" and self.friction == 1.0:
             raise ModelError("friction", self.friction, "must be below 1 when behaviour is limit")
 
