@@ -1,4 +1,9 @@
-"""Names made from content: the same parameters and the same solver give the same id."""
+"""Names made from content: the same parameters and the same solver give the same id.
+
+A change of the solver that may change a number, a name or a unit changes every id, so that no old
+run is taken for a new one. A change of words alone changes none: `studies.definition.meaning` says
+what words are.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import solver
+from studies.definition.meaning import meaning
 
 ID_PATTERN = re.compile(r"[0-9a-f]{32}")
 
@@ -26,7 +32,7 @@ def canonical(value: Any) -> str:
 
 
 def content_id(*parts: Any) -> str:
-    """Return 32 hexadecimal digits that depend on `parts` and on the solver's source."""
+    """Return 32 hexadecimal digits that depend on `parts` and on what the solver computes."""
     return _digest(canonical([*parts, solver_hash()]).encode())
 
 
@@ -46,14 +52,15 @@ FORM = (
 
 @cache
 def solver_hash() -> str:
-    """Return the digest of all that decides what a run's file holds.
+    """Return the digest of all that decides what a run's file holds, but for its words.
 
-    These are the sources of the solver and the modules that lay its records out as data sets.
+    These are the sources of the solver, and the modules that lay its records out as data sets,
+    each with its place: to move a file changes the digest.
     """
     root, here = Path(solver.__file__).parent, Path(__file__).parents[1]
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
-    digests = {name: _digest(path.read_bytes()) for name, path in files.items()}
+    digests = {name: _digest(meaning(path.read_bytes()).encode()) for name, path in files.items()}
     return _digest(json.dumps(digests, sort_keys=True).encode())
 
 

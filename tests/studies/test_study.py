@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 import subprocess
 import sys
 import time
@@ -198,37 +197,6 @@ def test_a_changed_solver_makes_new_ids(monkeypatch: pytest.MonkeyPatch) -> None
     after = Study.from_dict(GOOD)
     assert after.id != ids[0]
     assert next(after.cases()).id != ids[1]
-
-
-def test_the_solver_hash_covers_every_source_and_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "solver"
-    (package / "inner").mkdir(parents=True)
-    (package / "__init__.py").write_text("")
-    (package / "inner" / "law.py").write_text("E = 1")
-    monkeypatch.setattr("solver.__file__", str(package / "__init__.py"))
-    source = studies.definition.identity.solver_hash.__wrapped__
-    first = source()
-    (package / "inner" / "law.py").write_text("E = 2")
-    second = source()
-    (package / "inner" / "law.py").rename(package / "law.py")
-    assert len({first, second, source()}) == 3
-
-
-@pytest.mark.parametrize("name", studies.definition.identity.FORM)
-def test_the_solver_hash_covers_what_gives_a_file_its_form(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    here = Path(studies.definition.identity.__file__).parents[1]
-    shutil.copytree(here, tmp_path / "studies")
-    copied = tmp_path / "studies" / "definition" / "identity.py"
-    monkeypatch.setattr("studies.definition.identity.__file__", str(copied))
-    digest = studies.definition.identity.solver_hash.__wrapped__
-    before = digest()
-    with (tmp_path / "studies" / name).open("a") as module:
-        module.write("# changed\n")
-    assert digest() != before
 
 
 def test_axes_follow_the_scene_and_values_stay_as_written() -> None:
