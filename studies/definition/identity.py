@@ -46,6 +46,7 @@ FORM = (
     "definition/parameters.py",
     "definition/vocabulary.py",
     "storage/dataset.py",
+    "storage/provenance.py",
 )
 """Modules of this package that lay records out: names, units, dimensions, attributes."""
 
