@@ -214,4 +214,5 @@ PUNCH = Scene(
     parameters=PunchParameters,
     branch="load_ratio",
     path=path,
+    refining=frozenset({"smallest_element", "growth", "element", "load_step", "unload_steps"}),
 )

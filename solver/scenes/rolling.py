@@ -193,4 +193,10 @@ ROLLING = Scene(
     parameters=RollingParameters,
     branch="passes",
     path=path,
-)
+    refining=frozenset(
+        {
+            "element_size", "growth", "advance_step", "advance_tolerance", "press_steps",
+            "unload_steps",
+        }
+    ),
+)  # fmt: skip

@@ -27,6 +27,8 @@ class Scene:
     branch : the parameter along which one loading path serves many runs
     path : ``path(parameters, values, monitor)`` yields one record for each value of the
         branch parameter, in increasing order, as each becomes known; failures are records too
+    refining : the parameters that change how accurate a result is, not what it is the result of:
+        runs that differ in these alone solve one problem, and can be compared
     """
 
     name: str
@@ -34,3 +36,4 @@ class Scene:
     parameters: type[Any]
     branch: str
     path: Callable[[Any, Sequence[float], Monitor], Iterator[Record]]
+    refining: frozenset[str] = frozenset()
