@@ -114,4 +114,4 @@ def test_a_scene_without_published_numbers_asks_for_them(
 ) -> None:
     store = stored(tmp_path / "out", {"cell": [1]})
     assert main(["compare", str(store.directory)]) == 2
-    assert "--reference = None: must be given" in capsys.readouterr().err
+    assert "--reference = None: must name a table" in capsys.readouterr().err
