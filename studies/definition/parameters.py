@@ -181,9 +181,10 @@ def _describe(schema: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any, usual: Any) -> Any:
-    """Return a value that may have become text, such as one of an axis, as the usual value is.
+    """Return a value that was written as text, read back in the kind of the usual value.
 
-    Text that stands for no number and no truth value stays as it is.
+    An axis of truth values, for instance, is stored as text. Text that is neither a number nor a
+    truth value stays text.
     """
     if isinstance(usual, str) or not isinstance(value, str):
         return value

@@ -1,8 +1,8 @@
 """The sweep of a study: axes of one parameter, and linked axes, which move several together.
 
-An axis that is a list holds the values of the parameter it is named after. An axis that is a
-table has a name of its own; it holds labels, and the parameters each label sets. For each
-combination of labels the study is a sweep of lists, with what the labels set fixed.
+An axis that is a list holds the values of the parameter it is named after. A linked axis is a
+table with a name of its own: it holds labels, and the parameters that each label sets. For each
+combination of labels, what the labels set is fixed, and the lists are swept.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     first: dict[str, str] = {}
     for parameter, axis in _settings(axes):
         if first.setdefault(parameter, axis) != axis:
-            allowed = f"sets {parameter}, as sweep.{first[parameter]} does: keep one"
+            allowed = f"sets {parameter}, which sweep.{first[parameter]} sets too: keep one"
             raise StudyError(f"sweep.{axis}", content[axis], allowed)
     return axes
 
@@ -181,7 +181,7 @@ def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None
     from studies.definition.vocabulary import LABEL_ATTRIBUTES
 
     if name in known:
-        allowed = "must be a list of values: a table is an axis with a name of its own"
+        allowed = "must be a list of values; a table of labels needs a name that is no parameter"
     elif name in QUANTITIES or name in LABEL_ATTRIBUTES:
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):

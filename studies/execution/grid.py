@@ -28,7 +28,10 @@ Function = Callable[[Any, Report, StopCheck], Any]
 
 _POLL = 0.2
 """Seconds between two looks at whether to stop, on either side."""
-_WORKER_DIED = "the worker process died each time it was on this path"
+_WORKER_DIED = (
+    "the worker process died each time it computed this loading path; if memory ran out, "
+    "use fewer workers"
+)
 
 _CONNECT = 10.0
 """Seconds within which a scheduler must answer."""

@@ -27,7 +27,7 @@ class StudyEvent:
 
     Attributes
     ----------
-    kind : ``"path"`` (a path went forward) or ``"run"`` (a run has its outcome)
+    kind : ``"path"`` (a loading path has advanced) or ``"run"`` (a run has its outcome)
     progress : fraction of the whole study that is done, 0 to 1
     path : id of the path
     fraction : fraction of this path that is done, 0 to 1
@@ -91,7 +91,8 @@ def run_study(
     workers : worker processes on this machine; by default one a core
     scheduler : address of a running dask scheduler, to be used instead; its workers must see
         the store under the same path
-    resume : compute only runs that have no outcome; by default failed ones are tried again too
+    resume : compute only the runs that have no outcome; by default failed runs are computed again
+        too
     on_event : called, in this thread, with everything that happens
     should_stop : asked several times a second; once it is true the work stops, and finished
         runs stay

@@ -14,14 +14,19 @@ from studies.definition.identity import solver_hash
 from studies.storage import dataset as layout
 from studies.storage.store import Store
 
-NO_RECORD = "the path ended without a record of this run"
+NO_RECORD = "the scene ended its loading path without a record of this run"
 
 
 @dataclass(frozen=True, slots=True)
 class PathTask:
-    """A path to walk, or what is left of it, and where its runs go.
+    """A loading path to walk, or what is left of it, and where its runs are written.
 
-    ``source`` is the solver the caller has; a worker with another one refuses the task.
+    Attributes
+    ----------
+    scene, path : what to compute
+    directory : of the store
+    source : `solver_hash` of the process that started the study; a worker whose own differs
+        refuses the task
     """
 
     scene: Scene
@@ -37,15 +42,16 @@ class StopAsked(Exception):
 def walk(
     task: PathTask, report: Callable[[dict[str, Any]], None], should_stop: Callable[[], bool]
 ) -> list[dict[str, Any]]:
-    """Compute the runs of a path, and return their catalogue rows.
+    """Compute the runs of a loading path, and return their catalogue rows.
 
-    A run that is already there is left alone: a worker that took the path over from a dead one
-    continues where that stopped. When the path raises, the runs it still owed are
-    written as broken, with the reason; a record that cannot be written breaks its own run only.
+    A run whose file exists is not computed again: where a worker died, the next one continues.
+    When the scene raises an error, the runs that have no record yet are written as broken, with
+    the error as their message. A record that cannot be written breaks its own run only.
     """
     if task.source != solver_hash():
         raise RuntimeError(
-            "the worker has another version of the solver than the caller; restart both"
+            "the worker has another version of the solver than the process that started the study: "
+            "install the same one for both and restart the worker"
         )
     store = Store(task.directory)
     rows: list[dict[str, Any]] = []

@@ -122,7 +122,7 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
 
     Parameters
     ----------
-    paths : data sets, studies or output directories; what has no cases there is left out
+    paths : data sets, studies or output directories; data sets without cases are left out
     selection : axis -> wanted value
 
     Raises
@@ -196,7 +196,7 @@ def _conflict(
     if level not in known or known[level].agrees_with(profile):
         return None
     found = differences(profile.parameters, known[level].parameters)
-    reason = _told(found) or "made by another state of the solver"
+    reason = _told(found) or "made with another version of the solver"
     return f"{where} has another result at the same refinement there: {reason}", list(found)
 
 

@@ -299,7 +299,7 @@ def test_two_results_at_one_refinement_are_refused_with_what_refines_too(tmp_pat
     assert f"{there} growth 1.5, not 1.15; compare data sets one by one" in told
     again = changed.assign_attrs(parameters="{}")
     told = refused(usual, written(again, tmp_path / "c.nc"))
-    assert f"{there} made by another state of the solver" in told
+    assert f"{there} made with another version of the solver" in told
     assert read_profiles([usual, written(coarse, tmp_path / "d.nc")], {}).levels == [(1.0, 1.0)]
 
 
