@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import solver
-from studies.definition.meaning import meaning
 
 ID_PATTERN = re.compile(r"[0-9a-f]{32}")
 
@@ -58,6 +57,8 @@ def solver_hash() -> str:
     These are the sources of the solver, and the modules that lay its records out as data sets,
     each with its place: to move a file changes the digest.
     """
+    from studies.definition.meaning import meaning  # `residua --help` makes no id
+
     root, here = Path(solver.__file__).parent, Path(__file__).parents[1]
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
