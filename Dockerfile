@@ -9,10 +9,11 @@ ENV PIP_NO_CACHE_DIR=1 \
     MPLCONFIGDIR=/tmp/matplotlib
 
 WORKDIR /app
-COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY pyproject.toml setup.py constraints.txt README.md LICENSE ./
 COPY solver solver
 COPY studies studies
 COPY service service
+COPY data data
 RUN if [ "$(uname -m)" = x86_64 ]; then extra='[mkl]'; else extra=''; fi \
     && pip install --constraint constraints.txt ".$extra"
 

@@ -27,13 +27,13 @@ OUTDATED = "the solver has changed since the study was accepted: post it again"
 
 
 class Outlet:
-    """The way out for events, one JSON text a line."""
+    """Sends events to the service, one JSON text a line."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
 
     def send(self, kind: str, content: Mapping[str, Any]) -> None:
-        """Write one event; that nobody reads any more is no reason to fail."""
+        """Write one event; when the service no longer reads, the work goes on."""
         with contextlib.suppress(BrokenPipeError):
             self.stream.write(json.dumps({"kind": kind, "content": content}) + "\n")
             self.stream.flush()
@@ -52,7 +52,7 @@ def read_order() -> dict[str, Any]:
     while not text.endswith(b"\n"):
         piece = os.read(STDIN, 65536)
         if not piece:
-            raise SystemExit("the service left before it gave its order")
+            raise SystemExit("the service ended before it sent the order")
         text += piece
     order: dict[str, Any] = json.loads(text)
     return order

@@ -1,8 +1,8 @@
 """The durable queue: one row of an SQLite file for each study ever accepted.
 
-The row is the only truth about what shall happen to a study. Routes write wishes into it
-(accept, dismiss, retry), the runner reads them and writes what came of them, and a service
-that starts again after a crash finds in it what is left to do.
+The row alone says what shall be done with a study. Routes write into it what users ask for
+(accept, dismiss, retry); the runner reads that, and writes what was done. A service that starts
+after a crash reads from it what is left to do.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class State(StrEnum):
 
     @property
     def final(self) -> bool:
-        """Whether nothing more will happen unless somebody asks."""
+        """Whether the work has ended; only a retry starts it again."""
         return self not in (State.ACCEPTED, State.RUNNING)
 
 
@@ -163,7 +163,7 @@ class Jobs:
             )
 
     def note(self, job_id: str, progress: float, message: str = "") -> None:
-        """Write how far a running job is, and why it is not getting on if it is not."""
+        """Write how far a running job is, and why it had to be started again, if it had."""
         with self._transaction() as connection:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
@@ -171,7 +171,7 @@ class Jobs:
             )
 
     def begun(self, job_id: str) -> None:
-        """Write that a running job computes: what fails from now on has failed for good."""
+        """Write that a running job has begun: runs that fail now are not tried again."""
         with self._transaction() as connection:
             connection.execute(
                 "UPDATE job SET again = 0 WHERE id = ? AND state = ?", (job_id, State.RUNNING)

@@ -27,19 +27,19 @@ class Attempt:
     Attributes
     ----------
     progress : percentage of the study that is done
-    begun : whether it came so far that something was computed
-    runs : how many runs came to an end
-    counts : runs by status, once the study has come to its end
-    reason : why there is no such end
-    patient : whether the reason will pass by itself: no scheduler, a busy store
-    hopeless : whether another start would end in the same way
+    begun : whether the first event came: something was computed
+    runs : number of runs that got an outcome
+    counts : runs by status when the study ended; None when it did not
+    reason : why it did not end
+    patient : whether waiting helps: no scheduler answers, another process uses the directory
+    hopeless : whether every further start would end in the same way
     """
 
     progress: float
     begun: bool = False
     runs: int = 0
     counts: dict[str, int] | None = None
-    reason: str = "its process ended without a word"
+    reason: str = "its process ended without a result or an error message; see the service's log"
     patient: bool = False
     hopeless: bool = False
 
@@ -84,11 +84,11 @@ class Runner:
                 else:
                     await self._compute(job)
             except Exception:
-                log.exception("the queue could not be worked on; trying again")
+                log.exception("the queue could not be read or written; trying again")
                 await self._pause(10 * self.settings.poll_seconds)
 
     async def _compute(self, job: Job) -> None:
-        """Start a study until it comes to an end, or stops too often without anything new."""
+        """Start a study until it ends; give up after too many starts in a row without a new run."""
         barren, progress = 0, job.progress
         while True:
             attempt = await self._attempt(job, progress)
@@ -109,7 +109,7 @@ class Runner:
             await self._pause(self.settings.poll_seconds * (10 if attempt.patient else 2**barren))
 
     async def _attempt(self, job: Job, progress: float) -> Attempt:
-        """Start one child, follow its events to their end, and stop it when nobody wants it."""
+        """Start one child and follow its events; stop it when study or service shall stop."""
         attempt, again = Attempt(progress), job.again
         child = await self._start(job)
         events = asyncio.create_task(follow(child, attempt))
@@ -126,11 +126,11 @@ class Runner:
             await self._end(child)
             await asyncio.wait({events})
         if error := events.exception():
-            log.error("%s: its process cannot be understood", job.id, exc_info=error)
+            log.error("%s: its process sent what cannot be read", job.id, exc_info=error)
             return Attempt(
                 attempt.progress,
                 begun=attempt.begun,
-                reason=f"its process cannot be understood: {type(error).__name__}: {error}",
+                reason=f"its process sent what cannot be read: {type(error).__name__}: {error}",
             )
         return attempt
 
@@ -181,7 +181,7 @@ class Runner:
 
 
 async def follow(child: Process, attempt: Attempt) -> None:
-    """Write what a child tells into ``attempt``, until it falls silent."""
+    """Write the events of a child into ``attempt`` until its output ends."""
     assert child.stdout is not None
     async for line in child.stdout:
         message = json.loads(line)

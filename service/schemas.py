@@ -31,7 +31,7 @@ class StudyFilter(Window):
 
 
 class RunFilter(Window):
-    """Which runs are asked for, by any parameter; a number must be the very number of the run."""
+    """Which runs are asked for, by any parameter; a number matches only when it is equal."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -65,7 +65,7 @@ class StudySummary(BaseModel):
     name: str
     scene: str
     status: State
-    message: str = Field(description="why it failed, or is not getting on")
+    message: str = Field(description="why it failed; while it runs, why it had to be started again")
     progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
     size: int = Field(description="number of runs")
     submitted: str

@@ -42,10 +42,17 @@ def conditions(which: RunFilter) -> dict[str, Any]:
 
 
 def _value(name: str, given: Any, parameters: Sequence[Parameter]) -> Any:
-    """Return a value as the first of the parameters of this name that accepts it has it."""
+    """Return a value in the type of the first of these parameters that allows it.
+
+    Scenes may have different parameters of one name.
+    """
     for parameter in parameters:
         try:
-            return parameter.normalise(plain(given, parameter.default), name)
+            value = parameter.normalise(plain(given, parameter.default), name)
         except StudyError as error:
             refusal = error
+        else:
+            if parameter.in_range(value):
+                return value
+            refusal = parameter.refusal(name, given)
     raise refusal

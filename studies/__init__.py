@@ -1,17 +1,18 @@
 """Studies: a scene swept over parameters, computed in parallel, kept as labelled data.
 
-``study.toml`` -> `Study` -> cases -> paths -> `run_study` -> `Store` -> `open_study`
+``study.toml`` -> `Study` -> cases -> loading paths -> `run_study` -> `Store` -> `open_study`
 """
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import GridLost, StoreBusy, StudyError
 
 if TYPE_CHECKING:
-    from studies.definition.design import Case, Path
+    from studies.definition.cases import Case, LoadingPath
     from studies.definition.parameters import scene_schema
     from studies.definition.study import Study
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from studies.views.reading import open_netcdf, open_study
 
 _HOMES = {
-    "Case": "definition.design",
-    "Path": "definition.design",
+    "Case": "definition.cases",
+    "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
     "StudyEvent": "execution.run",
@@ -31,10 +32,13 @@ _HOMES = {
     "scene_schema": "definition.parameters",
 }
 
+_RENAMED = {"Path": "LoadingPath"}
+"""Old public names that still work, and their new ones."""
+
 __all__ = [
     "Case",
     "GridLost",
-    "Path",
+    "LoadingPath",
     "Store",
     "StoreBusy",
     "Study",
@@ -50,6 +54,14 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: reading a study file needs no xarray."""
+    if name in _RENAMED:
+        new = _RENAMED[name]
+        warnings.warn(
+            f"studies.{name} is now studies.{new}; the old name goes with the next release",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        name = new
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"studies.{_HOMES[name]}"), name)

@@ -120,12 +120,8 @@ def _compliance(
     return 0.5 * (W + W.T)
 
 
-def analyse(
-    upper: sparse.csr_array, name: str = "auto", kept: NDArray[np.int64] | None = None
-) -> LinearSolver:
-    """Return a solver for matrices with the pattern of ``upper``.
-
-    ``kept`` (m,), increasing, are the unknowns on which `LinearSolver.compliance` will be asked.
+def chosen(name: str = "auto") -> str:
+    """Return the solver that ``name`` stands for here: ``"pardiso"`` or ``"superlu"``.
 
     Raises
     ------
@@ -137,5 +133,19 @@ def analyse(
     available = pardiso.library() is not None
     if name == "pardiso" and not available:
         raise ModelError("linear_solver", name, "needs MKL: pip install 'residua[mkl]'")
+    return "pardiso" if available and name != "superlu" else "superlu"
+
+
+def analyse(
+    upper: sparse.csr_array, name: str = "auto", kept: NDArray[np.int64] | None = None
+) -> LinearSolver:
+    """Return a solver for matrices with the pattern of ``upper``.
+
+    ``kept`` (m,), increasing, are the unknowns on which `LinearSolver.compliance` will be asked.
+
+    Raises
+    ------
+    ModelError : the solver named is unknown or not installed
+    """
     kept = np.zeros(0, dtype=np.int64) if kept is None else kept
-    return PardisoSolver(upper, kept) if available and name != "superlu" else SuperLU(upper, kept)
+    return PardisoSolver(upper, kept) if chosen(name) == "pardiso" else SuperLU(upper, kept)

@@ -6,10 +6,13 @@ complete when `solver.scenes` has been imported.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from enum import IntEnum
 
 
@@ -26,6 +29,7 @@ class Quantity:
     standard_name : of the CF conventions, where there is one
     count : whether it is a whole number
     flags : what its values mean, where they are no numbers
+    beside : more attributes of the CF conventions
     """
 
     name: str
@@ -35,6 +39,7 @@ class Quantity:
     standard_name: str = ""
     count: bool = False
     flags: type[IntEnum] | None = None
+    beside: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def coordinate(self) -> bool:
@@ -42,14 +47,18 @@ class Quantity:
         return self.dims == (self.name,)
 
     @property
-    def attributes(self) -> dict[str, str]:
+    def attributes(self) -> dict[str, Any]:
         """CF attributes."""
         given = {
             "long_name": self.long_name,
             "units": self.units,
             "standard_name": self.standard_name,
         }
-        return {key: value for key, value in given.items() if value}
+        known: dict[str, Any] = {key: value for key, value in given.items() if value}
+        if self.flags is not None:
+            known["flag_values"] = np.array(list(self.flags), dtype=np.int32)
+            known["flag_meanings"] = " ".join(flag.name.lower() for flag in self.flags)
+        return known | dict(self.beside)
 
     def over(self, dimension: str) -> Quantity:
         """Return the quantity with one more dimension, before its own."""
@@ -68,6 +77,7 @@ def declare(
     standard_name: str = "",
     count: bool = False,
     flags: type[IntEnum] | None = None,
+    beside: Mapping[str, str] | None = None,
 ) -> Quantity:
     """Declare a variable or a coordinate, and return it.
 
@@ -85,5 +95,6 @@ def declare(
         standard_name=standard_name,
         count=count or flags is not None,
         flags=flags,
+        beside=beside or {},
     )
     return QUANTITIES[name]

@@ -15,15 +15,24 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-X = declare("x", "position along the surface from its middle", "mm", dims=("x",))
-Y = declare("y", "height above the surface", "mm", dims=("y",))
-DEPTH = declare("depth", "depth below the surface", "mm", dims=("depth",), standard_name="depth")
+X = declare(
+    "x", "position along the surface from its middle", "mm", dims=("x",), beside={"axis": "X"}
+)
+Y = declare("y", "height above the surface", "mm", dims=("y",), beside={"axis": "Y"})
+DEPTH = declare(
+    "depth", "depth below the surface", "mm", dims=("depth",), standard_name="depth",
+    beside={"positive": "down"},
+)  # fmt: skip
 STATION = declare(
     "station", "position of a depth profile along the surface", "mm", dims=("station",)
 )
 S = declare(
-    "s", "distance along the surface from the middle, of the contact if loaded", "mm", dims=("s",)
-)
+    "s", "distance along the surface from the middle, of the contact if loaded", "mm",
+    dims=("s",),
+)  # fmt: skip
+COMPONENT = declare("component", "component of the stress tensor", "", dims=("component",))
+STAGE = declare("stage", "stage of loading", "", dims=("stage",))
+BODY = declare("body", "body", "", dims=("body",))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,23 +47,44 @@ ADVANCE_ERROR = declare(
     "advance_error",
     "estimated error of residual stress under mid-track that the advance leaves", "MPa",
 )  # fmt: skip
-SURFACE, FIRST_ROW, FREE_SURFACE, LOWEST, DEPTH_OF_LOWEST = (
-    {
-        axis: declare(name.format(axis), words.format(2 * axis), units)
-        for axis in "xz"
-    }
-    for name, words, units in (
-        ("surface_residual_{}",
-         "residual stress {} at the surface, mid-track, extrapolated to its nodes", "MPa"),
-        ("first_row_residual_{}",
-         "residual stress {} at the first row of integration points, mid-track", "MPa"),
-        ("free_surface_residual_{}",
-         "residual stress {} at the surface, mid-track, by the conditions of a free surface",
-         "MPa"),
-        ("lowest_residual_{}", "smallest residual stress {} under mid-track", "MPa"),
-        ("depth_of_lowest_residual_{}", "depth of the smallest residual stress {}", "mm"),
-    )
-)  # fmt: skip
+SURFACE = {
+    "x": declare(
+        "surface_residual_x",
+        "residual stress xx at the surface, mid-track, extrapolated to its nodes", "MPa",
+    ),
+    "z": declare(
+        "surface_residual_z",
+        "residual stress zz at the surface, mid-track, extrapolated to its nodes", "MPa",
+    ),
+}  # fmt: skip
+FIRST_ROW = {
+    "x": declare(
+        "first_row_residual_x",
+        "residual stress xx at the first row of integration points, mid-track", "MPa",
+    ),
+    "z": declare(
+        "first_row_residual_z",
+        "residual stress zz at the first row of integration points, mid-track", "MPa",
+    ),
+}  # fmt: skip
+FREE_SURFACE = {
+    "x": declare(
+        "free_surface_residual_x",
+        "residual stress xx at the surface, mid-track, by the conditions of a free surface", "MPa",
+    ),
+    "z": declare(
+        "free_surface_residual_z",
+        "residual stress zz at the surface, mid-track, by the conditions of a free surface", "MPa",
+    ),
+}  # fmt: skip
+LOWEST = {
+    "x": declare("lowest_residual_x", "smallest residual stress xx under mid-track", "MPa"),
+    "z": declare("lowest_residual_z", "smallest residual stress zz under mid-track", "MPa"),
+}
+DEPTH_OF_LOWEST = {
+    "x": declare("depth_of_lowest_residual_x", "depth of the smallest residual stress xx", "mm"),
+    "z": declare("depth_of_lowest_residual_z", "depth of the smallest residual stress zz", "mm"),
+}
 FIRST_ROW_DEPTH = declare(
     "first_row_depth", "depth of the first row of integration points, mid-track", "mm"
 )

@@ -39,7 +39,8 @@ class Scene:
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
     branch : the parameter along which one loading path serves many runs: a larger value goes on
         where a smaller one ends, or leaves the same path later
-    refining : parameters that change how accurate a result is, not what it is the result of
+    refining : parameters that change how accurate a result is, not what it is the result of:
+        runs that differ in these alone solve one problem, and can be compared
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
     view : (parameters) -> where it is looked at

@@ -6,7 +6,7 @@ import sys
 import time
 from typing import TextIO
 
-from studies.definition.design import Case
+from studies.definition.cases import Case
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.execution.run import StudyEvent

@@ -1,4 +1,9 @@
-"""Names made from content: the same parameters and the same solver give the same id."""
+"""Names made from content: the same parameters and the same solver give the same id.
+
+A change of the solver that may change a number, a name or a unit changes every id, so that no old
+run is taken for a new one. A change of words alone changes none: `studies.definition.meaning` says
+what words are.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +31,7 @@ def canonical(value: Any) -> str:
 
 
 def content_id(*parts: Any) -> str:
-    """Return 32 hexadecimal digits that depend on `parts` and on the solver's source."""
+    """Return 32 hexadecimal digits that depend on `parts` and on what the solver computes."""
     return _digest(canonical([*parts, solver_hash()]).encode())
 
 
@@ -36,24 +41,28 @@ def is_id(text: str) -> bool:
 
 
 FORM = (
-    "definition/design.py",
+    "definition/cases.py",
     "definition/parameters.py",
     "definition/vocabulary.py",
     "storage/dataset.py",
+    "storage/provenance.py",
 )
 """Modules of this package that lay records out: names, units, dimensions, attributes."""
 
 
 @cache
 def solver_hash() -> str:
-    """Return the digest of all that decides what a run's file holds.
+    """Return the digest of all that decides what a run's file holds, but for its words.
 
-    These are the sources of the solver and the modules that lay its records out as data sets.
+    These are the sources of the solver, and the modules that lay its records out as data sets,
+    each with its place: to move a file changes the digest.
     """
+    from studies.definition.meaning import meaning  # `residua --help` makes no id
+
     root, here = Path(solver.__file__).parent, Path(__file__).parents[1]
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
-    digests = {name: _digest(path.read_bytes()) for name, path in files.items()}
+    digests = {name: _digest(meaning(path.read_bytes()).encode()) for name, path in files.items()}
     return _digest(json.dumps(digests, sort_keys=True).encode())
 
 

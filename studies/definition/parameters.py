@@ -1,4 +1,9 @@
-"""The parameters of a scene: checked, normalised, described."""
+"""The parameters of a scene: read from JSON or TOML, described in words, built.
+
+Whether a value is allowed is decided in one place: the scene's parameter object checks itself
+when it is built. Here a value is only brought into the parameter's type, and the declared range
+is put into words.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Unit
 from pydantic import TypeAdapter, ValidationError
@@ -27,14 +32,21 @@ _RELATIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a scene: its name, unit, default, what it means and what it accepts."""
+    """One parameter of a scene, as its parameter class declares it.
+
+    Attributes
+    ----------
+    name, unit, default, description : as declared; the default as JSON holds it
+    schema : JSON Schema of what is allowed
+    """
 
     name: str
     unit: str
     default: Any
     description: str
     schema: Mapping[str, Any]
-    adapter: TypeAdapter[Any] = dataclasses.field(repr=False)
+    _type: TypeAdapter[Any] = dataclasses.field(repr=False)
+    _range: TypeAdapter[Any] = dataclasses.field(repr=False)
 
     @property
     def allowed(self) -> str:
@@ -49,16 +61,31 @@ class Parameter:
         Raises
         ------
         StudyError
-            naming `field`, when the value has the wrong type, is out of range or not finite
+            naming `field`, when the value has the wrong type or is not finite
         """
-        refusal = StudyError(field, value, f"must be {self.allowed}")
         try:
-            checked = self.adapter.validate_json(json.dumps(value, allow_nan=False), strict=True)
+            typed = self._type.validate_json(json.dumps(value, allow_nan=False), strict=True)
         except (ValidationError, ValueError, TypeError, RecursionError):
-            raise refusal from None
-        if isinstance(checked, float) and not math.isfinite(checked):
-            raise refusal
-        return self.adapter.dump_python(checked, mode="json")
+            raise self.refusal(field, value) from None
+        if isinstance(typed, float) and not math.isfinite(typed):
+            raise self.refusal(field, value)
+        return self._type.dump_python(typed, mode="json")
+
+    def typed(self, value: Any) -> Any:
+        """Return a normalised value as the scene's parameter object holds it."""
+        return self._type.validate_python(value)
+
+    def in_range(self, value: Any) -> bool:
+        """Tell whether `value` lies in the declared range, whatever the other parameters are."""
+        try:
+            self._range.validate_python(value)
+        except ValidationError:
+            return False
+        return True
+
+    def refusal(self, field: str, value: Any) -> StudyError:
+        """Return the error that tells what `field` may be, for a value that it may not be."""
+        return StudyError(field, value, f"must be {self.allowed}")
 
 
 def scene_named(name: Any) -> Scene:
@@ -86,26 +113,31 @@ def parameters_of(scene: Scene) -> dict[str, Parameter]:
     hints = get_type_hints(scene.parameters, include_extras=True)
     found = {}
     for field in dataclasses.fields(scene.parameters):
-        adapter: TypeAdapter[Any] = TypeAdapter(hints[field.name])
-        marks = get_args(hints[field.name])[1:]
+        hint = hints[field.name]
+        in_range: TypeAdapter[Any] = TypeAdapter(hint)
+        marks = get_args(hint)[1:]
         found[field.name] = Parameter(
             name=field.name,
             unit=next((mark.unit for mark in marks if isinstance(mark, Unit)), ""),
-            default=adapter.dump_python(field.default, mode="json"),
+            default=in_range.dump_python(field.default, mode="json"),
             description=field.metadata.get("description", ""),
-            schema=adapter.json_schema(),
-            adapter=adapter,
+            schema=in_range.json_schema(),
+            _type=TypeAdapter(_bare(hint)),
+            _range=in_range,
         )
     return found
 
 
 def build(scene: Scene, values: Mapping[str, Any]) -> Any:
-    """Return the scene's parameter object for normalised `values`; the scene checks the rest."""
+    """Return the scene's parameter object for normalised `values`.
+
+    Raises
+    ------
+    ModelError
+        from the parameter object, which checks each value and how they go together
+    """
     known = parameters_of(scene)
-    typed = {
-        name: known[name].adapter.validate_json(json.dumps(value)) for name, value in values.items()
-    }
-    return scene.parameters(**typed)
+    return scene.parameters(**{name: known[name].typed(value) for name, value in values.items()})
 
 
 def scene_schema(name: str) -> dict[str, Any]:
@@ -116,6 +148,15 @@ def scene_schema(name: str) -> dict[str, Any]:
         if parameter.unit:
             schema["properties"][parameter.name]["unit"] = parameter.unit
     return {**schema, "additionalProperties": False}
+
+
+def _bare(hint: Any) -> Any:
+    """Return a type without its range: a number of any size, a text of any wording."""
+    if get_origin(hint) is Annotated:
+        return _bare(get_args(hint)[0])
+    if get_origin(hint) is Literal:
+        return Union[*{type(option) for option in get_args(hint)}]
+    return hint
 
 
 def _describe(schema: Mapping[str, Any]) -> str:
@@ -140,9 +181,10 @@ def _describe(schema: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any, usual: Any) -> Any:
-    """Return a value that may have become text, such as one of an axis, as the usual value is.
+    """Return a value that was written as text, read back in the kind of the usual value.
 
-    Text that stands for no number and no truth value stays as it is.
+    An axis of truth values, for instance, is stored as text. Text that is neither a number nor a
+    truth value stays text.
     """
     if isinstance(usual, str) or not isinstance(value, str):
         return value

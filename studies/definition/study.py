@@ -6,13 +6,13 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from solver.scenes import SCENES
-from studies.definition import design
+from studies.definition.cases import Case, LoadingPath, loading_paths
 from studies.definition.identity import content_id
 from studies.definition.parameters import one_of, parameters_of, scene_named
 from studies.definition.sweep import (
@@ -47,12 +47,13 @@ class Study(BaseModel):
     scene: str
     parameters: dict[str, Any] = Field(default_factory=dict)
     sweep: Axes = Field(default_factory=dict)
+    _cases: tuple[Case, ...] = PrivateAttr(default=())
 
     @classmethod
-    def from_toml(cls, path: FilePath | str) -> Self:
+    def from_toml(cls, path: Path | str) -> Self:
         """Read a study file."""
         try:
-            text = FilePath(path).read_text(encoding="utf-8")
+            text = Path(path).read_text(encoding="utf-8")
             content = tomllib.loads(text)
         except OSError as error:
             raise StudyError("file", str(path), f"cannot be read: {error.strerror}") from None
@@ -93,9 +94,13 @@ class Study(BaseModel):
         parameters = {
             key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
         }
-        for _ in expanded(scene, parameters, axes):
-            pass  # building a case is how the scene checks combinations of parameters
         return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": axes}
+
+    @model_validator(mode="after")
+    def _expand(self) -> Self:
+        """Build every case, which is how the scene checks the parameters; they are kept."""
+        self._cases = tuple(expanded(SCENES[self.scene], self.parameters, self.sweep))
+        return self
 
     @cached_property
     def id(self) -> str:
@@ -134,18 +139,18 @@ class Study(BaseModel):
         """Number of runs."""
         return math.prod(len(axis) for axis in self.sweep.values())
 
-    def cases(self) -> Iterator[design.Case]:
-        """Yield the runs of the study."""
-        return expanded(SCENES[self.scene], self.parameters, self.sweep)
+    def cases(self) -> Iterator[Case]:
+        """Yield the runs of the study, the last axis running fastest."""
+        return iter(self._cases)
 
-    def place(self, case: design.Case) -> dict[str, Any]:
+    def place(self, case: Case) -> dict[str, Any]:
         """Return the value, or the label, of a run of the study on each axis."""
         pairs = zip(self.axes.items(), case.index, strict=True)
         return {name: values[position] for (name, values), position in pairs}
 
-    def paths(self) -> list[design.Path]:
+    def paths(self) -> list[LoadingPath]:
         """Return the loading paths of the study: the cases that one task computes together."""
-        return design.paths(SCENES[self.scene], self.cases())
+        return loading_paths(SCENES[self.scene], self._cases)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""

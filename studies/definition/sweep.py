@@ -1,8 +1,8 @@
 """The sweep of a study: axes of one parameter, and linked axes, which move several together.
 
-An axis that is a list holds the values of the parameter it is named after. An axis that is a
-table has a name of its own; it holds labels, and the parameters each label sets. For each
-combination of labels the study is a sweep of lists, with what the labels set fixed.
+An axis that is a list holds the values of the parameter it is named after. A linked axis is a
+table with a name of its own: it holds labels, and the parameters that each label sets. For each
+combination of labels, what the labels set is fixed, and the lists are swept.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
-from studies.definition import design
+from studies.definition.cases import Case, cases_of
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter, nearest
 from studies.errors import StudyError
@@ -57,7 +57,7 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     first: dict[str, str] = {}
     for parameter, axis in _settings(axes):
         if first.setdefault(parameter, axis) != axis:
-            allowed = f"sets {parameter}, as sweep.{first[parameter]} does: keep one"
+            allowed = f"sets {parameter}, which sweep.{first[parameter]} sets too: keep one"
             raise StudyError(f"sweep.{axis}", content[axis], allowed)
     return axes
 
@@ -95,7 +95,7 @@ def linked_values(axes: Axes) -> dict[str, tuple[str, list[Any]]]:
     }
 
 
-def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[design.Case]:
+def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[Case]:
     """Yield every point of the sweep, the last axis running fastest.
 
     Raises
@@ -112,7 +112,7 @@ def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[des
         for _, (_, settings) in point:
             given |= settings
         try:
-            for case in design.cases(scene, given, lists):
+            for case in cases_of(scene, given, lists):
                 yield replace(case, index=(*index, *case.index))
         except StudyError as error:
             raise _located(error, linked, labels) from error
@@ -181,7 +181,7 @@ def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None
     from studies.definition.vocabulary import LABEL_ATTRIBUTES
 
     if name in known:
-        allowed = "must be a list of values: a table is an axis with a name of its own"
+        allowed = "must be a list of values; a table of labels needs a name that is no parameter"
     elif name in QUANTITIES or name in LABEL_ATTRIBUTES:
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):

@@ -1,4 +1,4 @@
-"""Words of a data set that every study has: outcomes of runs, labels, flags."""
+"""Words of a data set that every study has: the outcomes of runs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from solver.results.record import Status
-from solver.results.shakedown import State as Shakedown
 
 STATUSES = (*(status.name.lower() for status in Status), "error", "missing")
 """Outcomes by flag value: the solver's, then a run that broke, then one not computed."""
@@ -25,14 +24,4 @@ LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
         "flag_meanings": " ".join(STATUSES),
     },
     "message": {"long_name": "reason of the outcome"},
-    "shakedown_state": {
-        "flag_values": np.array(list(Shakedown), dtype=np.int32),
-        "flag_meanings": " ".join(state.name.lower() for state in Shakedown),
-    },
-    "x": {"axis": "X"},
-    "y": {"axis": "Y"},
-    "depth": {"positive": "down"},
-    "component": {"long_name": "component of the stress tensor"},
-    "stage": {"long_name": "stage of loading"},
-    "body": {"long_name": "body"},
 }

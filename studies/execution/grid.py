@@ -22,13 +22,16 @@ from studies.errors import GridLost
 
 Report = Callable[[dict[str, Any]], None]
 """Sends a small message from a task to the caller."""
-Stopped = Callable[[], bool]
+StopCheck = Callable[[], bool]
 """Tells a task whether it shall stop."""
-Function = Callable[[Any, Report, Stopped], Any]
+Function = Callable[[Any, Report, StopCheck], Any]
 
 _POLL = 0.2
 """Seconds between two looks at whether to stop, on either side."""
-_WORKER_DIED = "the worker process died each time it was on this path"
+_WORKER_DIED = (
+    "the worker process died each time it computed this loading path; if memory ran out, "
+    "use fewer workers"
+)
 
 _CONNECT = 10.0
 """Seconds within which a scheduler must answer."""
@@ -118,9 +121,9 @@ class Grid:
         self._open.close()
 
     def run(
-        self, function: Function, tasks: Sequence[Any], should_stop: Stopped
+        self, function: Function, tasks: Sequence[Any], should_stop: StopCheck
     ) -> Iterator[Message | Finished]:
-        """Run ``function(task, report, stopped)`` for every task; yield what happens.
+        """Run ``function(task, report, should_stop)`` for every task; yield what happens.
 
         When `should_stop` turns true, waiting tasks are dropped and running ones told to stop;
         the iteration ends when these have.
@@ -177,13 +180,13 @@ def _call(function: Function, token: str, task: Any) -> Any:
     asked = 0.0
     answer = False
 
-    def stopped() -> bool:
+    def should_stop() -> bool:
         nonlocal asked, answer
         if not answer and time.monotonic() - asked > _POLL:
             answer, asked = stop.is_set(), time.monotonic()
         return answer
 
-    return function(task, partial(worker.log_event, token), stopped)
+    return function(task, partial(worker.log_event, token), should_stop)
 
 
 def _finished(future: Future[Any], position: int) -> Finished:

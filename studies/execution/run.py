@@ -7,11 +7,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from solver.scenes import SCENES
-from studies.definition.design import Path
+from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
@@ -27,7 +27,7 @@ class StudyEvent:
 
     Attributes
     ----------
-    kind : ``"path"`` (a path went forward) or ``"run"`` (a run has its outcome)
+    kind : ``"path"`` (a loading path has advanced) or ``"run"`` (a run has its outcome)
     progress : fraction of the whole study that is done, 0 to 1
     path : id of the path
     fraction : fraction of this path that is done, 0 to 1
@@ -62,7 +62,7 @@ class StudyOutcome:
     counts: Mapping[str, int]
     failed: Sequence[tuple[str, str, str]]
     computed: Sequence[str]
-    dataset: FilePath
+    dataset: Path
     wall_seconds: float
     stopped: bool
 
@@ -91,7 +91,8 @@ def run_study(
     workers : worker processes on this machine; by default one a core
     scheduler : address of a running dask scheduler, to be used instead; its workers must see
         the store under the same path
-    resume : compute only runs that have no outcome; by default failed ones are tried again too
+    resume : compute only the runs that have no outcome; by default failed runs are computed again
+        too
     on_event : called, in this thread, with everything that happens
     should_stop : asked several times a second; once it is true the work stops, and finished
         runs stay
@@ -183,9 +184,9 @@ class _Work:
                 else:
                     self._give_up(tasks[item.position], item.error)
 
-    def _rest(self, path: Path) -> Path:
+    def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)
-        return Path(path.id, path.parameters, cases)
+        return LoadingPath(path.id, path.parameters, cases)
 
     def _hear(self, content: Mapping[str, Any]) -> None:
         path = content["path"]

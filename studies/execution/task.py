@@ -4,48 +4,54 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from solver.results.record import Record
 from solver.scenes import Scene
-from studies.definition.design import Case, Path
+from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
 from studies.storage import dataset as layout
 from studies.storage.store import Store
 
-NO_RECORD = "the path ended without a record of this run"
+NO_RECORD = "the scene ended its loading path without a record of this run"
 
 
 @dataclass(frozen=True, slots=True)
 class PathTask:
-    """A path to walk, or what is left of it, and where its runs go.
+    """A loading path to walk, or what is left of it, and where its runs are written.
 
-    ``source`` is the solver the caller has; a worker with another one refuses the task.
+    Attributes
+    ----------
+    scene, path : what to compute
+    directory : of the store
+    source : `solver_hash` of the process that started the study; a worker whose own differs
+        refuses the task
     """
 
     scene: Scene
-    path: Path
-    directory: FilePath
+    path: LoadingPath
+    directory: Path
     source: str
 
 
-class Stopped(Exception):
-    """Raised inside a path to leave it, because the study was asked to stop."""
+class StopAsked(Exception):
+    """Raised inside a loading path to leave it, because the study was asked to stop."""
 
 
 def walk(
-    task: PathTask, report: Callable[[dict[str, Any]], None], stopped: Callable[[], bool]
+    task: PathTask, report: Callable[[dict[str, Any]], None], should_stop: Callable[[], bool]
 ) -> list[dict[str, Any]]:
-    """Compute the runs of a path, and return their catalogue rows.
+    """Compute the runs of a loading path, and return their catalogue rows.
 
-    A run that is already there is left alone: a worker that took the path over from a dead one
-    continues where that stopped. When the path raises, the runs it still owed are
-    written as broken, with the reason; a record that cannot be written breaks its own run only.
+    A run whose file exists is not computed again: where a worker died, the next one continues.
+    When the scene raises an error, the runs that have no record yet are written as broken, with
+    the error as their message. A record that cannot be written breaks its own run only.
     """
     if task.source != solver_hash():
         raise RuntimeError(
-            "the worker has another version of the solver than the caller; restart both"
+            "the worker has another version of the solver than the process that started the study: "
+            "install the same one for both and restart the worker"
         )
     store = Store(task.directory)
     rows: list[dict[str, Any]] = []
@@ -56,8 +62,8 @@ def walk(
 
     def monitor(fraction: float) -> None:
         report({"path": task.path.id, "fraction": float(fraction)})
-        if stopped():
-            raise Stopped
+        if should_stop():
+            raise StopAsked
 
     owed: dict[Any, Case] = {}
     for case in task.path.cases:
@@ -74,7 +80,7 @@ def walk(
                 row = _written(store, task.scene, owed[value], record)
                 del owed[value]
                 keep(row)
-    except Stopped:
+    except StopAsked:
         return rows
     except Exception as error:
         reason = _reason(error)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -13,18 +13,19 @@ import h5py
 import numpy as np
 
 from solver.scenes import SCENES, Scene
-from studies.definition.design import Case
+from studies.definition.cases import Case
 from studies.definition.parameters import parameters_of
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, STATUSES
 from studies.storage import dataset as layout
+from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.store import Store, appearing
 
 SAME = 1e-9
 """Relative difference below which two runs are taken to have the same grid."""
 
 
-def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
+def combine(study: Study, store: Store, cases: Sequence[Case]) -> Path:
     """Write the combined data set of `study` and return its path.
 
     Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is
@@ -34,17 +35,20 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> FilePath:
     where all runs have the same grid, or the beginning of the longest one. Where grids differ,
     as they do when a length is swept, runs are matched by position, and the coordinate becomes a
     variable over the sweep, so that ``x`` of each run stays with the run. Shorter grids are
-    filled up with NaN. Runs without a record are NaN, and `status` says why.
+    filled up with NaN. Runs without a record are NaN, and `status` says why. The attributes
+    tell what ran to compute the runs, which may have been elsewhere.
     """
     scene = SCENES[study.scene]
     target = store.dataset_path(study.id)
     found = [case for case in cases if store.run_path(case.id).exists()]
     axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
     frame = _Frame(axes=axes, usual=usual, linked=study.linked)
+    ran: set[tuple[str, str]] = set()
     for case in found:
         with h5py.File(store.run_path(case.id), "r") as run:
             frame.learn(run)
-    attributes = layout.provenance(study.name, scene, study.fixed) | {"id": study.id}
+            ran.add(what_ran(run.attrs))
+    attributes = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
     with appearing(target) as part, h5netcdf.File(part, "w") as file:
         file.attrs.update(attributes)
         frame.create_axes(file, scene)

@@ -1,27 +1,21 @@
-"""One run as a labelled data set: names, units, flags and provenance in CF terms."""
+"""One run as a labelled data set: names, units and flags in CF terms."""
 
 from __future__ import annotations
 
-import datetime
-import importlib.metadata
 import json
-import subprocess
 from collections.abc import Mapping
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-import solver
 from solver.results.quantities import QUANTITIES
 from solver.results.record import Record
 from solver.scenes import Scene
-from studies.definition.design import USUAL_AXES, Case
-from studies.definition.identity import solver_hash
+from studies.definition.cases import USUAL_AXES, Case
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES
+from studies.storage.provenance import provenance
 
 INTEGER_FILL = -1
 
@@ -117,21 +111,6 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     }
 
 
-def provenance(title: str, scene: Scene, parameters: Mapping[str, Any]) -> dict[str, str]:
-    """Return the global attributes: what this is, from which parameters, made by what, when."""
-    return {
-        "Conventions": "CF-1.11",
-        "title": title,
-        "scene": scene.name,
-        "parameters": json.dumps(parameters),
-        "source": f"Residua {solver.__version__}",
-        "solver_source": solver_hash(),
-        "versions": json.dumps(_versions()),
-        **_commit(),
-        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-    }
-
-
 def _frame(
     scene: Scene, case: Case, sweep: tuple[str, ...], status: str, message: str
 ) -> xr.Dataset:
@@ -164,35 +143,3 @@ def _plain(name: str, number: float) -> float | None:
     """Return a number as JSON has it: None for one that is absent."""
     absent = number == INTEGER_FILL if _is_count(name) else not np.isfinite(number)
     return None if absent else number
-
-
-@cache
-def _versions() -> dict[str, str]:
-    names = ("numpy", "scipy", "scikit-fem", "xarray")
-    return {"solver": solver.__version__} | {
-        name: importlib.metadata.version(name) for name in names
-    }
-
-
-@cache
-def _commit() -> dict[str, str]:
-    """Return the commit of the solver's own working tree, or nothing where it is not under git."""
-    root = Path(solver.__file__).parent
-    try:
-        for command in (
-            ["git", "-C", str(root), "ls-files", "--error-unmatch", "__init__.py"],
-            [
-                "git",
-                "-C",
-                str(root),
-                "describe",
-                "--always",
-                "--dirty",
-                "--abbrev=40",
-                "--exclude=*",
-            ],
-        ):
-            answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
-    except (OSError, subprocess.SubprocessError):
-        return {}
-    return {"commit": answer.stdout.strip()}

@@ -4,7 +4,7 @@
 runs/<run id>.nc              one file a run, shared by all studies
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
-catalogue.sqlite              can be rebuilt from the files at any time
+catalogue.sqlite              made anew from the files when it is missing or damaged
 ```
 A file appears under its name only when it is complete.
 """
@@ -58,25 +58,6 @@ class Store:
         """Return where the combined data set of a study is or will be."""
         return self.study_directory(study_id) / "dataset.nc"
 
-    def study(self, study_id: str) -> Study:
-        """Return a study that was saved here.
-
-        Raises
-        ------
-        KeyError
-            when there is none of that id
-        """
-        try:
-            text = (self.study_directory(study_id) / "study.json").read_text(encoding="utf-8")
-        except (FileNotFoundError, ValueError):
-            raise KeyError(study_id) from None
-        return Study.from_dict(json.loads(text))
-
-    def studies(self) -> list[str]:
-        """Return the ids of the studies saved here, oldest first."""
-        files = (self.directory / "studies").glob("*/study.json")
-        return [path.parent.name for path in sorted(files, key=lambda path: path.stat().st_mtime)]
-
     def save_study(self, study: Study) -> Path:
         """Keep what the study asks for, and return its directory."""
         directory = self.study_directory(study.id)
@@ -115,19 +96,11 @@ class Store:
             self.run_path(run_id).unlink(missing_ok=True)
         self.catalogue.remove(run_ids)
 
-    def rebuild_catalogue(self) -> int:
-        """Make the catalogue anew from the files; return the number of runs."""
-        found = self._files()
-        self.directory.mkdir(parents=True, exist_ok=True)
-        self.catalogue.remove(self.catalogue.ids() - found)
-        self.catalogue.put(self.read_row(run_id) for run_id in found)
-        return len(found)
-
     def reconcile(self) -> None:
         """Bring the catalogue into line with the files that exist and can be read."""
         try:
             known = self.catalogue.ids()
-        except sqlite3.OperationalError:  # such as one that is locked: it is none the worse
+        except sqlite3.OperationalError:  # such as a locked file, which is not damaged
             raise
         except sqlite3.DatabaseError:
             for damaged in self.directory.glob(f"{self.catalogue.path.name}*"):  # and its journal
@@ -139,7 +112,7 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Hold the directory as its only writer, cleared of what killed writers left.
+        """Hold the directory as its only writer; delete the unfinished files of killed writers.
 
         Raises
         ------
@@ -158,7 +131,10 @@ class Store:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise StoreBusy(f"{self.directory}: another process computes here") from None
+                raise StoreBusy(
+                    f"{self.directory}: another process computes here; "
+                    "wait until it has ended, or name another directory"
+                ) from None
             for part in self.directory.rglob("*.part"):
                 part.unlink(missing_ok=True)
             self.reconcile()

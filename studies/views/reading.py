@@ -62,9 +62,9 @@ def present_datasets(path: Path | str) -> list[Path]:
 
 
 def begun_studies(path: Path | str) -> list[str]:
-    """Return how far each study is that has no data set yet: of those in `path`, or `path` itself.
+    """Return a line for each study in `path` (or `path` itself) that has no data set yet.
 
-    A study has a data set when the work on it has ended, were it by Ctrl-C.
+    The data set of a study is written when the work on it ends, also when Ctrl-C ended it.
     """
     path = Path(path).resolve()
     files = [*path.glob("study.json"), *sorted(path.glob("studies/*/study.json"))]
@@ -79,12 +79,12 @@ def _progress(file: Path) -> str:
         content = json.loads(file.read_text(encoding="utf-8"))
         name = content["name"]
         study = Study.from_dict(content)
-    except StudyError:  # it knows parameters that the scene has no more
+    except StudyError:  # such as a parameter that the scene no longer has
         pass
     except (OSError, ValueError, TypeError, KeyError):
         return f"{file.parent.name}: its {file.name} cannot be read"
     if study is None or study.id != file.parent.name:
-        return f"{name}: begun by another state of the solver"
+        return f"{name}: begun with another version of the solver"
     store = Store(file.parents[2])
     finished = sum(store.run_path(case.id).is_file() for case in study.cases())
     return f"{study.name}: {finished} of {study.size} runs finished"
@@ -143,9 +143,9 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     Parameters
     ----------
     dataset : of a study or of a run
-    selection : axis, or parameter set by a linked axis -> wanted value. What it leaves open is
-        decided in favour of the largest number and the first label: usually the run with most
-        residual stress.
+    selection : axis, or parameter set by a linked axis -> wanted value. On an axis that is not
+        named, the largest number or the first label is taken: usually the run with the most
+        residual stress
 
     Raises
     ------

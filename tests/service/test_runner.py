@@ -73,11 +73,11 @@ def test_a_retry_that_could_not_begin_is_still_a_retry(tmp_path: Path) -> None:
 def test_a_study_that_brings_nothing_new_is_given_up(tmp_path: Path) -> None:
     job, orders = carried_out(tmp_path, [RUN], [], again=True)
     assert orders == [True, False, False]
-    assert job.state is State.FAILED and "without a word" in job.message
+    assert job.state is State.FAILED and "without a result or an error message" in job.message
 
 
 @pytest.mark.parametrize("line", [GIBBERISH, ENDLESS], ids=["gibberish", "endless"])
 def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line: str) -> None:
     job, orders = carried_out(tmp_path, [RUN, line])
     assert len(orders) == 2
-    assert job.state is State.FAILED and "cannot be understood" in job.message
+    assert job.state is State.FAILED and "sent what cannot be read" in job.message

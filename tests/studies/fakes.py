@@ -41,8 +41,26 @@ class FakeParameters:
     mark: str = described("", "directory that counts how often a path was begun")
 
     def __post_init__(self) -> None:
+        check_ranges(self)
         if self.state == "plane_strain" and self.friction > 0.9:
             raise ModelError("friction", self.friction, "at most 0.9 in plane strain")
+
+
+def check_ranges(parameters: FakeParameters) -> None:
+    """Refuse what the fields do not allow, as the parameters of every scene do."""
+    allowed = {
+        "load_ratio": 0.0 < parameters.load_ratio <= 10.0,
+        "friction": 0.0 <= parameters.friction <= 1.0,
+        "hardening": parameters.hardening in ("none", "isotropic"),
+        "half_width": parameters.half_width > 0.0,
+        "points": 2 <= parameters.points <= 400,
+        "passes": 1 <= parameters.passes <= 10,
+        "seconds": parameters.seconds >= 0.0,
+        "state": parameters.state in ("plane_strain", "plane_stress"),
+    }
+    for name, holds in allowed.items():
+        if not holds:
+            raise ModelError(name, getattr(parameters, name), "out of range")
 
 
 def path(parameters: FakeParameters, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:

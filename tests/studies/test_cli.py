@@ -129,7 +129,7 @@ def test_a_study_of_another_solver_is_told_as_such(
     other = store.study_directory(study.id).with_name("0" * 32)
     store.study_directory(study.id).rename(other)
     assert main(["show", str(store.directory)]) == 0
-    told = "first: begun by another state of the solver; no data set yet"
+    told = "first: begun with another version of the solver; no data set yet"
     assert told in capsys.readouterr().out
     stored = json.loads((other / "study.json").read_text())
     stored["parameters"]["gone"] = 1

@@ -10,12 +10,14 @@ import netCDF4
 import numpy as np
 import pytest
 
-from studies import Store, Study, StudyError, open_study
+from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.definition.vocabulary import STATUSES
+from studies.storage import provenance
 from studies.storage.combine import combine
+from studies.storage.dataset import run_dataset
 from studies.views.reading import one_run
 from tests.studies.conftest import compute_here, fake_study
-from tests.studies.fakes import record
+from tests.studies.fakes import FAKE, record
 
 ComputedStudy = tuple[Study, Store]
 
@@ -38,6 +40,28 @@ def test_every_point_of_the_sweep_is_the_run_that_was_computed(computed: Compute
             assert one["status"].item() == STATUSES.index("ok")
         assert together["residual_stress"].attrs["units"] == "MPa"
         assert together["status"].dtype == np.int8
+
+
+def test_what_ran_is_told_of_all_runs_though_others_combine_them(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half of the runs come from a machine with another linear solver and an older library."""
+    study = fake_study()
+    cases = list(study.cases())
+    for case, name, version in zip(
+        cases, ["superlu", "pardiso"] * 2, ["1.0", "2.0"] * 2, strict=True
+    ):
+        monkeypatch.setattr(provenance, "chosen", lambda name=name: name)
+        monkeypatch.setattr(provenance, "_versions", lambda version=version: {"numpy": version})
+        store.write_run(run_dataset(FAKE, case, record(case.parameters)))
+    monkeypatch.undo()
+    store.save_study(study)
+    with open_netcdf(combine(study, store, cases[:1])) as one:
+        assert json.loads(one.attrs["versions"]) == {"numpy": "1.0"}
+        assert one.attrs["linear_solver"] == "superlu"
+    with open_netcdf(combine(study, store, cases)) as all_:
+        assert json.loads(all_.attrs["versions"]) == {"numpy": "1.0, 2.0"}
+        assert all_.attrs["linear_solver"] == "pardiso, superlu"
 
 
 def test_text_axes_are_labels_and_come_after_the_usual_ones(store: Store) -> None:

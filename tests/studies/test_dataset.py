@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 
 import netCDF4
 import numpy as np
 import pytest
 
+import solver
+from solver.linear.solvers import chosen
 from solver.results.quantities import QUANTITIES
 from solver.results.record import Record, Status
 from studies import Store, Study, open_netcdf
 from studies.definition.vocabulary import STATUSES
-from studies.storage.dataset import run_dataset
+from studies.storage import provenance
+from studies.storage.dataset import broken_dataset, run_dataset
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
@@ -75,11 +79,39 @@ def test_provenance_is_in_the_attributes(computed: ComputedStudy) -> None:
         assert run.attrs["Conventions"] == "CF-1.11"
         assert run.attrs["id"] == case.id
         assert json.loads(run.attrs["parameters"]) == case.values
-        assert set(json.loads(run.attrs["versions"])) == {
-            "solver", "numpy", "scipy", "scikit-fem", "xarray",
+        versions = json.loads(run.attrs["versions"])
+        assert versions.keys() == {
+            "solver", "numba", "mkl", "numpy", "scipy", "scikit-fem", "xarray",
         }  # fmt: skip
+        assert versions["numpy"] == np.__version__
+        assert versions["solver"] == solver.__version__
+        assert run.attrs["linear_solver"] == chosen()
         assert run.attrs["created"]
         assert len(run.attrs["solver_source"]) == 32
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"), [("superlu", "superlu"), ("nonsense", "none"), ("auto", chosen())]
+)
+def test_the_linear_solver_that_ran_is_told_also_by_a_run_that_broke(
+    asked: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RESIDUA_LINEAR_SOLVER", asked)
+    case = next(fake_study().cases())
+    assert run_dataset(FAKE, case, record(case.parameters)).attrs["linear_solver"] == told
+    assert broken_dataset(FAKE, case, "lost").attrs["linear_solver"] == told
+
+
+def test_a_library_that_is_not_installed_is_told_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = importlib.metadata.version
+
+    def without_mkl(name: str) -> str:
+        if name == "mkl":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return known(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", without_mkl)
+    assert provenance._versions.__wrapped__() == provenance._versions() | {"mkl": "none"}
 
 
 def test_counts_are_integers_with_a_fill_value_and_other_readers_agree(
@@ -106,4 +138,6 @@ def test_a_dimension_without_coordinate_is_refused() -> None:
 
 def test_every_quantity_of_the_table_has_a_unit_that_is_si_or_one() -> None:
     si = {"1", "mm", "rad", "MPa", "N", "N mm", "s"}
-    assert {each.units for each in QUANTITIES.values()} == si
+    labels = {name for name, each in QUANTITIES.items() if not each.units}
+    assert labels == {"component", "stage", "body"}
+    assert {each.units for each in QUANTITIES.values() if each.units} == si

@@ -122,8 +122,16 @@ def test_equal_tables_have_equal_ids_and_the_order_of_labels_counts() -> None:
         ({"case": {"A": {"friction": 2}}}, "sweep.case.A.friction", ">= 0 and <= 1"),
         ({"case": {"A": {"friction": [0.1]}}}, "sweep.case.A.friction", "a finite number"),
         ({"case": CASE | {"D": {"passes": 1}}}, "sweep.case.D", "the same parameters as C"),
-        ({"case": CASE, "friction": [0.1]}, "sweep.friction", "as sweep.case does: keep one"),
-        ({"case": CASE, "z": {"A": {"passes": 3}}}, "sweep.z", "sets passes, as sweep.case does"),
+        (
+            {"case": CASE, "friction": [0.1]},
+            "sweep.friction",
+            "which sweep.case sets too: keep one",
+        ),
+        (
+            {"case": CASE, "z": {"A": {"passes": 3}}},
+            "sweep.z",
+            "sets passes, which sweep.case sets",
+        ),
     ],
 )
 def test_a_wrong_linked_axis_names_field_and_what_is_allowed(

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from studies import Store, Study, StudyEvent, StudyOutcome, open_study, run_study
+from studies.command.cli import main
 from studies.definition.identity import solver_hash
 from studies.definition.vocabulary import STATUSES
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
-from tests.studies.fakes import FAKE, INCREMENTS
+from tests.studies.fakes import FAKE, INCREMENTS, FakeParameters
 
 TROUBLES = ["none", "limit", "raise", "die"]
 
@@ -56,7 +58,8 @@ def test_one_path_in_trouble_does_not_take_the_others_with_it(troubled: Troubled
     assert messages["limit_load"] == "flows at 0.75"
     assert {message for _, status, message in outcome.failed if status == "error"} == {
         "ZeroDivisionError: the stiffness is gone",
-        "the worker process died each time it was on this path",
+        "the worker process died each time it computed this loading path; if memory ran out, "
+        "use fewer workers",
     }
     assert store.catalogue.runs(scene="fake")[1] == study.size
 
@@ -186,6 +189,23 @@ def test_an_error_of_the_listener_stops_the_work_and_frees_the_store(store: Stor
         run_study(fake_study(seconds=0.5), store, workers=1, on_event=hear)
     with store.writing():
         pass
+
+
+def test_the_command_builds_a_parameter_object_once_for_each_case(
+    study_file: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Study, progress, tasks and data set share one expansion of the sweep."""
+    built: list[FakeParameters] = []
+    checked = FakeParameters.__post_init__
+
+    def counted(self: FakeParameters) -> None:
+        built.append(self)
+        checked(self)
+
+    monkeypatch.setattr(FakeParameters, "__post_init__", counted)
+    assert main(["run", str(study_file()), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
+    points = [(each.load_ratio, each.friction) for each in built]
+    assert points == [(0.3, 0.0), (0.3, 0.4), (0.9, 0.0), (0.9, 0.4)]
 
 
 def test_a_worker_with_another_solver_refuses(store: Store) -> None:

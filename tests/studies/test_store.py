@@ -71,7 +71,6 @@ def test_reading_makes_nothing(store: Store) -> None:
     assert store.catalogue.runs() == ([], 0)
     assert store.catalogue.run("0" * 32) is None
     assert store.catalogue.rows(["0" * 32]) == {}
-    assert store.studies() == []
     assert not store.directory.exists()
 
 
@@ -80,16 +79,12 @@ def test_ids_that_are_not_ids_reach_no_file(store: Store, bad: str) -> None:
     for locate in (store.run_path, store.study_directory, store.dataset_path):
         with pytest.raises(ValueError, match="content id"):
             locate(bad)
-    with pytest.raises(KeyError):
-        store.study(bad)
 
 
 def test_a_saved_study_is_found_again(computed: ComputedStudy) -> None:
     study, store = computed
-    assert store.studies() == [study.id]
-    assert store.study(study.id) == study
-    with pytest.raises(KeyError):
-        store.study("0" * 32)
+    saved = store.study_directory(study.id) / "study.json"
+    assert Study.from_dict(json.loads(saved.read_text())) == study
 
 
 def test_a_row_says_what_the_run_is(computed: ComputedStudy) -> None:
@@ -127,23 +122,25 @@ def test_pages_cover_every_run_once(computed: ComputedStudy) -> None:
     assert len({row["id"] for rows, _ in pages for row in rows}) == 4
 
 
-def test_the_catalogue_is_rebuilt_from_the_files(store: Store) -> None:
+def test_a_catalogue_that_was_deleted_is_made_anew_from_the_files(store: Store) -> None:
     compute_here(fake_study(trouble="limit"), store)
     before = store.catalogue.runs()
     store.catalogue.path.unlink()
     assert store.catalogue.runs() == ([], 0)
-    assert store.rebuild_catalogue() == 4
+    with store.writing():
+        pass
     assert store.catalogue.runs() == before
     assert {row["status"] for row in before[0]} == {"ok", "limit_load"}
     assert json.dumps(before[0], allow_nan=False)
 
 
-def test_the_rebuilt_catalogue_forgets_files_that_are_gone(store: Store) -> None:
+def test_the_catalogue_forgets_files_that_are_gone(store: Store) -> None:
     study = fake_study()
     compute_here(study, store)
     gone = next(study.cases()).id
     store.run_path(gone).unlink()
-    assert store.rebuild_catalogue() == 3
+    store.reconcile()
+    assert store.catalogue.runs()[1] == 3
     assert store.catalogue.run(gone) is None
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 import subprocess
 import sys
 import time
@@ -89,6 +88,67 @@ def test_bad_input_names_field_value_and_what_is_allowed(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("scene", "content", "told"),
+    [
+        (
+            "punch",
+            {"parameters": {"half_width": -1}},
+            "parameters.half_width = -1.0: must be a finite number > 0 and <= 1e+06 [mm]",
+        ),
+        (
+            "punch",
+            {"sweep": {"friction": [0.1, 2], "hardening": ["none", "mixed"]}},
+            "sweep.friction[1] = 2.0: must be a finite number >= 0 and <= 1",
+        ),
+        (
+            "punch",
+            {"sweep": {"hardening": ["none", "soft"]}},
+            "sweep.hardening[1] = 'soft': must be one of none, isotropic, kinematic, mixed",
+        ),
+        (
+            "rolling",
+            {"sweep": {"passes": [1, 2], "wheel": {"a": {"traction": 1}, "b": {"traction": 2}}}},
+            "sweep.wheel.b.traction = 2.0: must be a finite number >= -0.99 and <= 1, "
+            "where wheel = b",
+        ),
+        (
+            "rolling",
+            {"sweep": {"friction": [0.3, 0], "traction": [0.5]}},
+            "sweep.traction[0] = 0.5: must be 0 without friction "
+            "(at friction = 0.0, traction = 0.5)",
+        ),
+    ],
+)
+def test_what_a_scene_refuses_is_told_in_the_words_of_the_study(
+    scene: str, content: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(StudyError) as caught:
+        Study.from_dict({"name": "wrong", "scene": scene} | content)
+    assert str(caught.value) == told
+
+
+def test_the_scene_alone_decides_what_a_value_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tests.studies.fakes.check_ranges", lambda parameters: None)
+    (case,) = Study.from_dict(
+        {"name": "free", "scene": "fake", "parameters": {"points": 1}}
+    ).cases()
+    assert case.parameters.points == 1
+
+
+def test_a_sweep_is_expanded_once() -> None:
+    study = Study.from_dict(GOOD)
+    first, again = list(study.cases()), list(study.cases())
+    assert all(one is other for one, other in zip(first, again, strict=True))
+    together = [case for path in study.paths() for case in path.cases]
+    assert {id(case) for case in together} == {id(case) for case in first}
+
+
+def test_the_old_name_of_a_loading_path_works_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match=r"studies\.Path is now studies\.LoadingPath"):
+        assert studies.Path is studies.LoadingPath
+
+
 def test_a_sweep_too_large_is_refused_before_it_is_expanded() -> None:
     thousand = [(i + 1) / 1000 for i in range(1000)]
     sweep = {"friction": thousand, "load_ratio": thousand, "half_width": thousand}
@@ -137,37 +197,6 @@ def test_a_changed_solver_makes_new_ids(monkeypatch: pytest.MonkeyPatch) -> None
     after = Study.from_dict(GOOD)
     assert after.id != ids[0]
     assert next(after.cases()).id != ids[1]
-
-
-def test_the_solver_hash_covers_every_source_and_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "solver"
-    (package / "inner").mkdir(parents=True)
-    (package / "__init__.py").write_text("")
-    (package / "inner" / "law.py").write_text("E = 1")
-    monkeypatch.setattr("solver.__file__", str(package / "__init__.py"))
-    source = studies.definition.identity.solver_hash.__wrapped__
-    first = source()
-    (package / "inner" / "law.py").write_text("E = 2")
-    second = source()
-    (package / "inner" / "law.py").rename(package / "law.py")
-    assert len({first, second, source()}) == 3
-
-
-@pytest.mark.parametrize("name", studies.definition.identity.FORM)
-def test_the_solver_hash_covers_what_gives_a_file_its_form(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    here = Path(studies.definition.identity.__file__).parents[1]
-    shutil.copytree(here, tmp_path / "studies")
-    copied = tmp_path / "studies" / "definition" / "identity.py"
-    monkeypatch.setattr("studies.definition.identity.__file__", str(copied))
-    digest = studies.definition.identity.solver_hash.__wrapped__
-    before = digest()
-    with (tmp_path / "studies" / name).open("a") as module:
-        module.write("# changed\n")
-    assert digest() != before
 
 
 def test_axes_follow_the_scene_and_values_stay_as_written() -> None:

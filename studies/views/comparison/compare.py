@@ -22,7 +22,8 @@ class Comparison:
     is_depth : whether it is the depth of the feature, or its value
     ours : level -> computed number, from coarse to fine; NaN where there is no such feature
     difference : of the finest computed number from the published one, or from its nearer bound.
-        The finest is that on the finest mesh, and of several on it that with the finest increment
+        The finest has the smallest first size of its `Level`, and of several such runs the
+        smallest second one
     changes : for each refinement, the change between its two finest levels, all else equal
     orders : for each refinement, the order at which its three finest levels settle, all else
         equal; NaN where there are fewer, or where they do not settle

@@ -1,4 +1,4 @@
-"""Which problem a run solved: its parameters, but for those that say how finely."""
+"""Which problem a run solved: its parameters without those that refine."""
 
 from __future__ import annotations
 
@@ -9,15 +9,8 @@ from typing import Any
 
 import xarray as xr
 
+from solver.scenes import Scene
 from studies.definition.parameters import parameters_of, plain, scene_named
-
-REFINING = frozenset(
-    {
-        "element", "element_size", "smallest_element", "growth",
-        "advance_step", "advance_tolerance", "load_step", "press_steps", "unload_steps",
-    }
-)  # fmt: skip
-"""Parameters that change how accurate a result is, not what it is the result of."""
 
 SAME = 1e-6
 """Relative difference below which two numbers are the same."""
@@ -34,15 +27,21 @@ def run_parameters(run: xr.Dataset) -> dict[str, Any]:
     return given | swept
 
 
-def other_problem(one: Parameters, other: Parameters, number: int) -> dict[str, tuple[Any, Any]]:
-    """Return the parameters in which two runs differ up to a pass, each with both values.
+def other_problem(
+    scene: Scene, one: Parameters, other: Parameters, number: int
+) -> dict[str, tuple[Any, Any]]:
+    """Return the parameters in which two runs of a scene solve different problems, up to a pass.
 
-    Refinement makes no other problem. The number of passes does not either, nor does the way of
-    later passes: what is compared is the state after pass `number`.
+    Parameters that refine make no other problem. The number of passes does not either, nor does
+    the direction of later passes: what is compared is the state after pass `number`.
+
+    Returns
+    -------
+    dict : name of the parameter -> its value in `one`, its value in `other`
     """
     later = {"passes", "direction"} if number == 1 else {"passes"}
     found = differences(one, other)
-    return {name: pair for name, pair in found.items() if name not in REFINING | later}
+    return {name: pair for name, pair in found.items() if name not in scene.refining | later}
 
 
 def differences(one: Parameters, other: Parameters) -> dict[str, tuple[Any, Any]]:

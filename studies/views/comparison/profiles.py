@@ -1,4 +1,4 @@
-"""Profiles of residual stress below mid-track, gathered from data sets by case and refinement."""
+"""Profiles of residual stress below the middle, gathered from data sets by case and refinement."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 import xarray as xr
 from scipy.signal import find_peaks
 
-from studies.definition.parameters import parameters_of, scene_named
+from solver.scenes import Scene
+from studies.definition.parameters import scene_named
 from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
 from studies.views.comparison.problem import (
@@ -24,6 +25,7 @@ from studies.views.comparison.problem import (
     told,
 )
 from studies.views.comparison.reference import STRAIN, Published
+from studies.views.comparison.refinement import sizes_of
 from studies.views.reading import (
     find_datasets,
     one_run,
@@ -36,22 +38,16 @@ from studies.views.reading import (
 CASE = "case"
 """Dimension whose labels are those of the published cases."""
 
-REFINEMENTS: Mapping[str, str] = {"element_size": "mesh", "advance": "increment"}
-"""Sizes that a computation converges with, and what their refinement is called."""
-
-NOMINAL: Mapping[str, str] = {"advance": "advance_step"}
-"""Sizes that a run chooses itself, and the parameters they follow from."""
-
 Key = tuple[str, int]
 """Case and number of the pass."""
 
 Level = tuple[float, ...]
-"""Values of the refinements."""
+"""Sizes of a run, in the order of `sizes_of` of its scene."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """What was left below mid-track, after a pass.
+    """What was left below the middle of the contact or the track, after a pass.
 
     Attributes
     ----------
@@ -107,7 +103,7 @@ class Computed:
     Attributes
     ----------
     scene : their scene
-    axes : names of the refinements the scene has
+    axes : names of the sizes that refine, as `sizes_of` the scene names them
     profiles : case and pass -> level -> profile, levels from coarse to fine
     """
 
@@ -122,11 +118,11 @@ class Computed:
 
 
 def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Computed:
-    """Read the profiles below mid-track from data sets with cases.
+    """Read the profiles below the middle from data sets with cases.
 
     Parameters
     ----------
-    paths : data sets, studies or output directories; what has no cases there is left out
+    paths : data sets, studies or output directories; data sets without cases are left out
     selection : axis -> wanted value
 
     Raises
@@ -144,10 +140,11 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
                 if not {CASE, "residual_profile"} <= dataset.variables.keys():
                     continue
                 found = True
-                scenes.add(dataset.attrs["scene"])
+                scene = scene_named(dataset.attrs["scene"])
+                scenes.add(scene.name)
                 for key, level, profile in _profiles(select(dataset, selection)):
                     known = profiles[key]
-                    if conflict := _conflict(known, key, level, profile):
+                    if conflict := _conflict(scene, known, key, level, profile):
                         raise StudyError("path", str(path), _advised(dataset, *conflict))
                     known.setdefault(level, profile)
         if not found:
@@ -157,18 +154,19 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
         raise StudyError("path", ", ".join(map(str, paths)), f"must be of one scene, not {scenes}")
     if not profiles:
         raise StudyError("path", ", ".join(map(str, paths)), "must hold a run that succeeded")
-    scene = scenes.pop()
+    name = scenes.pop()
+    axes = tuple(size.name for size in sizes_of(scene_named(name)))
     ordered = {key: dict(sorted(each.items(), reverse=True)) for key, each in profiles.items()}
-    return Computed(scene=scene, axes=_refinements(scene), profiles=ordered)
+    return Computed(scene=name, axes=axes, profiles=ordered)
 
 
 def _profiles(dataset: xr.Dataset) -> Iterator[tuple[Key, Level, Profile]]:
     """Yield the profiles of every successful run and pass."""
-    axes = sweep_axes(dataset)
+    axes, sizes = sweep_axes(dataset), sizes_of(scene_named(dataset.attrs["scene"]))
     for at in np.argwhere(dataset["status"].to_numpy() == STATUSES.index(OK)):
         run = one_run(dataset.isel({axis: [i] for axis, i in zip(axes, at, strict=True)}))
         parameters = run_parameters(run)
-        level = tuple(_size(run, name, parameters) for name in _refinements(run.attrs["scene"]))
+        level = tuple(size.of(run, parameters) for size in sizes)
         middle = run.sel(station=0.0, method="nearest")
         if "pass" not in run.dims:
             middle = middle.expand_dims({"pass": [1]})
@@ -187,28 +185,18 @@ def _profiles(dataset: xr.Dataset) -> Iterator[tuple[Key, Level, Profile]]:
                 yield (str(run[CASE].item()), int(number)), level, profile
 
 
-def _refinements(scene: str) -> tuple[str, ...]:
-    known = parameters_of(scene_named(scene))
-    return tuple(name for name in REFINEMENTS if NOMINAL.get(name, name) in known)
-
-
-def _size(run: xr.Dataset, name: str, parameters: Parameters) -> float:
-    """Return a size as the run took it; as it was asked for where the run does not say."""
-    return float(run[name] if name in run.data_vars else parameters[NOMINAL.get(name, name)])
-
-
 def _conflict(
-    known: Mapping[Level, Profile], key: Key, level: Level, profile: Profile
+    scene: Scene, known: Mapping[Level, Profile], key: Key, level: Level, profile: Profile
 ) -> tuple[str, list[str]] | None:
     """Return why a profile cannot stand beside those of its case and pass, and what differs."""
     where = "case {}, pass {}".format(*key)
     for other in known.values():
-        if found := other_problem(profile.parameters, other.parameters, key[1]):
+        if found := other_problem(scene, profile.parameters, other.parameters, key[1]):
             return f"{where} is another problem there: {_told(found)}", list(found)
     if level not in known or known[level].agrees_with(profile):
         return None
     found = differences(profile.parameters, known[level].parameters)
-    reason = _told(found) or "made by another state of the solver"
+    reason = _told(found) or "made with another version of the solver"
     return f"{where} has another result at the same refinement there: {reason}", list(found)
 
 

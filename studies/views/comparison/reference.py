@@ -17,9 +17,9 @@ from studies.errors import StudyError
 
 STRAIN = "plastic_strain"
 
-DATA = Path(__file__).parents[3] / "data"
-"""Where ``reference/SCENE.csv`` keeps the published numbers of a scene, and
-``studies/SCENE-table.toml`` the cases they belong to."""
+PLACES = (Path(__file__).parents[2] / "data", Path(__file__).parents[3] / "data")
+"""Where published numbers are: in an installed package, in a checkout. ``reference/SCENE.csv``
+holds the numbers of a scene, ``studies/SCENE-table.toml`` the cases they belong to."""
 
 
 class Published(BaseModel):
@@ -99,17 +99,25 @@ def reference_of(scene: str) -> Path:
     StudyError
         when there is none
     """
-    path = DATA / "reference" / f"{scene}.csv"
-    if not path.is_file():
-        allowed = f"must be given: no published numbers of scene {scene} are at hand"
+    found = _kept(f"reference/{scene}.csv")
+    if found is None:
+        allowed = f"must name a table: Residua has no published numbers of the scene {scene}"
         raise StudyError("--reference", None, allowed)
-    return path
+    return found
 
 
 def published_cases(scene: str) -> dict[str, Mapping[str, Any]]:
     """Return the parameters of the cases that `reference_of` has numbers of, by label."""
-    study = Study.from_toml(DATA / "studies" / f"{scene}-table.toml")
+    found = _kept(f"studies/{scene}-table.toml")
+    if found is None:
+        return {}
+    study = Study.from_toml(found)
     return {study.place(case)["case"]: case.values for case in study.cases()}
+
+
+def _kept(name: str) -> Path | None:
+    """Return where a file of published numbers is, or None."""
+    return next((place / name for place in PLACES if (place / name).is_file()), None)
 
 
 def read_reference(path: Path) -> tuple[Published, ...]:

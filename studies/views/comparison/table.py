@@ -8,10 +8,11 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from studies.definition.parameters import scene_named
 from studies.views.columns import in_blocks, stacked
 from studies.views.comparison.compare import Comparison
 from studies.views.comparison.problem import Parameters, other_problem, told
-from studies.views.comparison.profiles import REFINEMENTS, Computed, Level
+from studies.views.comparison.profiles import Computed, Level
 from studies.views.comparison.reference import STRAIN, Published
 
 NEAR: Mapping[str, float] = {"MPa": 50.0, "mm": 1.0, "1": 0.01, "%": 10.0}
@@ -46,8 +47,8 @@ def comparison_table(
     """Return a line for each published number, what was not computed, and a summary.
 
     The difference is that of the finest computed number from the published one. Beside it stand
-    the changes of the computed number between the two finest meshes and increments, which tell
-    how much of the difference is the computation's own error. A line says in which parameters
+    the changes of the computed number between the two finest sizes of mesh and increment, which
+    tell how much of the difference is the computation's own error. A line says in which parameters
     what was computed departs from the published `cases`, as far as those are known.
     """
     parts = []
@@ -67,8 +68,8 @@ def write_comparisons(path: Path, computed: Computed, compared: Sequence[Compari
     levels = computed.levels
     names = ["case", "pass", "number", "unit", "low", "high"]
     names += [" ".join(map("{}={:g}".format, computed.axes, level)) for level in levels]
-    names += ["difference", *(f"change_{REFINEMENTS[name]}" for name in computed.axes)]
-    names += [f"order_{REFINEMENTS[name]}" for name in computed.axes]
+    names += ["difference", *(f"change_{name}" for name in computed.axes)]
+    names += [f"order_{name}" for name in computed.axes]
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*names, "source", "note"])
@@ -82,7 +83,7 @@ def write_comparisons(path: Path, computed: Computed, compared: Sequence[Compari
 
 def _lines(computed: Computed, compared: Sequence[Comparison]) -> str:
     levels = computed.levels
-    changes = [f"change with {REFINEMENTS[name]}" for name in computed.axes]
+    changes = [f"change with {name.replace('_', ' ')}" for name in computed.axes]
     headings = ["case", "pass", "number", "unit", "published"]
     headings += [*map(_level, levels), "difference", *changes]
     rows = [_row(each, levels) for each in compared]
@@ -90,7 +91,8 @@ def _lines(computed: Computed, compared: Sequence[Comparison]) -> str:
     if not computed.axes:
         return table
     refined = f"computed at {' / '.join(computed.axes)}, from coarse to fine"
-    meaning = "the difference is that of the finest mesh, of several there of the finest increment;"
+    finest = ", of several there with the smallest ".join(computed.axes)
+    meaning = f"the difference is that of the run with the smallest {finest};"
     beside = "a change is that between the two finest, all else equal; in brackets the order"
     return f"{refined};\n{meaning}\n{beside} at which the three finest settle\n\n{table}"
 
@@ -150,10 +152,11 @@ def _level(level: Level) -> str:
 
 def _departures(computed: Computed, cases: Mapping[str, Parameters]) -> str:
     """Return in which parameters which computed cases are not the published ones."""
+    scene = scene_named(computed.scene)
     found: dict[str, dict[str, None]] = defaultdict(dict)
     for (case, number), levels in computed.profiles.items():
         ours = next(iter(levels.values())).parameters  # all levels solve one problem
-        differing = other_problem(ours, cases[case], number) if case in cases else {}
+        differing = other_problem(scene, ours, cases[case], number) if case in cases else {}
         for name, (value, published) in differing.items():
             found[f"{name} {told(value)} (published {told(published)})"][case] = None
     return "; ".join(f"{', '.join(where)} {what}" for what, where in found.items())

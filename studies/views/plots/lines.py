@@ -47,7 +47,7 @@ def line_figure(
     for name in values.dims:
         values = values.dropna(name, how="all")
     if not values.size:
-        raise StudyError("field", field, "has no values here")
+        raise StudyError("field", field, "has no value in the run selected")
     values = _told_apart(values, [name for name in values.dims if name != along])
     others = [name for name in values.dims if name != along]
     if zoom is not None:

@@ -51,7 +51,7 @@ def picture(
     if field in singles:
         for name, given in {"component": component, "zoom": zoom}.items():
             if given is not None:
-                raise StudyError(name, given, f"{field} is one value a run: leave it out")
+                raise StudyError(name, given, f"{field} has one value a run: leave it out")
         return sweep_figure(select(dataset, selection or {}), field)
     one_run(dataset)  # where no run succeeded there are no fields: say why
     check_field(field, [*maps, *lines, *singles])

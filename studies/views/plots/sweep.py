@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from studies.definition.design import USUAL_AXES
+from studies.definition.cases import USUAL_AXES
 from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
@@ -145,7 +145,7 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
     numbers = sorted((each for each in standing if each.dtype.kind in "fiu"), key=_rank)[:2]
     if len(numbers) < 2:
         free = f"only {numbers[0].name} varies" if numbers else "no number varies"
-        allowed = f"is one value a run, drawn over two swept numbers, but {free} here"
+        allowed = f"has one value a run, which is drawn over two swept numbers, but {free} here"
         raise StudyError("field", field, allowed)
     used = {each.dims for each in numbers}
     others = [dataset[axis] for axis in several if (axis,) not in used]
@@ -155,7 +155,7 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
         raise StudyError(
             "field",
             field,
-            f"takes {panels} panels, at most {MOST_PANELS}: select of {axes}",
+            f"would take {panels} panels, at most {MOST_PANELS} are drawn: select values of {axes}",
         )
     return [*numbers, *others]
 
@@ -187,7 +187,7 @@ def _look(dataset: xr.Dataset, field: str) -> _Look:
     known = _known(dataset, field).to_numpy()
     known = known[np.isfinite(known)]
     if not known.size:
-        raise StudyError("field", field, "has no values here")
+        raise StudyError("field", field, "has no value in the runs selected")
     low, high = float(known.min()), float(known.max())
     kinds = {
         value: _Kind(name=words(name), marker=marker, colour=colour)

@@ -16,6 +16,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.results.record import Record, Status
+from solver.scenes.parameters import check
 from solver.scenes.scene import Scene
 
 LOG = "FAKE_SCENE_LOG"
@@ -45,6 +46,7 @@ class FakeParameters:
     )
 
     def __post_init__(self) -> None:
+        check(self)
         if self.behaviour == "limit" and self.friction == 1.0:
             raise ModelError("friction", self.friction, "must be below 1 when behaviour is limit")
 

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from solver.results.record import Record, Status
-from solver.scenes import SCENES
+from solver.scenes import SCENES, Scene
 from studies import Store, Study
 from studies.command.cli import main
 from studies.definition.parameters import parameters_of
@@ -20,7 +20,7 @@ from studies.errors import StudyError
 from studies.storage.combine import combine
 from studies.storage.dataset import run_dataset
 from studies.views.comparison.compare import Comparison, _line, compare
-from studies.views.comparison.problem import REFINING, differences, other_problem
+from studies.views.comparison.problem import differences, other_problem
 from studies.views.comparison.profiles import Computed, Profile, read_profiles
 from studies.views.comparison.reference import (
     Published,
@@ -28,6 +28,7 @@ from studies.views.comparison.reference import (
     read_reference,
     reference_of,
 )
+from studies.views.comparison.refinement import sizes_of
 from studies.views.comparison.table import comparison_table
 from tests.studies.rolled import COMPONENTS, DEPTH, LOWEST, PEAK, data_set, profile, written
 
@@ -298,13 +299,21 @@ def test_two_results_at_one_refinement_are_refused_with_what_refines_too(tmp_pat
     assert f"{there} growth 1.5, not 1.15; compare data sets one by one" in told
     again = changed.assign_attrs(parameters="{}")
     told = refused(usual, written(again, tmp_path / "c.nc"))
-    assert f"{there} made by another state of the solver" in told
+    assert f"{there} made with another version of the solver" in told
     assert read_profiles([usual, written(coarse, tmp_path / "d.nc")], {}).levels == [(1.0, 1.0)]
 
 
-def test_what_refines_is_a_parameter_of_a_scene() -> None:
-    known = {name for scene in SCENES.values() for name in parameters_of(scene)}
-    assert known >= REFINING
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_what_refines_is_a_parameter_of_the_scene(scene: Scene) -> None:
+    assert scene.refining <= parameters_of(scene).keys()
+
+
+def test_sizes_are_what_can_be_halved_again_and_again() -> None:
+    names = {name: [size.name for size in sizes_of(SCENES[name])] for name in ("punch", "rolling")}
+    assert names == {
+        "punch": ["smallest_element", "load_step"],
+        "rolling": ["element_size", "advance"],
+    }
 
 
 def test_meshes_whose_growth_goes_with_their_side_are_of_one_problem(tmp_path: Path) -> None:
@@ -321,11 +330,11 @@ def test_meshes_whose_growth_goes_with_their_side_are_of_one_problem(tmp_path: P
 def test_studies_of_convergence_refine_depth_with_length_and_nothing_else(name: str) -> None:
     """Growth to the power of 1 / element size is one number: sides in depth halve everywhere."""
     study = Study.from_toml(ROOT / "data" / "studies" / f"{name}.toml")
-    cases = published_cases("rolling")
+    scene, cases = SCENES["rolling"], published_cases("rolling")
     for case in study.cases():
         base, place = cases[study.place(case)["case"]], study.place(case)
-        assert not other_problem(case.values, base, 1), place
-        assert set(differences(case.values, base)) <= REFINING | {"passes", "direction"}
+        assert not other_problem(scene, case.values, base, 1), place
+        assert set(differences(case.values, base)) <= scene.refining | {"passes", "direction"}
         assert case.values["growth"] == pytest.approx(1.15 ** case.values["element_size"], abs=1e-4)
 
 

@@ -52,7 +52,7 @@ HEADING = b"case,quantity,component,value,unit,source\n"
 
 
 def test_a_scene_without_published_numbers_asks_for_a_table() -> None:
-    with pytest.raises(StudyError, match="--reference = None: must be given"):
+    with pytest.raises(StudyError, match="--reference = None: must name a table"):
         reference_of("punch")
 
 

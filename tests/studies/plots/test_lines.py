@@ -118,7 +118,7 @@ def test_a_field_is_selected_along_its_own_dimensions(
         (["station=5"], "station = '5': must be one of -10.0, 0.0, 10.0"),
         (["pas=5"], "case, element_size, advance_step, passes, pass, station; did you mean pass"),
         (["depth=5"], "depth = '5': must be one of load_ratio"),
-        (["case=short", "pass=2"], "field = 'residual_profile': has no values here"),
+        (["case=short", "pass=2"], "field = 'residual_profile': has no value in the run"),
         (["pass=2", "pass=3"], "--select = 'pass=3': pass is selected already, as 2"),
     ]:
         assert main([*plot, "--select", *wrong]) == 2
@@ -141,5 +141,5 @@ def test_zoom_of_a_line_is_about_the_centre_of_a_contact_computed_whole() -> Non
 def test_lines_without_values_are_refused() -> None:
     run = grid_map(np.arange(1.0, 4.0), np.arange(-3.0, 0.0)).assign_coords(s=[0.0, 1.0])
     run["pressure"] = (("s",), np.full(2, np.nan))
-    with pytest.raises(StudyError, match="field = 'pressure': has no values here"):
+    with pytest.raises(StudyError, match="field = 'pressure': has no value in the run"):
         line_figure(run, "pressure")

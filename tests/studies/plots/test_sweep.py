@@ -173,7 +173,7 @@ def test_a_field_without_values_is_refused() -> None:
     dataset = swept()
     for field in ("creepage", "shakedown_state"):
         dataset[field] = dataset[field].where(dataset["status"] != 0)
-        with pytest.raises(StudyError, match=f"field = '{field}': has no values here"):
+        with pytest.raises(StudyError, match=f"field = '{field}': has no value in the run"):
             sweep_figure(dataset, field)
 
 
@@ -218,7 +218,9 @@ def test_too_many_panels_are_refused() -> None:
     many = xr.concat([swept()] * 4, "radius_of_rim").transpose(..., "radius_of_rim")
     many = many.assign_coords(radius_of_rim=["a", "b", "c", "d"])
     many = many.transpose("hardening", "radius_of_rim", "pressure", "slip", ...)
-    with pytest.raises(StudyError, match="8 panels, at most 6: select of hardening, radius_of_rim"):
+    with pytest.raises(
+        StudyError, match="8 panels, at most 6 are drawn: select values of hardening, radius_of_rim"
+    ):
         sweep_figure(many, "creepage")
 
 
@@ -235,9 +237,9 @@ def test_the_command_draws_one_value_a_run_over_the_sweep(
     assert picture.read_bytes().startswith(b"\x89PNG")
     capsys.readouterr()
     for wrong, named in [
-        (["--select", "friction=0.4"], "field = 'increments': is one value a run"),
-        (["--component", "xx"], "component = 'xx': increments is one value a run"),
-        (["--zoom", "3"], "zoom = 3.0: increments is one value a run"),
+        (["--select", "friction=0.4"], "field = 'increments': has one value a run"),
+        (["--component", "xx"], "component = 'xx': increments has one value a run"),
+        (["--zoom", "3"], "zoom = 3.0: increments has one value a run"),
     ]:
         assert main([*arguments, *wrong]) == 2
         assert named in capsys.readouterr().err

@@ -1,13 +1,13 @@
-"""A sweep expanded: cases (one run each) and paths (one task each)."""
+"""A sweep expanded: cases (one run each) and loading paths (one task each)."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from solver import errors as solver_errors
+from solver.errors import ModelError
 from solver.scenes import Scene
 from studies.definition.identity import content_id
 from studies.definition.parameters import build, parameters_of
@@ -36,15 +36,24 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
-    """Cases that share one loading path, in increasing order of the scene's branch parameter."""
+class LoadingPath:
+    """Cases that the solver computes by walking one loading path.
+
+    They differ in the scene's branch parameter only. One task computes them together.
+
+    Attributes
+    ----------
+    id : content id of what the cases share
+    parameters : the scene's parameter object of the first case
+    cases : in increasing order of the branch parameter
+    """
 
     id: str
     parameters: Any
     cases: tuple[Case, ...]
 
 
-def cases(
+def cases_of(
     scene: Scene, fixed: Mapping[str, Any], axes: Mapping[str, Sequence[Any]]
 ) -> Iterator[Case]:
     """Yield every point of the sweep, the last axis running fastest.
@@ -61,27 +70,40 @@ def cases(
         given = {**defaults, **fixed, **point}
         try:
             parameters = build(scene, given)
-        except solver_errors.ModelError as error:
-            raise _located(error, point, dict(zip(axes, index, strict=True))) from error
+        except ModelError as error:
+            raise _located(scene, error, point, dict(zip(axes, index, strict=True))) from error
         yield Case(content_id("run", scene.name, given), parameters, given, index)
 
 
-def paths(scene: Scene, points: Iterator[Case]) -> list[Path]:
+def loading_paths(scene: Scene, points: Iterable[Case]) -> list[LoadingPath]:
     """Group `points` that differ in nothing but the branch parameter of the scene."""
     groups: dict[str, list[Case]] = {}
     for case in points:
         shared = {name: value for name, value in case.values.items() if name != scene.branch}
         groups.setdefault(content_id("path", scene.name, shared), []).append(case)
     return [
-        Path(key, group[0].parameters, tuple(sorted(group, key=lambda c: c.values[scene.branch])))
+        LoadingPath(
+            key, group[0].parameters, tuple(sorted(group, key=lambda c: c.values[scene.branch]))
+        )
         for key, group in groups.items()
     ]
 
 
 def _located(
-    error: solver_errors.ModelError, point: Mapping[str, Any], index: Mapping[str, int]
+    scene: Scene,
+    error: ModelError,
+    point: Mapping[str, Any],
+    index: Mapping[str, int],
 ) -> StudyError:
-    where = f"sweep.{error.field}[{index[error.field]}]" if error.field in index else ""
+    """Return what the scene refused, named as the study file names it.
+
+    A value out of its own range is told with that range, and with its unit. Otherwise the values
+    of the sweep that come together there are told too, since another combination may do.
+    """
+    swept = error.field in index
+    field = f"sweep.{error.field}[{index[error.field]}]" if swept else f"parameters.{error.field}"
+    parameter = parameters_of(scene).get(error.field)
+    if parameter is not None and not parameter.in_range(error.value):
+        return parameter.refusal(field, error.value)
     at = ", ".join(f"{name} = {value}" for name, value in point.items())
-    allowed = f"{error.allowed} (at {at})" if at else error.allowed
-    return StudyError(where or f"parameters.{error.field}", error.value, allowed)
+    return StudyError(field, error.value, f"{error.allowed} (at {at})" if at else error.allowed)

@@ -1,0 +1,85 @@
+"""``residua compare`` where only the package is: no checkout around it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.sources import PACKAGES, PROJECT, ROOT, tracked
+from tests.studies.rolled import data_set, written
+
+BUILD = """
+import sys
+from setuptools import Distribution, find_namespace_packages
+from setup import BuildPy
+
+target, *include = sys.argv[1:]
+packages = find_namespace_packages(include=include)
+built = Distribution({"packages": packages, "cmdclass": {"build_py": BuildPy}})
+built.script_name = "setup.py"
+command = built.get_command_obj("build_py")
+command.build_lib = target
+command.ensure_finalized()
+command.run()
+print(*command.get_outputs(include_bytecode=False), sep="\\n")
+"""
+
+
+def finished(
+    command: list[str], directory: Path, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a command in a directory, whatever its exit status."""
+    return subprocess.run(
+        command,
+        check=False,
+        cwd=directory,
+        env=os.environ | (environment or {}),
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The tree that a wheel holds, built by the command that fills wheels."""
+    target = tmp_path_factory.mktemp("wheel")
+    include = PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
+    command = [sys.executable, "-c", BUILD, str(target), *include]
+    answer = finished(command, ROOT)
+    assert answer.returncode == 0, answer.stderr
+    promised = {line for line in answer.stdout.splitlines() if line.startswith(str(target))}
+    assert promised == {str(path) for path in target.rglob("*") if path.is_file()}
+    return target
+
+
+def test_a_wheel_holds_every_module_and_the_published_numbers(installed: Path) -> None:
+    found = {path.relative_to(installed) for path in installed.rglob("*") if path.is_file()}
+    pages = {path for path in tracked() if path.name == "README.md"}
+    code = {path for path in tracked() if path.parts[0] in PACKAGES} - pages
+    assert code <= found
+    assert found - code == {
+        Path("studies/data/reference/rolling.csv"),
+        Path("studies/data/studies/rolling-table.toml"),
+    }
+    for path in found - code:
+        source = ROOT / "data" / path.relative_to("studies/data")
+        assert (installed / path).read_bytes() == source.read_bytes()
+
+
+def test_compare_works_from_a_wheel(installed: Path, tmp_path: Path) -> None:
+    written(data_set({"T1": 2, "T3": 2}), tmp_path / "table.nc")
+    command = [sys.executable, "-m", "studies.command.cli", "compare", "table.nc"]
+    where = [sys.executable, "-c", "import studies; print(studies.__file__)"]
+    elsewhere = {"PYTHONPATH": str(installed)}
+    assert finished(where, tmp_path, elsewhere).stdout.startswith(str(installed))
+    answer = finished(command, tmp_path, elsewhere)
+    assert answer.returncode == 0, answer.stderr
+    assert "published, but not computed here: " in answer.stdout
+    assert "not the published case: " in answer.stdout
+    assert re.search(r"^compared [1-9]\d* of \d+ published numbers", answer.stdout, re.MULTILINE)

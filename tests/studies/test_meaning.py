@@ -1,0 +1,210 @@
+"""What makes another id of a run, and which words do not."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import solver
+import studies.definition.identity
+from solver.results.quantities import QUANTITIES
+from solver.scenes import SCENES
+from studies.definition.meaning import WORDS_AT, meaning
+from studies.definition.parameters import parameters_of
+
+LAW = '''"""Return mapping."""
+
+from solver.errors import ModelError, NotConverged
+from solver.scenes.parameters import described
+
+STEPS = 4
+OUTPUTS = {"stress": {"long_name": "residual stress", "units": "MPa"}}
+WORK = declare("plastic_work", "plastic work", "N mm")
+SCENE = Scene(name="punch", summary="a punch on a half-plane", advice={"limit": "less load"})
+
+
+@dataclass
+class Law:
+    """A law."""
+
+    E: float = described(2.0e5, "Young's modulus")
+    nu: float = described(0.3, "ratio, of " f"{STEPS} steps")
+
+    def stress(self, strain):
+        """Return the stress [MPa]."""
+        assert strain.ndim == 1, "strain has one axis"
+        if strain.max() > 1.0:
+            raise ModelError("strain", strain, "must be small" + self.advice())
+        # Hooke's law
+        return self.E * strain
+
+
+def ended(load):
+    return NotConverged(f"no equilibrium at {load}: " + ("cut" if load else "stop"), load)
+'''
+
+
+def changed(old: str, new: str) -> bool:
+    assert LAW.count(old) == 1, old
+    return meaning(LAW.replace(old, new)) != meaning(LAW)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("# Hooke's law", "# the linear law\n"),
+        ('"""Return mapping."""', '"""Return of the stress to the yield surface."""'),
+        ('    """A law."""\n\n', ""),
+        ("Return the stress [MPa].", "Return the Cauchy stress [MPa]."),
+        ("residual stress", "stress that stays"),
+        ("plastic work", "work of plastic flow"),
+        ("a punch on a half-plane", "a flat punch on a half-plane"),
+        ("less load", "lower the load"),
+        ("Young's modulus", "modulus of elasticity E"),
+        ('"ratio, of " f"{STEPS} steps"', '"Poisson ratio"'),
+        ("strain has one axis", "strain must have one axis"),
+        ("must be small", "must be smaller than 1"),
+        ("no equilibrium at {load}: ", "at {load} no equilibrium was found: "),
+        ('"cut"', '"cut the step"'),
+        ("2.0e5", "200000.0"),
+        ("return self.E * strain", "return (\n            self.E * strain\n        )"),
+        ('{"stress": {"long_name"', "{'stress': {'long_name'"),
+    ],
+)
+def test_words_and_layout_change_nothing(old: str, new: str) -> None:
+    assert not changed(old, new)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("2.0e5", "2.1e5"),
+        ("2.0e5", "200000"),
+        ("0.3", "-0.3"),
+        ("STEPS = 4", "STEPS = 5"),
+        ("self.E * strain", "self.E / strain"),
+        ("self.E * strain", "strain * self.E"),
+        ("strain.max() > 1.0", "strain.max() >= 1.0"),
+        ('"stress"', '"residual_stress"'),
+        ('"units": "MPa"', '"units": "GPa"'),
+        ('"N mm"', '"N"'),
+        ('name="punch"', 'name="press"'),
+        ("nu: float", "poisson: float"),
+        ("nu: float", "nu: int"),
+        ("self.advice()", "self.words()"),
+        ('"), load)', '"), 0.0)'),
+        ("@dataclass\n", ""),
+        ("import ModelError, NotConverged", "import NotConverged, ModelError"),
+    ],
+)
+def test_what_may_change_a_number_or_a_name_is_seen(old: str, new: str) -> None:
+    assert changed(old, new)
+
+
+def test_a_text_that_may_be_more_than_words_is_kept() -> None:
+    assert meaning("rule = 'none'") != meaning("rule = 'mixed'")
+    assert meaning("f(x, 'none')") != meaning("f(x, 'mixed')")
+    assert meaning("x = {'units': 'mm'}") != meaning("x = {'units': 'm'}")
+    assert meaning("described('none', '')") != meaning("described('mixed', '')")
+    assert meaning("raise Lost(text)") != meaning("raise Lost(other)")
+    assert meaning("raise Lost(float('nan'))") != meaning("raise Lost(float('inf'))")
+
+
+class Mended(ast.NodeTransformer):
+    """Other words in place of the given ones."""
+
+    def __init__(self, words: set[str]) -> None:
+        self.words = words
+        self.found: set[str] = set()
+
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
+        if node.value not in self.words:
+            return node
+        self.found.add(node.value)
+        return ast.Constant(value="other words")
+
+
+def test_every_name_and_description_of_the_product_is_words() -> None:
+    """Where this fails, a new way to declare words must be named in `WORDS_AT`."""
+    scenes = [scene for name, scene in SCENES.items() if name != "fake"]
+    words = {quantity.long_name for quantity in QUANTITIES.values()}
+    words |= {each.description for scene in scenes for each in parameters_of(scene).values()}
+    words |= {scene.summary for scene in scenes}
+    words |= {text for scene in scenes for text in scene.advice.values()}
+    mended = Mended({word for word in words if " " in word})
+    for path in Path(solver.__file__).parent.rglob("*.py"):
+        source = path.read_text()
+        new = ast.unparse(mended.visit(ast.parse(source)))
+        assert meaning(new) == meaning(source), path
+    assert len(mended.found) > 0.9 * len(mended.words), "the rest holds f-strings"
+    assert {"described", "declare"} == set(WORDS_AT)
+
+
+@pytest.fixture
+def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of solver and studies, whose digest is taken in place of the real ones'."""
+    root = Path(solver.__file__).parents[1]
+    for package in ("solver", "studies"):
+        shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("*.pyc"))
+    (tmp_path / "solver" / "law.py").write_text(LAW)
+    monkeypatch.setattr("solver.__file__", str(tmp_path / "solver" / "__init__.py"))
+    here = tmp_path / "studies" / "definition" / "identity.py"
+    monkeypatch.setattr("studies.definition.identity.__file__", str(here))
+    return tmp_path
+
+
+def digest() -> str:
+    return studies.definition.identity.solver_hash.__wrapped__()
+
+
+def mend(path: Path, change: Callable[[str], str]) -> None:
+    text = path.read_text()
+    assert change(text) != text
+    path.write_text(change(text))
+
+
+def test_mending_words_in_every_file_keeps_the_digest(copied: Path) -> None:
+    before = digest()
+    for path in copied.rglob("*.py"):
+        mend(path, lambda text: f"# mended\n\n{text}\n# the end\n")
+    law = copied / "solver" / "law.py"
+    mend(law, lambda text: text.replace('"Young\'s modulus"', '"modulus of elasticity"'))
+    mend(law, lambda text: text.replace("A law.", "A law of elasticity."))
+    assert digest() == before
+
+
+def test_the_digest_covers_formulas_defaults_and_the_place_of_a_file(copied: Path) -> None:
+    seen = [digest()]
+    law = copied / "solver" / "law.py"
+    mend(law, lambda text: text.replace("described(0.3,", "described(0.29,"))
+    seen.append(digest())
+    mend(law, lambda text: text.replace("self.E * strain", "2 * self.E * strain"))
+    seen.append(digest())
+    law.rename(copied / "solver" / "materials" / "law.py")
+    seen.append(digest())
+    (copied / "solver" / "new.py").write_text("")
+    seen.append(digest())
+    assert len(set(seen)) == len(seen)
+
+
+@pytest.mark.parametrize("name", studies.definition.identity.FORM)
+def test_the_digest_covers_what_gives_a_file_its_form(name: str, copied: Path) -> None:
+    before = digest()
+    mend(copied / "studies" / name, lambda text: f"{text}\nchanged = True\n")
+    assert digest() != before
+
+
+def test_the_digest_leaves_out_what_only_looks_at_results(copied: Path) -> None:
+    before = digest()
+    mend(copied / "studies" / "views" / "tables.py", lambda text: f"{text}\nchanged = True\n")
+    assert digest() == before
+
+
+def test_an_id_follows_the_digest(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = studies.definition.identity.content_id("run", 1)
+    monkeypatch.setattr(studies.definition.identity, "solver_hash", lambda: "0" * 32)
+    assert studies.definition.identity.content_id("run", 1) != before
