@@ -54,8 +54,8 @@ class Discretisation(Nodes, Part):
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
         self.weights = self.basis.dx * self.measure(self.points)
-        self.B = kinematics.strain_operator(values, gradients, self.points[0], body.state)
-        if kind.mean_dilatation and body.state != "plane_stress":
+        self.B = kinematics.strain_operator(values, gradients, self.points[0], body.kinematics)
+        if kind.mean_dilatation and body.kinematics != "plane_stress":
             self.B = kinematics.mean_dilatation(self.B, self.weights)
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.moves = body.travelling is not None
@@ -72,7 +72,7 @@ class Discretisation(Nodes, Part):
             for axis in axes:
                 fixed[2 * nodes + "xy".index(axis)] = True
         fixed[self.copied[fixed]] = True
-        motions = kinematics.rigid_motions(self.X, self.body.state)
+        motions = kinematics.rigid_motions(self.X, self.body.kinematics)
         copies = self.copied != np.arange(self.n)
         free = np.flatnonzero(~fixed & ~copies)
         held = np.vstack([motions[fixed], (motions - motions[self.copied])[copies]])

@@ -32,7 +32,7 @@ def strain_operator(
     values : (n_nodes, n_elements, n_points) shape functions
     gradients : (dim, n_nodes, n_elements, n_points) their global derivatives [1/mm]
     radius : (n_elements, n_points) first coordinate of the points [mm]
-    state : one of `solver.model.kinematics.STATES`; not read in three dimensions
+    state : one of `solver.model.kinematics.KINEMATICS`; not read in three dimensions
 
     Returns
     -------

@@ -50,7 +50,7 @@ class Nodes:
 
     def measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
         """Return the depth a plane point stands for [mm]: thickness or 2 pi r."""
-        if self.body.state == "axisymmetric":
+        if self.body.kinematics == "axisymmetric":
             return np.asarray(2 * np.pi * x[0])
         return self.body.thickness
 

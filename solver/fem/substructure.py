@@ -148,7 +148,7 @@ def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> 
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(
         repr((
-            linear_solver, body.state, body.element,
+            linear_solver, body.kinematics, body.element,
             body.full_integration, body.thickness, body.periodic,
             sorted((name, held, body.facets(name).tobytes())
                    for name, held in body.supports.items()),

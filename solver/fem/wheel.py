@@ -126,7 +126,7 @@ class Wheel(Substructure):
         """Return ``u`` with the hub where it has to be at a time, rolling along with it."""
         out = u.copy()
         x, turn = self._hub + _X, self._hub + _TURN
-        out[x] = self.axle.advance.at(time)
+        out[x] = self.axle.position.at(time)
         if self.axle.rotation is None:
             out[turn] -= out[x] - u[x]
         else:
@@ -141,7 +141,7 @@ class Wheel(Substructure):
 
     def start(self) -> NDArray[np.float64]:
         """Return the wheel where its programs begin."""
-        return self.placed(float(self.axle.advance.time[0]))
+        return self.placed(float(self.axle.position.time[0]))
 
     def placed(self, time: float) -> NDArray[np.float64]:
         """Return the undeformed wheel where it has to be at a time.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Stepper:
-    """Advances a system.
+    """Takes a system from one time to another.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Stepper:
         pushed = self._worked(point.now, pushed)
         return Point(pushed, None, self._timed(point.tally.plus(pushed)))
 
-    def advance(self, point: Point, target: float, *, contact: bool = True) -> Point:
+    def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`."""
         step = target - point.now.state.time
         least = abs(step) / 2**self.control.max_cuts

@@ -186,7 +186,7 @@ class Walker:
                 point = self._stepper.begin(point.now.state, target.begins, point.tally)
             walk = replace(walk, point=point, points={}, work=point.tally.plastic_work)
         point = turned(walk.point) if target.turns else walk.point
-        point = self._stepper.advance(point, target.time, contact=not target.apart)
+        point = self._stepper.reach(point, target.time, contact=not target.apart)
         points = {**walk.points, target.keeps: point.now} if target.keeps else walk.points
         return replace(walk, point=point, points=points)
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.deprecation import renamed
 from solver.errors import ModelError
 from solver.materials import PlaneStress
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
-from solver.model.kinematics import STATES, State
+from solver.model.kinematics import KINEMATICS, Kinematics
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from solver.model.motion import Axle, TravellingPressure
 
 
+@renamed(state="kinematics")
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
     """A deformable body.
@@ -32,7 +34,7 @@ class Body:
     name : unique in its model
     mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
     material : its law, a `Material` or one of the user's own (`solver.materials.Law`)
-    state : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
+    kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
     element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
     full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
     thickness : of plane bodies [mm]
@@ -49,7 +51,7 @@ class Body:
     name: str
     mesh: Mesh
     material: Law
-    state: State = "plane_strain"
+    kinematics: Kinematics = "plane_strain"
     element: str = "quad8"
     full_integration: bool = False
     thickness: float = 1.0
@@ -62,8 +64,10 @@ class Body:
     periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
-        if self.state not in STATES:
-            raise ModelError("state", self.state, "must be one of " + ", ".join(STATES))
+        if self.kinematics not in KINEMATICS:
+            raise ModelError(
+                "kinematics", self.kinematics, "must be one of " + ", ".join(KINEMATICS)
+            )
         if not (np.isfinite(self.thickness) and self.thickness > 0):
             raise ModelError("thickness", self.thickness, "must be positive [mm]")
         element = element_type(self.element)
@@ -75,7 +79,7 @@ class Body:
             )  # fmt: skip
         # a wheel is cut from hub to rim, far from where it rolls
         check_mesh(self.mesh, self.name, element)
-        if self.state == "axisymmetric" and self.mesh.p[0].min() < 0:
+        if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:
             raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
         for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
             for boundary in names:
@@ -102,7 +106,7 @@ class Body:
     @cached_property
     def law(self) -> Law:
         """How its material answers in its two-dimensional state."""
-        if self.state != "plane_stress":
+        if self.kinematics != "plane_stress":
             return self.material
         return self.material.in_plane_stress() or PlaneStress(self.material)
 
@@ -113,7 +117,7 @@ class Body:
     def _check_periodic(self, sides: tuple[str, str]) -> None:
         if not isinstance(sides, tuple) or len(sides) != 2:
             raise ModelError("periodic", sides, "must be two names of boundaries")
-        if self.state == "axisymmetric":
+        if self.kinematics == "axisymmetric":
             raise ModelError("periodic", sides, "an axisymmetric body does not repeat itself")
         for boundary in sides:
             self.facets(boundary, "periodic", outer=True)

@@ -1,8 +1,8 @@
-"""The two-dimensional states a body may be in."""
+"""How a two-dimensional body moves out of its plane."""
 
 from __future__ import annotations
 
 from typing import Literal, get_args
 
-State = Literal["plane_strain", "plane_stress", "axisymmetric"]
-STATES: tuple[str, ...] = get_args(State)
+Kinematics = Literal["plane_strain", "plane_stress", "axisymmetric"]
+KINEMATICS: tuple[str, ...] = get_args(Kinematics)

@@ -61,7 +61,7 @@ class Model:
 
     Attributes
     ----------
-    bodies : with different names and one common state
+    bodies : with different names and the same kinematics
     contacts : pairs of their boundaries
     """
 
@@ -72,9 +72,9 @@ class Model:
         names = [body.name for body in self.bodies]
         if not names or len(set(names)) < len(names):
             raise ModelError("bodies", names, "must be at least one, with different names")
-        states = {body.state for body in self.bodies}
-        if len(states) > 1:
-            raise ModelError("bodies.state", sorted(states), "must be the same for all bodies")
+        kinds = {body.kinematics for body in self.bodies}
+        if len(kinds) > 1:
+            raise ModelError("bodies.kinematics", sorted(kinds), "must be the same for all bodies")
         for contact in self.contacts:
             sides = (("slave", contact.slave), ("master", contact.master))
             for side, (name, boundary) in sides:

@@ -23,7 +23,7 @@ class Axle:
     radius : of the rim [mm]; moments act as force at this radius
     force : vertical force on the axle, positive when pressing down [N]
     moment : moment on the axle, positive counter-clockwise [N mm]
-    advance : position of the axle along x from where it was meshed [mm]
+    position : position of the axle along x from where it was meshed [mm]
     rotation : rotation of the hub, when it is prescribed instead of the moment [rad]
     turned : rotation at the start that brings the meshed rim to the track [rad]
     """
@@ -32,7 +32,7 @@ class Axle:
     radius: float
     force: Amplitude
     moment: Amplitude
-    advance: Amplitude
+    position: Amplitude
     rotation: Amplitude | None = None
     turned: float = 0.0
 

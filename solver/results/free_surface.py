@@ -119,7 +119,7 @@ class FreeSurface:
         """Return components t and z (2, n) of strain at the surface for displacements (n,)."""
         nodal = u.reshape(-1, 2)[self.nodes]
         along = np.einsum("nic,ni,cn->n", nodal, self.dN, self.tangent)
-        if self.part.body.state != "axisymmetric":
+        if self.part.body.kinematics != "axisymmetric":
             return np.stack([along, np.zeros_like(along)])
         return np.stack([along, (nodal[:, :, 0] * self.N).sum(axis=1) / self.X[0]])
 
@@ -133,7 +133,7 @@ class FreeSurface:
         """
         elasticity = self.part.body.material.elasticity
         elastic = self.strain(u) - self.first_row(plastic_strain)
-        if self.part.body.state == "plane_stress":
+        if self.part.body.kinematics == "plane_stress":
             return np.stack([elasticity.youngs_modulus * elastic[0], np.zeros_like(elastic[0])])
         return elasticity.biaxial_stress(elastic)
 

@@ -10,7 +10,7 @@ import numpy as np
 from solver.fem.wheel import Wheel
 from solver.results.fields import PLASTIC_STRAIN_PROFILE, RESIDUAL_PROFILE
 from solver.results.quantities import declare
-from solver.results.shakedown import Shakedown, State, classify
+from solver.results.shakedown import Shakedown, ShakedownState, classify
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -127,9 +127,9 @@ def shakedown(
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)
     found = classify(accumulated[last], _equivalent(left)[last], yield_strain, hardens=hardens)
-    if periodic or found.state is State.ELASTIC:
+    if periodic or found.state is ShakedownState.ELASTIC:
         return found
-    return Shakedown(State.UNDECIDED, found.accumulated, found.net)
+    return Shakedown(ShakedownState.UNDECIDED, found.accumulated, found.net)
 
 
 def _increments(traces: Sequence[Trace], cycle: int) -> tuple[Array, Array]:

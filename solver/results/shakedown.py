@@ -47,7 +47,7 @@ KNOWN = 0.1
 """Distance of the bounds of a limit, over the upper one, up to which their mean is the limit."""
 
 
-class State(IntEnum):
+class ShakedownState(IntEnum):
     """The shakedown state, with the value it is stored as."""
 
     ELASTIC = 0
@@ -61,7 +61,7 @@ class State(IntEnum):
 class Shakedown:
     """The state, and the plastic strain a cycle accumulates and leaves in the end (NaN unknown)."""
 
-    state: State
+    state: ShakedownState
     accumulated: float
     net: float
 
@@ -127,19 +127,19 @@ def classify(
         some: ratchetting then has not come to its end, however slow it is
     """
     if not accumulated.any():
-        return Shakedown(State.ELASTIC, 0.0, 0.0)
+        return Shakedown(ShakedownState.ELASTIC, 0.0, 0.0)
     quiet = QUIET * yield_strain
     flow = Limit.of(accumulated.max(axis=1))
     if accumulated[-1].max() <= quiet or flow.high <= quiet:
-        return Shakedown(State.ELASTIC_SHAKEDOWN, 0.0, 0.0)
+        return Shakedown(ShakedownState.ELASTIC_SHAKEDOWN, 0.0, 0.0)
     flows = accumulated[-1] > CLOSED * accumulated[-1].max()
     depth = np.where(flows, net[-1] - CLOSED * accumulated[-1], -np.inf).argmax()
     net, turnover = net[:, depth], accumulated[:, depth]
     left = Limit.of(net)
     opening = Limit.of(np.divide(net, turnover, out=np.zeros_like(net), where=turnover > 0))
-    state = State.UNDECIDED
+    state = ShakedownState.UNDECIDED
     if flow.low > quiet and opening.high <= CLOSED:
-        state = State.PLASTIC_SHAKEDOWN
+        state = ShakedownState.PLASTIC_SHAKEDOWN
     elif left.low > quiet and opening.low > CLOSED and not hardens:
-        state = State.RATCHETTING
+        state = ShakedownState.RATCHETTING
     return Shakedown(state, flow.value, left.value)

@@ -121,7 +121,7 @@ def model(parameters: PunchParameters) -> Model:
         name="punch",
         mesh=grid(under, up, cells),
         material=parameters.material(parameters.punch_stiffness, elastic=parameters.elastic_punch),
-        state=parameters.state,
+        kinematics=parameters.state,
         element=parameters.element,
         supports={"left": "x"},
         pressure={"top": parameters.yield_stress},
@@ -130,7 +130,7 @@ def model(parameters: PunchParameters) -> Model:
         name="half_plane",
         mesh=grid(np.concatenate([under, beyond[1:]]), down, cells),
         material=parameters.material(),
-        state=parameters.state,
+        kinematics=parameters.state,
         element=parameters.element,
         supports={"left": "x", "bottom": "y"},
     )

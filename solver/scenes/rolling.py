@@ -28,7 +28,7 @@ from solver.results.free_surface import FreeSurface
 from solver.results.passes import Trace, passes, shakedown
 from solver.results.quantities import declare
 from solver.results.record import Status
-from solver.results.shakedown import State
+from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Scene
@@ -110,7 +110,9 @@ AXLE_ROTATION = declare(
     "axle_rotation",
     "rotation of the wheel at mid-track, counter-clockwise, from how it is meshed there", "rad",
 )  # fmt: skip
-SHAKEDOWN_STATE = declare("shakedown_state", "shakedown state that the passes tend to", flags=State)
+SHAKEDOWN_STATE = declare(
+    "shakedown_state", "shakedown state that the passes tend to", flags=ShakedownState
+)
 STEADY_PLASTIC_INCREMENT = declare(
     "steady_plastic_increment", "plastic strain accumulated in a cycle, in the end"
 )
@@ -159,7 +161,7 @@ def progress(look: Look) -> Values:
     schedule, settled = look.parameters.schedule, look.outcome.settled
     return {
         TRAVEL: schedule.travel(look.outcome.last.state.time),
-        ADVANCE: schedule.advance / settled.times,
+        ADVANCE: schedule.increment / settled.times,
         ADVANCE_ERROR: settled.error,
     }
 
@@ -229,7 +231,7 @@ def warnings(look: Look) -> tuple[str, ...]:
     settled, tolerance = look.outcome.settled, settling(look.parameters)
     if tolerance is None or settled.error <= tolerance.tolerance:
         return ()
-    advance = look.parameters.schedule.advance
+    advance = look.parameters.schedule.increment
     known = not np.isnan(settled.error)
     error = f"an error of {settled.error:.3g} MPa" if known else "an unknown error"
     failed = f"; one of {advance / settled.failed:.3g} mm failed" if settled.failed else ""

@@ -282,7 +282,7 @@ def _wheel(parameters: RollingParameters) -> Body:
             radius=R,
             force=schedule.load.times(parameters.force),
             moment=schedule.drive.times(R * parameters.traction * full_slip),
-            advance=position,
+            position=position,
             rotation=rotation,
             turned=-turned,
         ),

@@ -60,7 +60,7 @@ class Schedule:
         return round(self.track / 2 / self.step)
 
     @property
-    def advance(self) -> float:
+    def increment(self) -> float:
         """Advance of an increment, which divides half the track [mm]."""
         return self.track / (2 * self.half_steps)
 

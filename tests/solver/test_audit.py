@@ -172,7 +172,7 @@ def test_work_is_found_again_where_contact_spreads(element, friction):
         mesh = type(mesh)(bent(mesh.p), mesh.t, sort_t=False).with_boundaries(dict(mesh.boundaries))
     steel = Material(youngs_modulus=2e5, poisson_ratio=0.3)
     soft = Material(youngs_modulus=5e4, poisson_ratio=0.3, yield_stress=200.0)
-    fields = {"state": "axisymmetric", "element": element}
+    fields = {"kinematics": "axisymmetric", "element": element}
     ball = Body(name="ball", mesh=mesh, material=steel, supports={"left": "x"},
                 pressure={"top": 100.0}, **fields)  # fmt: skip
     base = block("base", np.linspace(0, 4, 25), np.linspace(-4, 0, 9), material=soft,

@@ -24,6 +24,10 @@ def square(element="quad8", **fields):
 # -- loads and operators -----------------------------------------------------------------------
 
 
+LEFT = grid(np.arange(-1.0, 2.0), np.arange(3.0))
+"""A square across the axis."""
+
+
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_pressure_has_its_resultant(element):
     """100 MPa on a top 2 long and 3 thick pushes down with 600 N."""
@@ -35,7 +39,7 @@ def test_pressure_has_its_resultant(element):
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_axisymmetric_pressure_acts_on_the_whole_disc(element):
     load = Discretisation(
-        square(element, pressure={"top": 100.0}, state="axisymmetric")
+        square(element, pressure={"top": 100.0}, kinematics="axisymmetric")
     ).load_vector
     assert load[1::2].sum() == pytest.approx(-100.0 * np.pi * 4.0)
 
@@ -43,7 +47,7 @@ def test_axisymmetric_pressure_acts_on_the_whole_disc(element):
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("state", STATES)
 def test_rigid_motions_strain_nothing(element, state):
-    part = Discretisation(square(element, state=state))
+    part = Discretisation(square(element, kinematics=state))
     assert part.rigid.shape[1] == (1 if state == "axisymmetric" else 3)
     for motion in part.rigid.T:
         assert np.abs(part.strain(motion)).max() < 1e-13
@@ -52,7 +56,7 @@ def test_rigid_motions_strain_nothing(element, state):
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("state", STATES)
 def test_linear_displacements_have_uniform_strain(element, state):
-    part = Discretisation(square(element, state=state))
+    part = Discretisation(square(element, kinematics=state))
     x, y = part.X
     u = np.stack([1e-3 * x + (0 if state == "axisymmetric" else 4e-3) * y, -2e-3 * y + 3e-3 * x])
     strain = part.strain(u.T.ravel())
@@ -66,7 +70,7 @@ def test_linear_displacements_have_uniform_strain(element, state):
 @pytest.mark.parametrize("state", STATES)
 def test_internal_forces_do_the_work_of_the_stress(element, state):
     """Virtual work: f . u = integral of stress : strain, for any u and any stress."""
-    part = Discretisation(square(element, state=state, thickness=2.0))
+    part = Discretisation(square(element, kinematics=state, thickness=2.0))
     rng = np.random.default_rng(4)
     u, stress = rng.standard_normal(part.n), rng.standard_normal((4, part.weights.size))
     work = (stress * part.strain(u)).sum(axis=0) @ part.weights.ravel()
@@ -80,14 +84,14 @@ def test_weights_sum_to_the_volume(element):
 
 def test_weights_of_a_ring_sum_to_its_volume():
     ring = grid(np.linspace(1.0, 3.0, 4), np.arange(3.0))
-    part = Discretisation(square(mesh=ring, state="axisymmetric"))
+    part = Discretisation(square(mesh=ring, kinematics="axisymmetric"))
     assert part.weights.sum() == pytest.approx(2 * np.pi * (9 - 1))
 
 
 @pytest.mark.parametrize("element", ["quad8", "quad9", "quad4", "tri6"])
 @pytest.mark.parametrize("state", ["plane_strain", "plane_stress"])
 def test_tangent_is_the_derivative_of_the_internal_force(element, state):
-    part = Discretisation(square(element, state=state, supports={"left": "xy"}))
+    part = Discretisation(square(element, kinematics=state, supports={"left": "xy"}))
     rng = np.random.default_rng(6)
     u = 4e-3 * rng.standard_normal(part.n)
     response = part.respond(u, part.virgin())
@@ -172,7 +176,7 @@ def test_mapped_meshes_keep_names_and_follow_the_curve():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"state": "plain"}, "state = 'plain': must be one of plane_strain"),
+        ({"kinematics": "plain"}, "kinematics = 'plain': must be one of plane_strain"),
         ({"element": "hex8"}, "element = 'hex8': must be one of quad8"),
         ({"element": "tri6", "mesh": grid(np.arange(3.0), np.arange(3.0))}, "corners"),
         ({"thickness": 0.0}, "thickness = 0.0: must be positive"),
@@ -180,7 +184,10 @@ def test_mapped_meshes_keep_names_and_follow_the_curve():
         ({"supports": {"lid": "x"}}, "supports = 'lid': must name a boundary .* left"),
         ({"supports": {"left": "z"}}, "supports.left = 'z': must be x, y or xy"),
         ({"pressure": {"top": np.inf}}, "pressure.top = inf: must be finite"),
-        ({"mesh": grid(np.arange(-1.0, 2.0), np.arange(3.0)), "state": "axisymmetric"}, "x >= 0"),
+        (
+            {"mesh": grid(np.arange(-1.0, 2.0), np.arange(3.0)), "kinematics": "axisymmetric"},
+            "x >= 0",
+        ),
     ],
 )
 def test_bad_bodies_are_refused_by_field_value_and_what_is_allowed(fields, message):
@@ -214,8 +221,8 @@ def test_models_refuse_what_does_not_fit_together():
         Model(bodies=(body, body))
     with pytest.raises(ModelError, match=r"bodies = \[\]"):
         Model(bodies=())
-    other = Body(name="other", mesh=body.mesh, material=STEEL, state="plane_stress")
-    with pytest.raises(ModelError, match=r"bodies\.state"):
+    other = Body(name="other", mesh=body.mesh, material=STEEL, kinematics="plane_stress")
+    with pytest.raises(ModelError, match=r"bodies\.kinematics"):
         Model(bodies=(body, other))
     with pytest.raises(ModelError, match="slave = 'ghost': must be one of square"):
         pair = ContactPair(slave=("ghost", "top"), master=("square", "top"))
@@ -232,3 +239,11 @@ def test_unknown_linear_solver_is_refused():
     model = Model(bodies=(square(supports={"left": "xy"}, pressure={"top": 1.0}),))
     with pytest.raises(ModelError, match="linear_solver = 'lapack': must be one of"):
         solve(model, linear_solver="lapack")
+
+
+def test_the_old_name_of_the_kinematics_works_with_a_warning():
+    with pytest.warns(DeprecationWarning, match="Body.state is called Body.kinematics now"):
+        body = Body(name="square", mesh=LEFT, material=STEEL, state="plane_stress")
+    assert body.kinematics == "plane_stress"
+    with pytest.warns(DeprecationWarning, match="Body.kinematics"):
+        assert body.state == "plane_stress"

@@ -28,7 +28,7 @@ def two_surfaces(
             mesh=mapped(grid(x, y), arc),
             material=STEEL,
             element=element,
-            state=state,
+            kinematics=state,
             thickness=thickness,
             supports=held,
         )

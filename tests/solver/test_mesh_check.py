@@ -329,7 +329,7 @@ def test_a_hinge_is_refused(cells):
 @pytest.mark.parametrize("state", ["plane_strain", "axisymmetric"])
 def test_coordinates_that_are_not_finite_are_refused(value, state):
     mesh = moved(grid(CELLS, CELLS), 3, 1.0, value)
-    said = refusal(mesh, state=state)
+    said = refusal(mesh, kinematics=state)
     assert said == f"node 3 is at (1, {value:g}); coordinates must be finite"
 
 

@@ -70,7 +70,7 @@ def test_contact_surface_goes_on_for_half_a_period_at_either_end():
         ({"periodic": ("left", "nowhere")}, "periodic"),
         ({"periodic": ("right", "left")}, "periodic"),
         ({"periodic": ("left", "top"), "pressure": {}}, "periodic"),
-        ({"state": "axisymmetric"}, "periodic"),
+        ({"kinematics": "axisymmetric"}, "periodic"),
         ({"supports": {"bottom": "xy", "left": "x"}}, "supports.left"),
         ({"pressure": {"right": 1.0}}, "pressure.right"),
     ],

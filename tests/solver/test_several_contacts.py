@@ -41,7 +41,7 @@ def test_two_pads_on_one_plate_both_press_on_it(order):
 
 def test_bodies_that_overlap_before_loading_press_on_each_other():
     """Two blocks, 4 and 10 high, 0.01 too high together: sigma_y = -E 0.01 / 14 (plane stress)."""
-    make = {"material": STEEL, "state": "plane_stress"}
+    make = {"material": STEEL, "kinematics": "plane_stress"}
     upper = Body(
         name="upper",
         mesh=grid(np.linspace(0, 5, 6), np.linspace(-0.01, 4, 5)),

@@ -23,9 +23,9 @@ def bars(overlap, yield_stress=math.inf, hardening_ratio=0.0):
         hardening="isotropic", hardening_ratio=hardening_ratio,
     )  # fmt: skip
     x = np.linspace(0.0, SIDE, 5)
-    upper = block("upper", x, x - overlap, material=material, state="plane_stress",
+    upper = block("upper", x, x - overlap, material=material, kinematics="plane_stress",
                   supports={"left": "x", "top": "y"})  # fmt: skip
-    lower = block("lower", x, x - SIDE, material=material, state="plane_stress",
+    lower = block("lower", x, x - SIDE, material=material, kinematics="plane_stress",
                   supports={"left": "x", "bottom": "y"})  # fmt: skip
     pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"))
     return Model(bodies=(upper, lower), contacts=(pair,))
@@ -59,9 +59,9 @@ def test_overlapping_bodies_that_nothing_loads_balance_each_other():
 def stack(gap, direction=1.0, friction=0.0, held=None):
     """A block that nothing but contact holds in y, ``gap`` above its base."""
     x = np.linspace(0.0, SIDE, 5)
-    upper = block("upper", x, gap + x, state="plane_stress", supports=held or {"left": "x"},
+    upper = block("upper", x, gap + x, kinematics="plane_stress", supports=held or {"left": "x"},
                   pressure={"top": 100.0 * direction})  # fmt: skip
-    lower = block("lower", x, x - SIDE, state="plane_stress",
+    lower = block("lower", x, x - SIDE, kinematics="plane_stress",
                   supports={"left": "x", "bottom": "y"})  # fmt: skip
     pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), friction=friction)
     return Model(bodies=(upper, lower), contacts=(pair,))
@@ -124,6 +124,6 @@ def test_a_body_that_hardens_has_no_limit_load(ratio, elastic_punch):
 def test_a_limit_load_says_what_flows():
     with pytest.raises(LimitLoad, match=r"body 'bar' flows around x = .* mm with 0\.0% of its"):
         x = np.linspace(0.0, 4.0, 5)
-        bar = block("bar", x, x, material=steel(300.0), state="plane_stress",
+        bar = block("bar", x, x, material=steel(300.0), kinematics="plane_stress",
                     supports={"left": "x", "bottom": "y"}, pressure={"right": -330.0})  # fmt: skip
         solve(Model(bodies=(bar,)), control=CONTROL)

@@ -77,7 +77,7 @@ def bar(**material):
                 name="bar",
                 mesh=grid(np.linspace(0.0, 4.0, 5), np.linspace(0.0, 1.0, 3)),
                 material=Material(youngs_modulus=2e5, poisson_ratio=0.3, **material),
-                state="plane_stress",
+                kinematics="plane_stress",
                 supports={"left": "x", "bottom": "y"},
                 pressure={"right": 300.0},
             ),

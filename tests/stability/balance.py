@@ -192,7 +192,7 @@ def _points(system: System, pair: ContactPair, converged: Converged) -> tuple[Ar
     at = (cuts[:-1, None] + cuts[1:, None]) / 2 + np.diff(cuts)[:, None] / 2 * xi
     weight = (np.diff(cuts)[:, None] / 2 * w * np.ones_like(at)).ravel()
     at = at.ravel()
-    weight = weight * (2 * np.pi * at if slave.body.state == "axisymmetric" else 1.0)
+    weight = weight * (2 * np.pi * at if slave.body.kinematics == "axisymmetric" else 1.0)
     hats = np.stack([np.interp(at, x, row) for row in np.eye(len(x))])
     return at, weight, hats
 

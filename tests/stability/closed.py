@@ -78,7 +78,7 @@ class Column:
             thickness=self.thickness[0],
             supports={"left": "x"} | ({"top": "y"} if self.clamped else {}),
             pressure=load | self._sideways,
-            state=self.state,
+            kinematics=self.state,
             element=self.element,
         )
 
@@ -90,7 +90,7 @@ class Column:
             thickness=self.thickness[1],
             supports={"left": "x", "bottom": "y"},
             pressure=self._sideways,
-            state=self.state,
+            kinematics=self.state,
             element=self.element,
         )
 

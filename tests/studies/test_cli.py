@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from solver.results.shakedown import State as Shakedown
+from solver.results.shakedown import ShakedownState
 from studies import Store, Study, StudyEvent, open_netcdf
 from studies.command.cli import main
 from studies.command.progress import Progress
@@ -144,7 +144,7 @@ def test_show_of_a_run_tells_flags_in_words_and_no_negative_zero(
     study, store = computed
     with open_netcdf(store.run_path(next(study.cases()).id)) as run:
         changed = run.load()
-    for name, value in (("shakedown_state", Shakedown.UNDECIDED), ("creepage", -0.0)):
+    for name, value in (("shakedown_state", ShakedownState.UNDECIDED), ("creepage", -0.0)):
         changed[name] = xr.full_like(changed["peak_residual_tension"], float(value))
         changed[name].attrs = attributes_of(name)
     changed.to_netcdf(tmp_path / "run.nc")

@@ -174,7 +174,7 @@ def more_flow(patch: Patch) -> None:
 
 def forgotten_flow(patch: Patch) -> None:
     """One increment begins as if nothing had yielded before."""
-    advance = solver.loading.stepper.Stepper.advance
+    advance = solver.loading.stepper.Stepper.reach
 
     def forgetful(self: Any, point: Any, target: float, **options: Any) -> Any:
         point = advance(self, point, target, **options)
@@ -184,7 +184,7 @@ def forgotten_flow(patch: Patch) -> None:
         virgin = tuple(PlasticState.virgin(p.accumulated.size) for p in state.plastic)
         return replace(point, now=replace(point.now, state=replace(state, plastic=virgin)))
 
-    patch.setattr(solver.loading.stepper.Stepper, "advance", forgetful)
+    patch.setattr(solver.loading.stepper.Stepper, "reach", forgetful)
 
 
 def no_hoop_strain(patch: Patch) -> None:
@@ -256,12 +256,12 @@ def hasty_release(patch: Patch) -> None:
 
 def load_left_on(patch: Patch) -> None:
     """Instead of being released, the bodies keep a hundredth of the load, in equilibrium."""
-    advance = solver.loading.stepper.Stepper.advance
+    advance = solver.loading.stepper.Stepper.reach
 
     def kept(self: Any, point: Any, target: float, *, contact: bool = True) -> Any:
         return advance(self, point, target if contact else 0.01 * point.now.state.time)
 
-    patch.setattr(solver.loading.stepper.Stepper, "advance", kept)
+    patch.setattr(solver.loading.stepper.Stepper, "reach", kept)
 
 
 MUTATIONS: dict[str, Mutation] = {

@@ -32,7 +32,7 @@ def bent(element, state, turned):
     turn = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
     mesh = grid(np.linspace(0.0, 4.0, 6), np.array([-1.0, -0.6, -0.3, 0.0]), cells(element))
     body = replace(
-        block("bar", np.arange(2.0), np.arange(2.0), element, state=state),
+        block("bar", np.arange(2.0), np.arange(2.0), element, kinematics=state),
         mesh=replace(mesh, doflocs=turn @ mesh.doflocs),
     )
     part = Discretisation(body)
@@ -120,7 +120,7 @@ def test_plastic_strain_of_depth_alone_leaves_the_stress_of_the_first_row():
 
 def pressed(state, n, yield_stress, pressure, element="quad8"):
     body = sector(
-        np.linspace(1.0, 2.0, n + 1), n, material=steel(yield_stress), state=state,
+        np.linspace(1.0, 2.0, n + 1), n, material=steel(yield_stress), kinematics=state,
         element=element, pressure={"left": pressure},
     )  # fmt: skip
     return solve(Model(bodies=(body,)), control=PathControl(load_step=1.0, unload_steps=1))

@@ -28,7 +28,7 @@ def two_blocks(
         x_slave,
         np.linspace(0.0, 4.0, 4),
         element,
-        state=state,
+        kinematics=state,
         supports={"left": "x"},
         pressure={"top": P},
         condense=condense,
@@ -38,7 +38,7 @@ def two_blocks(
         x_master,
         np.linspace(-5.0, 0.0, 5),
         element,
-        state=state,
+        kinematics=state,
         supports={"left": "x", "bottom": "y"},
         condense=condense,
     )

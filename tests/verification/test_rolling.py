@@ -194,7 +194,7 @@ def test_advance_is_taken_as_given_without_a_tolerance():
 
 def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch):
     fields = SLIDING | {"element_size": 4.0, "advance_step": 6.0}
-    advance = Stepper.advance
+    advance = Stepper.reach
 
     def fails_below_3_mm(self, point, target, **options):
         # rolling begins when the wheel has been set down and driven
@@ -202,7 +202,7 @@ def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch
             raise PathEnded(NotConverged("stuck", 0.0, 1.0), point)
         return advance(self, point, target, **options)
 
-    monkeypatch.setattr(Stepper, "advance", fails_below_3_mm)
+    monkeypatch.setattr(Stepper, "reach", fails_below_3_mm)
     record = roll.__wrapped__(**fields, advance_tolerance=1e-6)
     assert record.scalars["advance"] == 3.0
     assert np.array_equal(

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Status
-from solver.results.shakedown import Limit, State, classify
+from solver.results.shakedown import Limit, classify
+from solver.results.shakedown import ShakedownState as State
 from solver.results.sliding_limits import (
     johnson_limit,
     largest_shear,
@@ -106,7 +107,11 @@ def test_friction_lowers_the_limit_and_from_0_37_on_the_surface_governs():
         # by how much each cycle opens is not known, but that it does
         ([0.148, 0.150, 0.153, 0.158], [0.140, 0.142, 0.144, 0.150], State.RATCHETTING),
         ([0.09, 0.10, 0.093, 0.095], [0.08, 0.087, 0.079, 0.082], State.RATCHETTING),
-        ([3e-3, 3e-3, 3e-3, 3e-3], [1.3e-4, 1.27e-4, 1.24e-4, 1.21e-4], State.PLASTIC_SHAKEDOWN),
+        (
+            [3e-3, 3e-3, 3e-3, 3e-3],
+            [1.3e-4, 1.27e-4, 1.24e-4, 1.21e-4],
+            State.PLASTIC_SHAKEDOWN,
+        ),
         # what it tends to depends on which of its values are asked
         ([9e-4, 6e-4, 3e-4, 2e-4], [9e-4, 6e-4, 3e-4, 2e-4], State.UNDECIDED),
     ],

@@ -19,7 +19,7 @@ def press(state, pressure, poisson_ratio, n_radius, n_angle, element="quad8", st
         np.linspace(1.0, 2.0, n_radius + 1),
         n_angle,
         material=steel(YIELD, poisson_ratio),
-        state=state,
+        kinematics=state,
         element=element,
         pressure={"left": pressure},
     )

@@ -124,7 +124,7 @@ def reactions(
         else:
             held = np.where(body.held, contact - body.lacking, 0.0)
             total = total + body.applied() - held.sum(axis=0)
-            if body.plain.body.state == "axisymmetric":
+            if body.plain.body.kinematics == "axisymmetric":
                 total[0] = 0.0  # radial forces balance round the axis
         worst = max(worst, float(np.abs(total).max()))
     return worst / (converged.state.force_scale or 1.0)

@@ -58,14 +58,14 @@ class PlainBody:
         return np.asarray(self.part.basis.dx * self._depth(self.part.basis.global_coordinates()))
 
     def _depth(self, x: Array) -> Array:
-        round_axis = self.body.state == "axisymmetric"
+        round_axis = self.body.kinematics == "axisymmetric"
         return np.asarray(2 * np.pi * x[0] if round_axis else self.body.thickness)
 
     @property
     def _averaged(self) -> bool:
         """Whether the element takes its change of volume from the mean over its points."""
         kind = element_type(self.body.element)
-        return kind.mean_dilatation and self.body.state != "plane_stress"
+        return kind.mean_dilatation and self.body.kinematics != "plane_stress"
 
     def _level(self, field: Array) -> Array:
         """Return a tensor field whose trace is that of the mean over each element."""
@@ -85,7 +85,7 @@ class PlainBody:
         xy = np.einsum("iep,ie->ep", self._gradients[:, 1], at[..., 0])
         xy += np.einsum("iep,ie->ep", self._gradients[:, 0], at[..., 1])
         zz = np.zeros_like(xx)
-        if self.body.state == "axisymmetric":
+        if self.body.kinematics == "axisymmetric":
             zz = np.einsum("iep,ie->ep", self._round, at[..., 0])
         return self._level(np.array([xx, yy, zz, xy / SQRT2]))
 
@@ -98,7 +98,7 @@ class PlainBody:
         x += np.einsum("iep,ep->ie", G[:, 1], weighted[3])
         y = np.einsum("iep,ep->ie", G[:, 1], weighted[1])
         y += np.einsum("iep,ep->ie", G[:, 0], weighted[3])
-        if self.body.state == "axisymmetric":
+        if self.body.kinematics == "axisymmetric":
             x += np.einsum("iep,ep->ie", self._round, weighted[2])
         count = self.part.X.shape[1]
         nodes = self._nodes.ravel()

@@ -82,7 +82,7 @@ def _solve(make: Callable[[], Mesh], element: str) -> Solution:
         mesh=make(),
         material=STEEL,
         element=element,
-        state="plane_stress",
+        kinematics="plane_stress",
         supports={"left": "xy", "bottom": "y"},
         pressure={"right": -10.0},
     )

@@ -110,7 +110,7 @@ def _solve(make: Callable[[], tuple[Mesh, set[int]]], element: str) -> Solution:
         mesh=make()[0],
         material=STEEL,
         element=element,
-        state="plane_stress",
+        kinematics="plane_stress",
         supports={"left": "x", "bottom": "y"},
         pressure={"right": -10.0},
     )

@@ -41,7 +41,7 @@ def _pull(rule: str, ratio: float, element: str) -> Solution:
         mesh=grid(np.linspace(0, LENGTH, 4), np.linspace(0, 1, 3), cells),
         material=_material(rule, ratio),
         element=element,
-        state="plane_stress",
+        kinematics="plane_stress",
         supports={"left": "x", "bottom": "y"},
         pressure={"right": -YIELD},
     )
@@ -99,7 +99,7 @@ def _spread(rule: str, ratio: float, friction: float) -> Scene:
             Layer(material=material, width=6.0, cells=(7, 3)),
         ),
         pressure=LOAD * YIELD,
-        state="plane_stress",
+        kinematics="plane_stress",
         friction=friction,
         steps=10,
     ).scene()

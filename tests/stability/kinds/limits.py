@@ -30,7 +30,7 @@ def _bar(load: float) -> Solution:
         name="bar",
         mesh=grid(np.linspace(0, 4, 5), np.linspace(0, 1, 3)),
         material=IDEAL,
-        state="plane_stress",
+        kinematics="plane_stress",
         supports={"left": "x", "bottom": "y"},
         pressure={"right": -YIELD},
     )
@@ -54,7 +54,7 @@ def _beam(load: float) -> Solution:
         name="beam",
         mesh=mesh,
         material=IDEAL,
-        state="plane_stress",
+        kinematics="plane_stress",
         supports={"left": "x", "foot": "y"},
         pressure={"low": YIELD, "high": -YIELD},
     )

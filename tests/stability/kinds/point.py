@@ -49,7 +49,7 @@ class Tip:
             name="tip",
             mesh=mapped(flat, shaped),
             material=self.material,
-            state=self.state,
+            kinematics=self.state,
             supports={"top": "x"} if self.held else {},
             pressure={"top": self.pressure} | ({"left": self.push} if self.push else {}),
         )
@@ -57,7 +57,7 @@ class Tip:
             name="plate",
             mesh=grid(np.linspace(-6, 6, 25), np.linspace(-4, 0, 5)),
             material=self.material,
-            state=self.state,
+            kinematics=self.state,
             supports={"bottom": "xy"},
         )
         pair = ContactPair(

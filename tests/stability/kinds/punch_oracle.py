@@ -89,7 +89,7 @@ def _work(system: System, body: str, converged: Converged, axis: str) -> float:
     part = system.full(body)
     stress = system.response(body, converged).stress
     along = stress[1] if axis == "y" else stress[0]
-    if axis == "x" and part.body.state == "axisymmetric":
+    if axis == "x" and part.body.kinematics == "axisymmetric":
         along = along + stress[2]
     return float(along @ part.weights.ravel()) / _length(system, body, "xy".index(axis))
 
@@ -140,7 +140,7 @@ def law(system: System, body: str, converged: Converged) -> dict[str, float]:
     elastic[:3] -= nu / E * stress[:3].sum(axis=0)
     miss = strain - elastic - plastic
     out_of_plane = 0.0
-    if part.body.state == "plane_stress":
+    if part.body.kinematics == "plane_stress":
         miss = miss[[0, 1, 3]]  # the strain out of plane is whatever it has to be
         out_of_plane = float(np.abs(stress[2]).max()) / max(float(np.abs(stress).max()), 1e-300)
     largest = max(float(np.abs(strain).max()), float(np.abs(plastic).max()), 1e-300)

@@ -62,10 +62,10 @@ def bend(model: Model, steps: int, low: float) -> Cycles:
     try:
         for _ in range(TIMES):
             for load in np.linspace(low, 1, steps + 1)[1:]:
-                point = stepper.advance(point, float(load))
+                point = stepper.reach(point, float(load))
             up.append(point.now)
             for load in np.linspace(1, low, steps + 1)[1:]:
-                point = stepper.advance(point, float(load))
+                point = stepper.reach(point, float(load))
             down.append(point.now)
     except PathEnded as ended:
         raise ended.error from ended

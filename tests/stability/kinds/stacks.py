@@ -96,7 +96,7 @@ class Stack:
                 "tri" if layer.element.startswith("tri") else "quad",
             ),
             material=layer.material,
-            state=self.state,
+            kinematics=self.state,
             element=layer.element,
             thickness=self.thickness,
             supports={"left": "x"} | ({"bottom": "y"} if last else {}),
