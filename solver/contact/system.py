@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
+    from solver.fem.part import Part
     from solver.fem.surface import Surface
     from solver.materials.state import Response
     from solver.model.model import ContactPair, Model
@@ -78,9 +79,6 @@ class Interface:
         return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
 
 
-Part = Discretisation | Substructure
-
-
 def _surfaces(model: Model, wholes: Mapping[str, Discretisation]) -> dict[tuple[str, str], Surface]:
     """Return the surfaces of all pairs in the numbering of the whole bodies.
 
@@ -125,7 +123,7 @@ def _interface(
     for side in (contact.slave, contact.master):
         number, chain = names.index(side[0]), surfaces[side]
         part = parts[number]
-        sides.append((number, part.surface(chain) if isinstance(part, Substructure) else chain))
+        sides.append((number, part.surface(chain)))
     (slave, slave_surface), (master, master_surface) = sides
     both = (parts[slave], parts[master])
     check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
@@ -252,12 +250,12 @@ class System:
         """Return the displacements (n,) of a whole body [mm]."""
         number = self.part(name)
         part, u = self.parts[number], state.u[number]
-        return part.expand(u, state.time) if isinstance(part, Substructure) else u
+        return part.expand(u, state.time)
 
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body."""
         number = self.part(name)
-        if isinstance(self.parts[number], Substructure):
+        if not self.parts[number].meshed:
             whole = self.full(name)
             return whole.respond(self.displacement(name, converged.state), whole.virgin())
         return converged.responses[number]

@@ -92,6 +92,17 @@ class Factored:
         return self._analysed.solver.compliance(block)
 
 
+class PartOperators(Protocol):
+    """The operators of a part."""
+
+    @property
+    def elastic(self) -> Operator:
+        """The elastic one."""
+
+    def tangent(self, response: Response, blend: float) -> Operator:
+        """Return that of ``(1 - blend) tangent + blend elastic stiffness``."""
+
+
 class Operators:
     """The operators of one part; the elastic one is made once and kept.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,22 +10,78 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.fem.operators import PartOperators
     from solver.fem.surface import Surface
+    from solver.materials.state import PlasticState, Response
     from solver.model.body import Body
 
 
-class Part:
-    """A body as the increments see it; this base class answers for a body that does not move.
+class Part(ABC):
+    """A body as the increments see it. What is not abstract holds for a meshed body at rest.
 
-    Its unknowns are ``u`` (n,); ``moves`` tells whether its load moves over the bodies.
-
-    ``load_vector`` (n,) holds the nodal forces of the body's pressures [N].
+    Attributes
+    ----------
+    n : number of unknowns ``u``
+    body : as declared
+    load_vector : (n,) nodal forces of the body's pressures at load factor one [N]
+    free : unknowns that no support holds
+    active : those of them that are not pinned to hold its rigid motions
+    rigid : (n, n_rigid) rigid motions that the supports leave free
+    moves : whether its load moves over the bodies
+    meshed : whether its unknowns are those of all of its nodes
     """
 
     n: int
     body: Body
     load_vector: NDArray[np.float64]
+    free: NDArray[np.int64]
+    active: NDArray[np.int64]
+    rigid: NDArray[np.float64]
     moves: bool = False
+    meshed: bool = True
+
+    # -- what each kind of part does by itself -------------------------------------------------
+
+    @abstractmethod
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> PartOperators:
+        """Return its inverses of stiffness, for the contact surfaces it has."""
+
+    @abstractmethod
+    def virgin(self) -> PlasticState:
+        """Return the internal variables before any load."""
+
+    @abstractmethod
+    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+        """Return stress, tangent and new internal variables at all points."""
+
+    @abstractmethod
+    def residual(
+        self, time: float, u: NDArray[np.float64], response: Response
+    ) -> NDArray[np.float64]:
+        """Return external minus internal forces (n,), contact forces left out [N]."""
+
+    @abstractmethod
+    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+
+    @abstractmethod
+    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+        """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
+
+    # -- what a meshed body at rest does -------------------------------------------------------
+
+    def surface(self, surface: Surface) -> Surface:
+        """Return a surface of the whole body in this part's numbering."""
+        return surface
+
+    def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """Return the displacements of the whole body [mm]; those of a wheel in its hub's frame."""
+        del time
+        return u
+
+    def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the nodal forces of the whole body for those of this part [N]."""
+        return force
 
     @property
     def volumes(self) -> NDArray[np.float64]:

@@ -75,6 +75,8 @@ class Substructure(Part):
     ``elastic`` are the unknowns that the condensed stiffness acts on.
     """
 
+    meshed = False
+
     def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
         self.whole = whole
         self.body = whole.body

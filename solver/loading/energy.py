@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from solver.contact.state import Converged
-    from solver.contact.system import Part
+    from solver.fem.part import Part
 
 
 def worked(parts: Sequence[Part], before: Converged, now: Converged) -> Energy:

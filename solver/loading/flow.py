@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.contact.system import Part
+    from solver.fem.part import Part
     from solver.materials import Response
 
 _FLOWING = 0.02

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+    from scipy.sparse import csr_array
 
     from solver.contact.state import Converged
     from solver.contact.system import System
@@ -26,12 +27,13 @@ class Nodal:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        names = [body.name for body in system.model.bodies]
-        self._recover = {name: recovery(system.full(name)) for name in names}
+        self._recovery: dict[str, csr_array] = {}
 
     def of_points(self, body: str, points: Array) -> Array:
         """Return recovered nodal values (..., n_nodes) of point values (..., n_points)."""
-        return np.asarray((self._recover[body] @ points.T).T)
+        if body not in self._recovery:
+            self._recovery[body] = recovery(self.system.full(body))
+        return np.asarray((self._recovery[body] @ points.T).T)
 
     def stress(self, body: str, converged: Converged) -> Array:
         """Return recovered nodal stress (4, n_nodes), Mandel [MPa]."""

@@ -10,11 +10,11 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.contact.system import System
 from solver.errors import ModelError
-from solver.fem.fields import recovery
 from solver.loading.control import PathControl
 from solver.loading.outcome import Tally
 from solver.loading.walker import Walker
 from solver.results.audit import Audit, audit
+from solver.results.samples import Nodal
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
@@ -61,13 +61,11 @@ class Solution:
 
         Unloaded, this is the residual stress.
         """
-        points = self.system.response(body, self._at(stage)).stress
-        return to_tensor((recovery(self.system.full(body)) @ points.T).T)
+        return to_tensor(Nodal(self.system).stress(body, self._at(stage)))
 
     def plastic_strain(self, body: str) -> NDArray[np.float64]:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
-        strain = self.system.response(body, self.unloaded).state.accumulated
-        return np.maximum(recovery(self.system.full(body)) @ strain, 0.0)
+        return Nodal(self.system).plastic_strain(body, self.unloaded)
 
     def contact(
         self, pair: int = 0, stage: Stage = "loaded"

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.fem.substructure import Substructure
 from solver.results.audit.law import increment_error
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ class AuditedBody:
     @property
     def meshed(self) -> bool:
         """Whether the increments solved for all of its nodes, and kept its internal variables."""
-        return not isinstance(self.part, Substructure)
+        return self.part.meshed
 
     def _strain(self, state: State) -> Array:
         """Return Mandel strain (4, n_points), from the displacements."""

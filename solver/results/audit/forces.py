@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.candidates import find_candidates
-from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
 from solver.results.audit.surfaces import deformed
 
@@ -34,8 +33,7 @@ def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
     out = {}
     for i, (body, part) in enumerate(zip(system.model.bodies, system.parts, strict=True)):
         force = candidates.on_part(i, candidates.forces, part.n)
-        whole = part.on_whole(force) if isinstance(part, Substructure) else force
-        out[body.name] = whole.reshape(-1, 2)
+        out[body.name] = part.on_whole(force).reshape(-1, 2)
     return out
 
 
