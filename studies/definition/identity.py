@@ -84,7 +84,8 @@ def written(scene: Scene) -> list[list[str]]:
     for item in fields(scene):
         value = getattr(scene, item.name)
         given += value if isinstance(value, tuple) else [value]
-    functions = [getattr(each, "func", each) for each in given if callable(each)]
+    called = [getattr(each, "func", each) for each in given if callable(each)]
+    functions = [each if hasattr(each, "__qualname__") else type(each) for each in called]
     modules = {each.__module__ for each in functions}
     digests = {name: _module_digest(name) for name in modules}
     return [[each.__qualname__, digests[each.__module__]] for each in functions]
