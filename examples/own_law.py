@@ -90,12 +90,12 @@ LENGTH, TENSION = 10.0, 400.0
 plastic = -np.log(1 - (TENSION - law.yield_stress) / law.growth) / law.rate
 total = TENSION / steel.youngs_modulus + plastic
 
-for state in ("plane_stress", "axisymmetric", "plane_strain"):
+for kinematics in ("plane_stress", "axisymmetric", "plane_strain"):
     bar = Body(
         name="bar",
         mesh=grid(np.linspace(0, 2, 3), np.linspace(0, LENGTH, 5)),
         material=law,
-        state=state,
+        kinematics=kinematics,
         supports={"bottom": "y", "left": "x"},
         pressure={"top": -TENSION},
     )
@@ -104,7 +104,7 @@ for state in ("plane_stress", "axisymmetric", "plane_strain"):
     assert audit.passed, audit.violations
     kept = solution.plastic_strain("bar")
     xx, yy, zz, xy = solution.stress("bar", "loaded")
-    if state == "plane_strain":  # the bar cannot get thinner along z, and is stronger
+    if kinematics == "plane_strain":  # the bar cannot get thinner along z, and is stronger
         assert np.all(zz > 100.0)
         assert kept.max() < plastic
     else:
@@ -114,4 +114,4 @@ for state in ("plane_stress", "axisymmetric", "plane_strain"):
         assert np.allclose(kept, plastic, rtol=1e-9)
     mises = np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
     assert np.allclose(mises, law.curve(kept), rtol=1e-9)
-    print(f"{state}: von Mises {mises.mean():.2f} MPa, plastic strain {kept.mean():.5f}")
+    print(f"{kinematics}: von Mises {mises.mean():.2f} MPa, plastic strain {kept.mean():.5f}")

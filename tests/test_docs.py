@@ -4,7 +4,8 @@ The blocks of a page run from top to bottom in one empty directory that holds a 
 studies ready to run; so do those of every page that has any. ``python`` blocks are programs; in
 ``console`` blocks each line ``$ residua …`` runs and must succeed. A block after
 ``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
-minutes. Links lead to files and headings that exist, and so do the files a page names.
+minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that
+script, which is. Links lead to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from tests.architecture.test_layers import LAYERS
 
 TEXTS = [path for path in tracked() if path.suffix == ".md"]
 BLOCK = re.compile(
-    r"(?P<skip><!-- no-test -->\n+)?^```(?P<language>python|console)\n(?P<text>.*?)^```",
+    r"(?P<skip><!-- no-test -->\n+)?"
+    r"(?:<!-- from (?P<script>examples/\w+\.py) -->\n+)?"
+    r"^```(?P<language>python|console)\n(?P<text>.*?)^```",
     re.DOTALL | re.MULTILINE,
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
@@ -46,9 +49,12 @@ class Block:
     text: str
     line: int
     skipped: bool
+    script: str = ""
 
     def programs(self) -> list[list[str]]:
         """Arguments for the interpreter, one list a program."""
+        if self.script:
+            return []
         if self.language == "python":
             # Empty lines in front: a traceback then names the line of the page.
             return [["-c", "\n" * self.line + self.text]]
@@ -64,6 +70,7 @@ def blocks(text: str) -> list[Block]:
             text=match["text"],
             line=text.count("\n", 0, match.start("text")),
             skipped=match["skip"] is not None,
+            script=match["script"] or "",
         )
         for match in BLOCK.finditer(text)
     ]
@@ -100,6 +107,26 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
 def test_only_costly_blocks_are_left_out(page: Path) -> None:
     left_out = [block for block in blocks((ROOT / page).read_text()) if block.skipped]
     assert not [block.line for block in left_out if not COSTLY.search(block.text)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_quoted_lines_stand_in_the_script(page: Path) -> None:
+    quoted = [block for block in blocks((ROOT / page).read_text()) if block.script]
+    assert not [block.line for block in quoted if missing(block, ROOT)]
+
+
+def missing(block: Block, root: Path) -> bool:
+    """Whether the lines of a block do not stand together in the script they are from."""
+    return f"\n{block.text}" not in f"\n{(root / block.script).read_text()}"
+
+
+def test_a_line_that_is_not_in_the_script_is_found(tmp_path: Path) -> None:
+    (tmp_path / "examples").mkdir()
+    (tmp_path / "examples" / "a.py").write_text("x = 1\ny = 2\nz = 3\n")
+    head = "<!-- from examples/a.py -->\n```python\n"
+    page = f"{head}y = 2\nz = 3\n```\n{head}y = 2\nz = 4\n```\n{head}= 2\n```\n"
+    assert [missing(block, tmp_path) for block in blocks(page)] == [False, True, True]
+    assert not [block.programs() for block in blocks(page) if block.programs()]
 
 
 def test_every_kind_of_block_is_found() -> None:

@@ -38,6 +38,7 @@ class Record:
         or labels (``component``, ``stage``, ``body``)
     fields : variable name -> (dimension names, values); NaN outside the bodies
     scalars : variable name -> number, audit figures included
+    symmetric : whether the bodies are one half of what is symmetric about x = 0
     """
 
     parameters: object
@@ -46,3 +47,4 @@ class Record:
     coordinates: Mapping[str, np.ndarray] = field(default_factory=dict)
     fields: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = field(default_factory=dict)
     scalars: Mapping[str, float] = field(default_factory=dict)
+    symmetric: bool = False

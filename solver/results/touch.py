@@ -120,10 +120,32 @@ class Prescribed:
         return centre
 
 
+class Nothing:
+    """No contact and no travelling pressure: such a scene lists no output of contact."""
+
+    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+        """See `Touch`."""
+        nowhere = np.full_like(x, np.nan)
+        return nowhere, nowhere, nowhere
+
+    def extent(self, converged: Converged) -> tuple[float, float]:
+        """See `Touch`."""
+        return np.nan, np.nan
+
+    def force(self, converged: Converged) -> float:
+        """See `Touch`."""
+        return np.nan
+
+    def centre(self, converged: Converged) -> float:
+        """See `Touch`."""
+        return 0.0
+
+
 def touch_of(system: System, *, symmetric: bool) -> Touch:
-    """Return what acts between the bodies of a system, or on its only one."""
+    """Return what acts between the bodies of a system, or on one of them."""
     if system.interfaces:
         return Contact(system, symmetric=symmetric)
-    (body,) = system.model.bodies
-    assert body.travelling is not None
-    return Prescribed(body.travelling, system.full(body.name).period)
+    for body in system.model.bodies:
+        if body.travelling is not None:
+            return Prescribed(body.travelling, system.full(body.name).period)
+    return Nothing()

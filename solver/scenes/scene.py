@@ -124,6 +124,7 @@ class Scene:
                 if q.dims and not q.coordinate
             },
             scalars={q.name: value for q, value in values.items() if not q.dims},
+            symmetric=look.view.symmetric,
         )
 
 

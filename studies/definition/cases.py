@@ -9,7 +9,7 @@ from typing import Any
 
 from solver.errors import ModelError
 from solver.scenes import Scene
-from studies.definition.identity import content_id
+from studies.definition.identity import content_id, written
 from studies.definition.parameters import build, parameters_of
 from studies.errors import StudyError
 
@@ -65,6 +65,7 @@ def cases_of(
     """
     defaults = {name: known.default for name, known in parameters_of(scene).items()}
     positions = [range(len(values)) for values in axes.values()]
+    source = written(scene)
     for index in itertools.product(*positions):
         point = {name: values[i] for (name, values), i in zip(axes.items(), index, strict=True)}
         given = {**defaults, **fixed, **point}
@@ -72,15 +73,16 @@ def cases_of(
             parameters = build(scene, given)
         except ModelError as error:
             raise _located(scene, error, point, dict(zip(axes, index, strict=True))) from error
-        yield Case(content_id("run", scene.name, given), parameters, given, index)
+        yield Case(content_id("run", scene.name, given, source), parameters, given, index)
 
 
 def loading_paths(scene: Scene, points: Iterable[Case]) -> list[LoadingPath]:
     """Group `points` that differ in nothing but the branch parameter of the scene."""
     groups: dict[str, list[Case]] = {}
+    source = written(scene)
     for case in points:
         shared = {name: value for name, value in case.values.items() if name != scene.branch}
-        groups.setdefault(content_id("path", scene.name, shared), []).append(case)
+        groups.setdefault(content_id("path", scene.name, shared, source), []).append(case)
     return [
         LoadingPath(
             key, group[0].parameters, tuple(sorted(group, key=lambda c: c.values[scene.branch]))

@@ -1,20 +1,26 @@
 """Names made from content: the same parameters and the same solver give the same id.
 
 A change of the solver that may change a number, a name or a unit changes every id, so that no old
-run is taken for a new one. A change of words alone changes none: `studies.definition.meaning` says
-what words are.
+run is taken for a new one; a change of a scene of the user's own changes the ids of its runs. A
+change of words alone changes none: `studies.definition.meaning` says what words are.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import re
+import sys
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import solver
+
+if TYPE_CHECKING:
+    from solver.scenes import Scene
 
 ID_PATTERN = re.compile(r"[0-9a-f]{32}")
 
@@ -64,6 +70,42 @@ def solver_hash() -> str:
     files |= {f"studies/{name}": here / name for name in FORM}
     digests = {name: _digest(meaning(path.read_bytes()).encode()) for name, path in files.items()}
     return _digest(json.dumps(digests, sort_keys=True).encode())
+
+
+def written(scene: Scene) -> list[list[str]]:
+    """Return what a scene is put together of, for `content_id`.
+
+    These are the names of its parameters and functions, each with the digest of the module that it
+    is written in, where this is none of the solver's. Of a script counts what workers see of it:
+    not what stands under ``if __name__ == "__main__":``. What the module imports does not count,
+    and code without a file, such as a cell of a notebook, has no digest.
+    """
+    given: list[Any] = [type(scene)]
+    for item in fields(scene):
+        value = getattr(scene, item.name)
+        given += value if isinstance(value, tuple) else [value]
+    called = [getattr(each, "func", each) for each in given if callable(each)]
+    functions = [each if hasattr(each, "__qualname__") else type(each) for each in called]
+    modules = {each.__module__ for each in functions}
+    digests = {name: _module_digest(name) for name in modules}
+    return [[each.__qualname__, digests[each.__module__]] for each in functions]
+
+
+def _module_digest(name: str) -> str:
+    """Return the digest of a module's source but for its words; nothing for one of the solver."""
+    file = getattr(sys.modules.get(name), "__file__", None)
+    if file is None or Path(file).is_relative_to(Path(solver.__file__).parent):
+        return ""
+    from studies.definition.meaning import meaning
+
+    tree = ast.parse(Path(file).read_bytes())
+    tree.body = [each for each in tree.body if not _only_as_script(each)]
+    return _digest(meaning(ast.unparse(tree)).encode())
+
+
+def _only_as_script(statement: ast.stmt) -> bool:
+    names = ast.walk(statement.test) if isinstance(statement, ast.If) else ()
+    return any(isinstance(each, ast.Name) and each.id == "__name__" for each in names)
 
 
 def _digest(data: bytes) -> str:

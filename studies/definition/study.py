@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError,
 
 from solver.scenes import SCENES
 from studies.definition.cases import Case, LoadingPath, loading_paths
-from studies.definition.identity import content_id
+from studies.definition.identity import content_id, written
 from studies.definition.parameters import one_of, parameters_of, scene_named
 from studies.definition.sweep import (
     Axes,
@@ -114,7 +114,8 @@ class Study(BaseModel):
             name: list(axis.items()) if isinstance(axis, dict) else axis
             for name, axis in self.sweep.items()
         }
-        return content_id("study", self.name, self.scene, self.fixed, axes)
+        source = written(SCENES[self.scene])
+        return content_id("study", self.name, self.scene, self.fixed, axes, source)
 
     @property
     def fixed(self) -> dict[str, Any]:

@@ -16,6 +16,9 @@ OK = STATUSES[Status.OK.code]
 ERROR = "error"
 MISSING = "missing"
 
+SYMMETRIC = "symmetric"
+"""Attribute of a file: 1 where the bodies are one half of what is symmetric about x = 0, else 0."""
+
 LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
     "status": {
         "long_name": "outcome of the run",

@@ -16,7 +16,7 @@ from solver.scenes import SCENES, Scene
 from studies.definition.cases import Case
 from studies.definition.parameters import parameters_of
 from studies.definition.study import Study
-from studies.definition.vocabulary import MISSING, STATUSES
+from studies.definition.vocabulary import MISSING, STATUSES, SYMMETRIC
 from studies.storage import dataset as layout
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.store import Store, appearing
@@ -36,7 +36,8 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> Path:
     as they do when a length is swept, runs are matched by position, and the coordinate becomes a
     variable over the sweep, so that ``x`` of each run stays with the run. Shorter grids are
     filled up with NaN. Runs without a record are NaN, and `status` says why. The attributes
-    tell what ran to compute the runs, which may have been elsewhere.
+    tell what ran to compute the runs, which may have been elsewhere, and whether all runs are one
+    half of symmetric bodies.
     """
     scene = SCENES[study.scene]
     target = store.dataset_path(study.id)
@@ -44,13 +45,17 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> Path:
     axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
     frame = _Frame(axes=axes, usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
+    halves: set[int] = set()
     for case in found:
         with h5py.File(store.run_path(case.id), "r") as run:
             frame.learn(run)
             ran.add(what_ran(run.attrs))
+            if SYMMETRIC in run.attrs:  # a run without a record does not know
+                halves.add(int(run.attrs[SYMMETRIC].item()))
     attributes = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
+    symmetric = {SYMMETRIC: int(halves == {1})}
     with appearing(target) as part, h5netcdf.File(part, "w") as file:
-        file.attrs.update(attributes)
+        file.attrs.update(attributes | symmetric)
         frame.create_axes(file, scene)
         frame.create_fields(file)
         for case in found:

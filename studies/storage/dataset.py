@@ -14,7 +14,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import USUAL_AXES, Case
 from studies.definition.parameters import parameters_of
-from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES
+from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES, SYMMETRIC
 from studies.storage.provenance import provenance
 
 INTEGER_FILL = -1
@@ -46,6 +46,7 @@ def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
     ones = (1,) * len(sweep)
     status = STATUSES[record.status.code]
     dataset = _frame(scene, case, sweep, status, record.message)
+    dataset.attrs[SYMMETRIC] = int(record.symmetric)
     for name, labels in record.coordinates.items():
         dataset[name] = (name, np.asarray(labels), attributes_of(name))
     for name, (dimensions, values) in record.fields.items():

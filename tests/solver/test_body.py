@@ -8,10 +8,10 @@ import pytest
 from solver import Body, ContactPair, Material, Model, ModelError, solve
 from solver.fem.discretisation import Discretisation
 from solver.mesh import graded, grid, mapped
+from solver.mesh.elements import ELEMENTS
 from solver.tensors import SQRT2
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
-ELEMENTS = ["quad8", "quad9", "quad4", "tri6", "tri3"]
 STATES = ["plane_strain", "plane_stress", "axisymmetric"]
 
 

@@ -9,10 +9,10 @@ from solver import Body, Material
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, error_estimate, recovery
 from solver.mesh import graded, grid, mapped
+from solver.mesh.elements import ELEMENTS
 from solver.tensors import SQRT2, to_tensor, von_mises
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
-ELEMENTS = ["quad8", "quad9", "quad4", "tri6", "tri3"]
 
 
 def square(element="quad8", n=5, curved=False, **fields):

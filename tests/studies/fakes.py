@@ -91,8 +91,9 @@ def troubled(run: FakeParameters) -> Record:
     if run.trouble == "limit":
         known = {"x": record(run).coordinates["x"]}
         return Record(
-            parameters=run, status=Status.LIMIT_LOAD, message="flows at 0.75", coordinates=known
-        )
+            parameters=run, status=Status.LIMIT_LOAD, message="flows at 0.75", coordinates=known,
+            symmetric=True,
+        )  # fmt: skip
     if run.trouble == "warn":
         return replace(record(run), message="strains are large")
     if run.trouble == "unwritable" and run.load_ratio < 1.0:
@@ -152,6 +153,7 @@ def record(run: FakeParameters) -> Record:
             "cpu_seconds": run.seconds,
             "audit_balance": 1e-12,
         },
+        symmetric=True,
     )
 
 

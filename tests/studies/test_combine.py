@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import netCDF4
@@ -40,6 +41,20 @@ def test_every_point_of_the_sweep_is_the_run_that_was_computed(computed: Compute
             assert one["status"].item() == STATUSES.index("ok")
         assert together["residual_stress"].attrs["units"] == "MPa"
         assert together["status"].dtype == np.int8
+
+
+@pytest.mark.parametrize(("halves", "told"), [((1, 1), 1), ((0, 0), 0), ((0, 1), 0), ((), 0)])
+def test_a_study_is_of_symmetric_bodies_where_all_its_runs_are(
+    store: Store, halves: tuple[int, ...], told: int
+) -> None:
+    study = fake_study(sweep={"friction": [0.0, 0.1]})
+    cases = list(study.cases())
+    for case, half in zip(cases, halves, strict=False):
+        given = replace(record(case.parameters), symmetric=bool(half))
+        store.write_run(run_dataset(FAKE, case, given))
+    store.save_study(study)
+    with open_netcdf(combine(study, store, cases)) as together:
+        assert together.attrs["symmetric"] == told
 
 
 def test_what_ran_is_told_of_all_runs_though_others_combine_them(

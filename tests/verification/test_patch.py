@@ -7,6 +7,7 @@ import pytest
 
 from solver import ContactPair, Model, solve
 from solver.mesh import grid, mapped
+from solver.mesh.elements import ELEMENTS
 from solver.tensors import to_tensor
 from tests.verification.bodies import NU, block, cells, steel
 
@@ -14,7 +15,6 @@ P = 100.0
 ROUNDING = 1e-10
 """Of the pressure: condition number of the stiffness (1e4) times machine precision, and room."""
 
-ELEMENTS = ["quad8", "quad9", "quad4", "tri6", "tri3"]
 SLAVE = np.linspace(0.0, 10.0, 11)
 MASTER = np.append(np.arange(14) * 0.7, 10.0)  # edges of 0.7, the last 0.9
 

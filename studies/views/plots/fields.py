@@ -7,6 +7,7 @@ import math
 import xarray as xr
 
 from studies.definition.parameters import one_of
+from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError
 
 MAP = ("y", "x")
@@ -52,18 +53,23 @@ def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:
     return values.sel(component=component or known[0])
 
 
-def focus(run: xr.Dataset, along: xr.DataArray, zoom: float) -> float:
+def is_half(run: xr.Dataset) -> bool:
+    """Whether one half of symmetric bodies was computed, as its scene declares."""
+    return bool(run.attrs.get(SYMMETRIC, 0))
+
+
+def focus(run: xr.Dataset, zoom: float) -> float:
     """Return the place along the surface that a zoom is about [mm]: the centre of the contact.
 
-    Where one half of symmetric bodies was computed, the grid ends at this centre: then it is the
-    edge of the contact.
+    Where one half of symmetric bodies was computed, this centre is the end of the grid: then it is
+    the edge of the contact.
 
     Raises
     ------
     StudyError
         when it is the edge, and the run does not know it
     """
-    if float(along.min()) < 0.0:
+    if not is_half(run):
         return 0.0
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else math.nan
     if not math.isfinite(edge):

@@ -51,7 +51,7 @@ def line_figure(
     values = _told_apart(values, [name for name in values.dims if name != along])
     others = [name for name in values.dims if name != along]
     if zoom is not None:
-        middle = focus(run, values["s"], zoom) if along == "s" else 0.0
+        middle = focus(run, zoom) if along == "s" else 0.0
         values = values.where(abs(values[along] - middle) <= zoom, drop=True)
         if values.sizes[along] < 2:
             raise too_close(zoom)

@@ -8,7 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.views.plots.captions import capitalised, label, setting, wrapped
-from studies.views.plots.fields import check_field, component_of, focus, map_fields, too_close
+from studies.views.plots.fields import (
+    check_field,
+    component_of,
+    focus,
+    is_half,
+    map_fields,
+    too_close,
+)
 from studies.views.reading import one_run
 
 SIGNED = "RdBu_r"
@@ -49,7 +56,10 @@ def map_figure(
     check_field(field, map_fields(run))
     values = component_of(run[field], component).transpose("y", "x")
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
-    values = whole(values) if zoom is None else _near(values, focus(run, values["x"], zoom), zoom)
+    if zoom is not None:
+        values = _near(values, focus(run, zoom), zoom)
+    elif is_half(run):
+        values = whole(values)
     signed = "component" in values.coords
     high, note = _limit(values, signed)
     width, height = _size(values)
@@ -86,14 +96,11 @@ def map_figure(
 
 
 def whole(values: xr.DataArray) -> xr.DataArray:
-    """Return a map of both halves of the bodies, where one half was computed.
+    """Return a map of both halves of bodies that are symmetric about x = 0, from the half x >= 0.
 
-    A grid whose first column ends at, or lies on, x = 0 is that of bodies symmetric about this
-    line, or about this axis. Shear across it changes sign on the other side.
+    Shear across this line, or this axis, changes sign on the other side. A column on it stays one.
     """
     x = values["x"].to_numpy()
-    if len(x) < 2 or not np.isclose(x[0], [0.0, (x[1] - x[0]) / 2], atol=1e-6 * x[-1]).any():
-        return values
     component = str(values["component"].item()) if "component" in values.coords else ""
     sign = -1.0 if component.count("x") == 1 else 1.0
     other = sign * values.isel(x=slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1))

@@ -128,8 +128,8 @@ def test_a_field_is_selected_along_its_own_dimensions(
 def test_zoom_of_a_line_is_about_the_centre_of_a_contact_computed_whole() -> None:
     run = grid_map(np.arange(1.0, 4.0), np.arange(-3.0, 0.0))
     run["contact_half_width"] = 8.0
-    for first, middle in ((-20.0, 0.0), (0.0, 8.0)):
-        one = run.assign_coords(s=first + np.arange(40.0))
+    for symmetric, middle in ((0, 0.0), (1, 8.0)):
+        one = run.assign_coords(s=np.arange(-20.0, 20.0)).assign_attrs(symmetric=symmetric)
         one["pressure"] = (("s",), np.ones(40))
         limits = line_figure(one, "pressure", zoom=5.0).axes[0].get_xlim()
         assert limits == (middle - 5.0, middle + 5.0)

@@ -32,13 +32,19 @@ def texts_of(sheet: Figure) -> str:
     return " ".join(texts).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def grid_map(x: np.ndarray, y: np.ndarray, component: str | None = None) -> xr.Dataset:
+def grid_map(
+    x: np.ndarray, y: np.ndarray, component: str | None = None, *, symmetric: bool = False
+) -> xr.Dataset:
     """Return a successful run with one map that is different everywhere."""
     values = 1.0 + np.arange(y.size * x.size, dtype=float).reshape(y.size, x.size)
     run = xr.Dataset(
         {"status": 0, "message": "", "contact_half_width": x.max() / 2},
         coords={"x": ("x", x, {"units": "mm"}), "y": ("y", y, {"units": "mm"})},
-        attrs={"scene": "fake", "parameters": '{"state": "plane_strain"}'},
+        attrs={
+            "scene": "fake",
+            "parameters": '{"state": "plane_strain"}',
+            "symmetric": int(symmetric),
+        },
     )
     attributes = {"long_name": "a quantity with a long name", "units": "MPa"}
     if component is None:
@@ -82,7 +88,7 @@ def test_a_strain_map_begins_at_zero_and_shows_the_values_as_they_are(
     ("component", "sign"), [(None, 1), ("xx", 1), ("yz", 1), ("xy", -1), ("zx", -1)]
 )
 def test_half_a_body_is_drawn_whole(first: float, component: str | None, sign: int) -> None:
-    run = grid_map(first + np.arange(6.0), np.arange(-4.0, 0.0), component)
+    run = grid_map(first + np.arange(6.0), np.arange(-4.0, 0.0), component, symmetric=True)
     values = run["quantity"].isel(component=0) if component else run["quantity"]
     both = whole(values)
     assert both.sizes["x"] == (12 if first else 11)
@@ -95,10 +101,24 @@ def test_half_a_body_is_drawn_whole(first: float, component: str | None, sign: i
     np.testing.assert_array_equal(drawn, both)
 
 
-@pytest.mark.parametrize("first", [-5.0, 2.0])
-def test_a_whole_body_is_drawn_as_it_is(first: float) -> None:
-    values = grid_map(first + np.arange(11.0), np.arange(3.0))["quantity"]
-    assert whole(values) is values
+@pytest.mark.parametrize("first", [-5.0, 0.0, 0.5, 2.0])
+def test_bodies_that_are_not_said_to_be_symmetric_are_drawn_as_they_are(first: float) -> None:
+    run = grid_map(first + np.arange(11.0), np.arange(3.0))
+    for given in (run, run.drop_attrs(deep=False).assign_attrs(scene="fake", parameters="{}")):
+        drawn = np.asarray(mesh_of(map_figure(given, "quantity"))[1].get_array())
+        np.testing.assert_array_equal(drawn, run["quantity"])
+
+
+def test_the_stored_run_and_its_study_say_that_half_the_bodies_were_computed(
+    computed: ComputedStudy,
+) -> None:
+    study, store = computed
+    with open_netcdf(store.run_path(next(study.cases()).id)) as run:
+        assert run.attrs["symmetric"] == 1
+    with open_study(store.directory) as together:
+        assert together.attrs["symmetric"] == 1
+        x = mesh_of(map_figure(together, "residual_stress"))[0].get_xlim()
+    assert x[0] == -x[1]
 
 
 @pytest.mark.parametrize("size", [(0.5, 6.0), (1.0, 1.0), (9.0, 0.5), (1e-3, 2e-3), (1e4, 3e4)])
@@ -150,7 +170,7 @@ def test_zoom_is_about_the_centre_of_a_contact_computed_whole() -> None:
 
 
 def test_zoom_to_an_edge_that_is_not_known_says_what_is_missing() -> None:
-    run = grid_map(np.arange(20.0), np.arange(-20.0, 0.0))
+    run = grid_map(np.arange(20.0), np.arange(-20.0, 0.0), symmetric=True)
     run["contact_half_width"] = np.nan
     for given in (run, run.drop_vars("contact_half_width")):
         with pytest.raises(StudyError, match="this run has no contact_half_width: leave it out"):

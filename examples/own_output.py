@@ -1,0 +1,46 @@
+"""An output of one's own, added to a scene of the package: how deep the half-plane has yielded.
+
+Run it with ``python examples/own_output.py``. What an output gives is declared once: its name,
+what it is, its unit. Data sets and pictures read this declaration.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver import SCENES, Status
+from solver.results.look import Look, Values
+from solver.results.quantities import QUANTITIES, declare
+
+PUNCH = SCENES["punch"]
+
+YIELDED_DEPTH = declare(
+    "yielded_depth", "depth to which the half-plane has yielded below the middle of the punch", "mm"
+)
+
+
+def yielded_depth(look: Look) -> Values:
+    """Return the largest depth [mm] with plastic strain at the first station, x = 0."""
+    _, strain = look.samples.profile(look.unloaded)  # over station and depth
+    yielded = look.view.depth[strain[0] > 1e-6]
+    return {YIELDED_DEPTH: float(yielded.max(initial=0.0))}
+
+
+# A scene under a name of its own. To add it to SCENES makes it known to studies.
+scene = replace(PUNCH, name="punch_depth", outputs=(*PUNCH.outputs, yielded_depth))
+SCENES[scene.name] = scene
+
+# A scene walks one path for several values of its branch parameter, here the load.
+coarse = scene.parameters(smallest_element=0.05, growth=2.5, load_step=0.15, hardening="isotropic")
+records = list(scene.path(coarse, values=[0.6, 1.2, 1.4], monitor=lambda fraction: None))
+
+known = QUANTITIES["yielded_depth"]
+print(f"{known.long_name} [{known.units}]")
+for record in records:
+    assert record.status is Status.OK, record.message
+    print(f"load ratio {record.parameters.load_ratio}: {record.scalars['yielded_depth']:.1f}")
+
+depths = np.array([record.scalars["yielded_depth"] for record in records])
+assert depths[0] == 0.0, "at this load only the corner yields"
+assert (np.diff(depths) > 0).all(), "the more load, the deeper"
+assert depths[-1] < coarse.half_plane_size * coarse.half_width
