@@ -1,9 +1,11 @@
 """Elastic-plastic bodies in frictional contact, and the residual stress they keep.
 
-`Body` (mesh + element + state + `Material` + supports + pressure) and `ContactPair` make a
-`Model`; a `System` is the model discretised; a `Path` walks its load in increments, each solved
-with plasticity outside and contact inside, and releases it; a `Solution` or, for the named
-`SCENES`, a `Record` is what remains. Numbers are in N, mm, MPa; tension is positive; y is up.
+`Body` (mesh, element, kinematics, `Material`, supports, pressure) and `ContactPair` make a `Model`;
+a `System` is the model discretised. A `Program` of `Stage`s is its loading history. A `Walker`
+solves it increment by increment, with plasticity in the outer iteration and contact in the inner
+one, and gives an `Outcome`. `solve` does this for a model of your own and returns a `Solution`; a
+`Scene` of `SCENES` gives a `Record` for each run. Numbers are in N, mm, MPa; tension is positive; y
+points up.
 """
 
 from solver.contact.system import System

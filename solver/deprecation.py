@@ -1,4 +1,4 @@
-"""Old names that work for one release more."""
+"""Old names that still work for one release, with a warning."""
 
 from __future__ import annotations
 
@@ -13,10 +13,17 @@ _Class = TypeVar("_Class", bound=type)
 
 
 def renamed(**names: str) -> Callable[[_Class], _Class]:
-    """Return a class decorator that takes old names of arguments and attributes: old = new."""
+    """Return a class decorator that still accepts old names: ``renamed(old="new")``.
+
+    An old name, of an argument or of an attribute, stands for the new one and gives a
+    `DeprecationWarning`.
+    """
 
     def told(kind: type, old: str) -> None:
-        text = f"{kind.__name__}.{old} is called {kind.__name__}.{names[old]} now"
+        text = (
+            f"{kind.__name__}.{old} is called {kind.__name__}.{names[old]} now: use the new name, "
+            "the old one will be removed"
+        )
         warnings.warn(text, DeprecationWarning, stacklevel=3)
 
     def decorate(kind: _Class) -> _Class:

@@ -1,4 +1,4 @@
-"""What can go wrong, told apart."""
+"""The exceptions of this package."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ class SolverError(Exception):
 
 
 class ModelError(SolverError, ValueError):
-    """Bad input: which field, which value, what is allowed.
+    """Bad input; the message says which field, which value and what is allowed.
 
     Parameters
     ----------
@@ -30,7 +30,8 @@ class ModelError(SolverError, ValueError):
 class NotConverged(SolverError):
     """The iteration failed although an equilibrium may exist.
 
-    ``reached`` is the last load factor in equilibrium, ``attempted`` the next one tried.
+    ``reached`` is the time of the last converged increment, ``attempted`` that of the increment
+    that failed. Time is the load factor where the pressures of the bodies have no amplitude.
     """
 
     def __init__(self, message: str, reached: float = 0.0, attempted: float = 0.0) -> None:
@@ -43,4 +44,4 @@ class NotConverged(SolverError):
 
 
 class LimitLoad(NotConverged):
-    """The structure has no equilibrium above ``reached``: it flows plastically at constant load."""
+    """The load cannot grow beyond ``reached``: the structure flows plastically at constant load."""

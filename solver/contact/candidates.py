@@ -1,4 +1,4 @@
-"""The contact points of a system at given displacements, as rows of one dense problem."""
+"""Candidates: the vertices near contact at given displacements, with gaps, slips and rows."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MARGIN = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Derivative rows of all gaps (and slips) on the unknowns ``dofs`` of one part."""
+    """Derivatives of all gaps (and slips) with respect to the unknowns ``dofs`` of one part."""
 
     dofs: NDArray[np.int64]
     block: NDArray[np.float64]
@@ -38,16 +38,16 @@ class Candidates:
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
-    friction : (n,) coefficient; zero where the vertex had no contact before and nothing is
-        known of its approach: it then starts without tangential force
-    limit : (n,) largest tangential force whatever the normal one [N]
+    friction : (n,) coefficient; zero at a vertex that had no contact before and whose approach
+        is not known: it starts without tangential force
+    limit : (n,) largest tangential force at any normal force [N]
     motion : (n or 2n,) gap, and slip when there is friction [mm]
     apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
     status : (n,) of the current iterate
-    rows : one a part, None for a part without contact surface
+    rows : one per part, None for a part without contact surface
     covered : for each interface, the share of the hats of its candidates that faces the master
-    gaps : for each interface, the gap of all of its vertices, inf where nothing faces [mm]
+    gaps : for each interface, the gap of all its vertices, inf where no master faces them [mm]
     beyond : smallest gap of the vertices that are not candidates [mm]
     """
 
@@ -77,14 +77,14 @@ class Candidates:
         return nodal
 
     def of_part(self, part: int, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gaps and slips that displacements ``u`` (n, ...) of a part make [mm]."""
+        """Return the gaps and slips that displacements ``u`` (n, ...) of a part cause [mm]."""
         rows = self.rows[part]
         if rows is None:
             return np.zeros((len(self.motion), *u.shape[1:]))
         return np.asarray(rows.block @ u[rows.dofs])
 
     def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
-        """Return W: how contact forces move the contact points [mm/N]."""
+        """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""
         W = np.zeros((len(self.motion), len(self.motion)))
         for operator, rows in zip(operators, self.rows, strict=True):
             if rows is not None:
@@ -111,8 +111,8 @@ class Candidates:
     def work(self, before: tuple[ContactState, ...]) -> tuple[float, float]:
         """Return the work of friction and of the bodies against contact in an increment [N mm].
 
-        By the mean of the forces before and now. Contact takes no work but where vertices open or
-        close on the way, and that only as far as the mean is not the path.
+        Forces are the mean of those before and after. Contact then takes work only at vertices
+        that open or close within the increment, where the mean is not the true history.
         """
         normal, friction, at = 0.0, 0.0, 0
         for state, vertices, gap in zip(before, self.vertices, self.gaps, strict=True):
@@ -135,7 +135,7 @@ class Candidates:
         forces: NDArray[np.float64],
         status: NDArray[np.int64],
     ) -> tuple[ContactState, ...]:
-        """Return the contact states that hold these forces and statuses."""
+        """Return the contact states with these forces and statuses."""
         out, at = [], 0
         for state, vertices in zip(before, self.vertices, strict=True):
             here = slice(at, at + len(vertices))
@@ -150,7 +150,7 @@ class Candidates:
         return tuple(out)
 
     def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
-        """Return the contact states after an increment over ``span`` of load."""
+        """Return the contact states after an increment over ``span`` of time."""
         out, at = [], 0
         rate = 1 / span if span else np.nan
         after = self.states(before, self.forces, self.status)
@@ -168,7 +168,7 @@ class Candidates:
 
 
 def no_candidates(system: System) -> Candidates:
-    """Return the empty set: bodies taken apart."""
+    """Return no candidates: the bodies are taken apart."""
     empty = np.zeros(0)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
@@ -185,10 +185,10 @@ def find_candidates(
     contacts: tuple[ContactState, ...],
     span: float = 0.0,
 ) -> Candidates:
-    """Return the candidates at displacements ``u``, the load having grown by ``span``.
+    """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if the last increment tells how it came near.
+    it touched, if the rates of its approach are known from the last increment.
     """
     pairings = [interface.pairing(u) for interface in system.interfaces]
     vertices = [
@@ -212,7 +212,7 @@ def find_candidates(
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
         if interface.floating and len(at) and not before.touching.any():
-            # nothing but its first point holds a body that comes to rest on it
+            # only the first point to touch can hold a floating body: it gets friction at once
             first_point = normal.start + before.gap[at].argmin()
             apart[first_point] = np.nan_to_num(apart[first_point])
         friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
@@ -251,9 +251,9 @@ def find_candidates(
 
 
 def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
-    """Return the slip (n,) until gaps that go on closing as they do are closed.
+    """Return the slip (n,) before contact, if gap and slip continue at their last rates.
 
-    NaN where a gap does not close, or not within ``span``, or nothing is known of it.
+    NaN where the gap does not close within ``span``, or its rates are not known.
     """
     gap, closing, sliding = approach[0], approach[1] * span, approach[2] * span
     share = np.divide(gap, -closing, out=np.full_like(gap, np.nan), where=closing < 0)
@@ -263,7 +263,7 @@ def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:
     """Return the vertices near contact.
 
-    A floating body comes down however far it is: its nearest vertex is near.
+    A floating body comes down from any distance: its nearest vertex always counts.
     """
     margin = _MARGIN * pairing.length
     if floating:
@@ -273,7 +273,7 @@ def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np
 
 
 def _join(pieces: list[Rows]) -> Rows | None:
-    """Return the rows of all surfaces of a part; unknowns that surfaces share stand once."""
+    """Return the rows of all surfaces of a part; unknowns that surfaces share occur once."""
     if not pieces:
         return None
     dofs, place = np.unique(np.concatenate([p.dofs for p in pieces]), return_inverse=True)

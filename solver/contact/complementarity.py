@@ -27,13 +27,13 @@ _TOLERANCE = LEAST_FRICTION
 _ROUNDING = 1e-14
 _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
-"""Of a least solution, which has rounding or, where there is no solution, what the least friction
-cannot balance."""
+"""Relative residual of a least-squares solution that may be rounding. Where there is no solution it
+is larger: the part of the load that contact cannot balance, even under the least friction."""
 _KNOWN = 1e-8
 
 
 def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
-    """Return the solution, or None when there is none (or none was found).
+    """Return the solution, or None when there is none or none was found.
 
     ``start`` (n,) is the status to begin with, usually that of the iteration before.
     """
@@ -77,14 +77,14 @@ def _forces(
     S[size:, :size] = problem.A.T @ P
     rhs = -np.concatenate([problem.offset[rows], problem.balance])
     rhs -= np.concatenate([problem.W[rows] @ known, problem.A.T @ known])
-    # forces and motions differ by the magnitude of the compliance: balance the rows
+    # forces and motions differ in size by the compliance: scale the rows
     weight = np.ones(size + k)
     if k and size:
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
     rhs *= weight
-    # fewer conditions than motions: the body is free to turn about the one point it stands on.
-    # A factor of that singular matrix turns it as rounding likes; the least solution does not
+    # fewer conditions than motions: the body can turn about the one point it stands on. Factors of
+    # the singular matrix would turn it by rounding; the least-squares solution does not turn it
     free = 0 < size < k
     if not free:
         _, _, solution, info = linalg.lapack.dgesv(S, rhs)
@@ -119,7 +119,7 @@ def _active_sets(
     n, mu = problem.n, problem.friction
     force, length = problem.scales
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
-    # under little friction a small part of what it carries, but no less than rounding
+    # under little friction: a small part of the force it carries, but not less than rounding
     tiny_shear = force * np.clip(_ACCURATE * mu, _ROUNDING, _TOLERANCE)
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
@@ -148,7 +148,7 @@ def _active_sets(
             new[keep & (status == STICK) & (T < -bound)] = FORWARD
             new[keep & (status == FORWARD) & (slip < -tiny_length)] = STICK
             new[keep & (status == BACKWARD) & (slip > tiny_length)] = STICK
-        # one at its limit stays there within the tolerance, so that rounding makes no cycle
+        # a point at its limit stays there within the tolerance: rounding must not make a cycle
         reached = mu * N - limit > np.where(capped, -tiny_force, tiny_force)
         reached &= (mu > 0) & (new > STICK)
         if np.array_equal(new, status) and np.array_equal(reached, capped):
@@ -158,14 +158,14 @@ def _active_sets(
 
 
 def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
-    """Solve passes with the friction bound of the pass before, each a convex problem.
+    """Solve in passes, each a convex problem with the friction bound of the pass before.
 
-    After every pass the active sets start once more from what it found, so that the answer is
-    exact and the passes need not converge themselves.
+    After every pass the active sets start again from its status, so that the solution is exact
+    and the passes themselves need not converge.
     """
     n, mu = problem.n, problem.friction
     force, _ = problem.scales
-    # from above: a motion that friction has to hold must find enough of it in every pass
+    # start with a large bound: in every pass friction must suffice to hold a floating body
     bound = problem.bound(np.full(n, force if len(problem.balance) else 0.0))
     for _ in range(_MAX_PASSES):
         solved = given_bound(problem, bound)
@@ -192,8 +192,8 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
 def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
     """Whether forces and motions meet all conditions.
 
-    A solution may be known that no status gives: where nothing turns a body, every rotation that
-    leaves its open points open is one.
+    Passes can find a solution that no set of statuses gives: where no force turns a body, every
+    rotation that keeps its open points open is a solution.
     """
     n, (force, length) = problem.n, problem.scales
     motion = problem.offset + problem.W @ F + problem.A @ q

@@ -1,8 +1,8 @@
-"""Contact must stay on its surfaces.
+"""Contact must stay on the surfaces of its pair.
 
-A surface is a chain of edges that its body's boundary may go on beyond. What comes into contact
-there is not known to the problem: a state in which contact has come to such an end is wrong,
-however well it is in balance. Where the body ends with the chain, at a corner, contact ends too.
+The boundary of a body may continue beyond the end of a contact surface. Contact there is not part
+of the problem, so a state in which contact has reached such an end is wrong, even in equilibrium.
+Where the surface ends at a corner of the body, contact ends there as well.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _COVERED = 1 - 1e-6
 
 
 def strayed(system: System, u: tuple[NDArray[np.float64], ...], candidates: Candidates) -> str:
-    """Return which surface contact has come to the end of, or nothing."""
+    """Return the message that contact has reached the end of a surface; empty if it has not."""
     first = 0
     for interface, vertices, covered in zip(
         system.interfaces, candidates.vertices, candidates.covered, strict=True
@@ -32,8 +32,8 @@ def strayed(system: System, u: tuple[NDArray[np.float64], ...], candidates: Cand
         if side is not None:
             body = interface.parts[side].body.name
             return (
-                f"contact has come to the end of the surface of body {body!r}, which goes on "
-                "beyond it: make the boundary of the contact pair longer"
+                f"contact has reached the end of the surface of body {body!r}, but the body goes "
+                "on beyond it: make the boundary of this contact pair longer"
             )
     return ""
 

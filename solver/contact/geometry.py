@@ -32,7 +32,7 @@ _MIN_COVERED = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Pairing:
-    """Contact kinematics at given positions, one row a slave vertex.
+    """Contact kinematics at given positions, one row per slave vertex.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Pairing:
     covered : (n,) share of the hat that faces the master
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
-        nothing faces the vertex
+        no master faces the vertex
     normal, tangent : pairs ``(slave, master)`` of (n, 2 n_nodes) derivative rows of gap and
         of slip (slave relative to master along the surface) on the surfaces' unknowns
     """
@@ -80,10 +80,10 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def _near(start: NDArray[np.float64], end: NDArray[np.float64]) -> tuple[NDArray[np.int64], ...]:
-    """Return where a line that passes an edge's ends at these signed distances may cross it.
+    """Return the edges that a line may cross, given its signed distances from their ends.
 
-    The chord decides, with room for the edge's curvature: at most `_BEYOND` edge half-lengths
-    past either end.
+    The line is tested against the chord, extended for the curvature of the edge: it may cross the
+    chord up to `_BEYOND` half-lengths from the middle.
     """
     return np.nonzero(np.abs(start + end) <= _BEYOND * np.abs(start - end))
 
@@ -176,7 +176,7 @@ def pair(
 ) -> Pairing:
     """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm].
 
-    What lies farther than ``reach`` [mm] behind the slave does not face it.
+    A master farther than ``reach`` [mm] behind the slave does not face it.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
     normals = vertex_normals(xs, slave)
@@ -214,7 +214,7 @@ def _integrate(
     distance: NDArray[np.float64],
     weight: NDArray[np.float64],
 ) -> Pairing:
-    """Sum the points into rows, one a slave vertex."""
+    """Sum the points into rows, one per slave vertex."""
     k = slave.edges.shape[1]
     Ns = shape_functions(xi, k)
     Nm = shape_functions(eta, master.edges.shape[1])

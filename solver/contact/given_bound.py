@@ -18,17 +18,15 @@ _PIVOTS_PER_UNKNOWN = 20
 def given_bound(
     problem: ContactProblem, bound: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return forces and rigid motions when |T| <= bound is given.
-
-    A convex problem, solved by Lemke's method.
+    """Return forces and rigid motions when |T| <= bound is given, or None if there are none.
 
     z = (N, tau, back), w = (gap, fore, sigma) with tau = T / bound + 1, sigma = 1 - T / bound
     and slip = fore - back: the matrix is positive semidefinite but for the scale of its
-    columns, so the method ends with a solution where one exists. In units of its bound a
-    tangential force is as exact under the least friction as a normal one. Rigid motions are
-    eliminated by a principal pivot on as many contact forces as there are motions.
+    columns, so the method ends with a solution where one exists. Measured in units of its bound, a
+    tangential force is as exact as a normal one, even under the least friction. Rigid motions
+    are eliminated by a principal pivot on as many contact forces as there are motions.
     """
-    # compiled, and rarely needed: only who comes here pays for importing the compiler
+    # imported only here: importing the compiler is slow, and Lemke's method is rarely needed
     from solver.contact.lemke import lemke
 
     n, k = problem.n, len(problem.balance)
@@ -54,7 +52,7 @@ def given_bound(
         columns[:, : n + m] = A[: n + m].T * unit
         balance = problem.balance / (force * shape) - columns[:, n : n + m].sum(axis=1)
         held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
-        if len(held) < k:  # too few points to hold what floats
+        if len(held) < k:  # too few points to hold the floating bodies
             return None
         eliminated = _eliminate(M, r, A, columns, balance, held)
         if eliminated is None:

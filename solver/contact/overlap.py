@@ -1,8 +1,7 @@
 """Bodies that overlap before loading: by how much, and how much is allowed.
 
-A small overlap is pushed apart in the first increment. One that is a good part of a body is a
-mistake in the model: small strains cannot undo it, and which surface a point came through is a
-guess.
+Bodies with a small overlap are pushed apart before any load acts. A large overlap is a mistake in
+the model: small strains cannot undo it, and it is not known through which surface a point entered.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ def check_overlap(slave: Body, master: Body, sides: tuple[Surface, Surface]) -> 
                 "contacts", (body.name, other.name),
                 f"body {body.name!r} overlaps {other.name!r} by {depth.max():.4g} mm at "
                 f"x = {x:.4g}, y = {y:.4g} mm; at most {allowed:.4g} mm, a twentieth of the "
-                "smaller body's narrow side, can be pushed apart",
+                "smaller body's narrow side, can be pushed apart: move one of the bodies",
             )  # fmt: skip
 
 

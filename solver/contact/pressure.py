@@ -18,9 +18,8 @@ def contact_pressure(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return pressure and shear on the slave's vertices (n,) [MPa]: means under each hat.
 
-    The multiplier field is piecewise linear; its mean under the hat of a vertex has the same
-    resultant and, next to a sharp corner, where the nodal values alternate about the right
-    mean, not their ripple.
+    The multiplier field is piecewise linear. Its means under the hats have the same resultant as
+    its values at the vertices, without the oscillation of these next to a sharp corner.
     """
     contact, chain = state.contacts[interface], system.interfaces[interface].slave_surface
     area = system.interfaces[interface].pairing(state.u).area

@@ -1,4 +1,4 @@
-"""The frictional contact problem on the contact points, and what solves it, as data.
+"""The frictional contact problem on the contact points, and its solution, as data.
 
 Unknowns are the normal forces N >= 0 and tangential forces T at n points and the free rigid
 motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction ``F = N``)::
@@ -24,16 +24,17 @@ OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 
 @dataclass(frozen=True, slots=True)
 class ContactProblem:
-    """One instance.
+    """One contact problem.
 
     Attributes
     ----------
     W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without
     offset : (m,) gap and slip at zero force [mm]
-    friction : (n,) coefficient at each point; zero holds the tangential force at zero
+    friction : (n,) coefficient at each point; zero means no tangential force
     A : (m, k) gap and slip of the free rigid motions
     balance : (k,) resultants of all other forces on those motions [N]
-    limit : (n,) largest tangential force whatever the normal one [N]; inf, or None for all, is none
+    limit : (n,) largest tangential force at any normal force [N]; inf sets no limit, None sets none
+        at any point
     """
 
     W: NDArray[np.float64]
@@ -74,7 +75,7 @@ class ContactProblem:
 
 @dataclass(frozen=True, slots=True)
 class ContactSolution:
-    """Forces (m,), rigid motions (k,), the status of each point, and how it was found."""
+    """Forces (m,), rigid motions (k,), status (n,), and whether it was found by pivoting."""
 
     forces: NDArray[np.float64]
     rigid: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What an increment starts from and what it gives when it has converged."""
+"""The state an increment starts from, and what it gives when it has converged."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ContactState:
-    """What a contact pair carries from one increment to the next, a value a slave vertex.
+    """What a contact pair carries from one increment to the next, one value per slave vertex.
 
     ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
     surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` tells
     whether the vertex had contact, so that its friction has a history. ``approach`` (3, n) is
-    the gap [mm], and the rates of gap and slip with the load in the last increment, NaN where
-    not known; ``gap`` (n,) is the gap whether near contact or not, inf where nothing faces.
+    the gap of candidates [mm], and the rates of gap and slip over time in the last increment, NaN
+    where not known; ``gap`` (n,) is the gap of all vertices, inf where no master faces them.
     """
 
     normal: NDArray[np.float64]
@@ -42,7 +42,7 @@ class ContactState:
         return cls(np.zeros(n), np.zeros(n), status, touching, approach, gap)
 
     def halted(self) -> ContactState:
-        """Return the state where another motion begins: rates so far mean nothing."""
+        """Return the state without its rates: another motion begins."""
         approach = self.approach.copy()
         approach[1:] = np.nan
         return replace(self, approach=approach)
@@ -52,7 +52,7 @@ class ContactState:
 class State:
     """A converged state of the whole system; never changed, only replaced.
 
-    ``time`` orders states; it is the load factor where bodies have no other amplitude.
+    ``time`` is the load factor where the pressures of the bodies have no amplitude.
     ``force_scale`` is the largest force level met so far, to which tolerances refer [N].
     """
 
@@ -65,15 +65,16 @@ class State:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Energy:
-    """Work along a path [N mm].
+    """Energy at the beginning of a lap, and the work since then [N mm].
 
     Attributes
     ----------
-    stored : elastic energy of the bodies where the path began
-    external : of loads, and of what holds a body that is moved
-    plastic : of stress on plastic strain, by the mean of its stress before and after
-    friction : of friction on slip, positive
-    contact : against contact where points open or close in an increment: an error of the path
+    stored : elastic energy of the bodies at the beginning
+    external : work of loads and prescribed motions
+    plastic : work of stress on plastic strain, by the mean of stress before and after
+    friction : work of friction on slip, positive
+    contact : work against contact where points open or close within an increment: an error of
+        integration
     """
 
     stored: float = 0.0
@@ -89,17 +90,17 @@ class Converged:
 
     Attributes
     ----------
-    forces : on each part, in balance with contact: loads, and what supports and prescribed
-        motions exert [N]
+    forces : on each part, in balance with contact: loads, and the forces of supports and
+        prescribed motions [N]
     responses : of each part at its points
-    iterations : of Newton
-    elastic : whether no point yielded
+    iterations : Newton iterations
     plastic_work : of the increment [N mm]
     dissipation : least at a point [N mm/mm3]
     contact_work : work of friction, and against contact, in the increment [N mm]
-    pivoted, blended : iterations whose inner problem needed the fallback or a blended tangent
-    strayed : where contact has come to the end of a surface that goes on; empty where it has not
-    energy : work along the path so far
+    pivoted, blended : iterations whose contact problem needed pivoting, or whose tangent was
+        blended with the elastic stiffness
+    strayed : message that contact has reached the end of a surface; empty if it has not
+    energy : work since the lap began
     """
 
     start: State
@@ -108,7 +109,6 @@ class Converged:
     contact_work: tuple[float, float]
     responses: tuple[Response, ...]
     iterations: int
-    elastic: bool
     plastic_work: float
     dissipation: float
     pivoted: int

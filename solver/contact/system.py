@@ -32,16 +32,16 @@ if TYPE_CHECKING:
 
 
 _TOUCHING = 1e-9
-"""Over the length of the longest contact surface."""
+"""Gap / length of the longest contact surface, below which vertices touch."""
 _SET_DOWN = 1e-9
-"""Gap over the radius of a wheel below which what is set down touches."""
+"""Gap / radius of a wheel that is set down, below which vertices touch."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interface:
     """A contact pair on its two parts.
 
-    ``shear_strength`` is the largest shear it carries whatever the pressure [MPa].
+    ``shear_strength`` is the largest shear it carries at any pressure [MPa].
     """
 
     slave: int
@@ -82,7 +82,7 @@ class Interface:
 def _surfaces(model: Model, wholes: Mapping[str, Discretisation]) -> dict[tuple[str, str], Surface]:
     """Return the surfaces of all pairs in the numbering of the whole bodies.
 
-    One that goes on as the surface of another pair does not end there.
+    Where a surface continues as the surface of another pair, contact may pass on: no end is there.
     """
     found = {
         side: surface.extract(wholes[side[0]], side[1])
@@ -135,8 +135,8 @@ def _interface(
         if not reference.area.any():
             raise ModelError(
                 "contacts", (contact.slave, contact.master),
-                "these surfaces do not face each other: at rest no normal of the slave meets the "
-                "master from outside",
+                "these surfaces do not face each other: before loading no normal of the slave "
+                "meets the master from outside; check the boundaries and where the bodies are",
             )  # fmt: skip
     strength = min(part.body.material.shear_yield_stress for part in both)
     return Interface(
@@ -208,29 +208,29 @@ class System:
 
     @cached_property
     def touching(self) -> float:
-        """Distance up to which surfaces at rest touch, and neither part nor overlap [mm]."""
+        """Largest gap or overlap before loading that counts as touching [mm]."""
         lengths = [np.ptp(i.slave_surface.X, axis=1).max() for i in self.interfaces]
         return _TOUCHING * float(max(lengths, default=0.0))
 
     @cached_property
     def moves(self) -> bool:
-        """Whether a load moves over the bodies."""
+        """Whether a load moves along a body."""
         return any(part.moves for part in self.parts)
 
     @cached_property
     def overlapping(self) -> bool:
-        """Whether bodies overlap before loading; what is set down just touches."""
+        """Whether bodies overlap before loading; moving loads are set down so that they touch."""
         return not self.moves and any(
             (contact.gap < -self.touching).any() for contact in self.initial().contacts
         )
 
     @cached_property
     def proportional(self) -> bool:
-        """Whether elastic states do not depend on how the load was brought on.
+        """Whether an elastic state depends on the load alone, and not on its history.
 
-        True without friction, and where all facing vertices touch before loading, so that
-        every status stays as it is while the load grows: but for a limit of shear, which does
-        not grow with it.
+        True without friction, and where all facing vertices touch before loading: every status
+        then stays the same while the load grows. A limit of shear makes it false, since it does
+        not grow with the load.
         """
         if self.overlapping or not all(np.isinf(i.shear_strength) for i in self.interfaces):
             return False
@@ -270,12 +270,12 @@ class System:
         return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:
-        """Return a state in which what moves by itself has gone on to a time."""
+        """Return a state with prescribed motions at their values for a time."""
         parts = zip(self.parts, state.u, strict=True)
         return replace(state, u=tuple(part.moved(u, time) for part, u in parts))
 
     def set_down(self, state: State, time: float) -> State:
-        """Return the state at a time at which a lap begins: wheels where it does, just touching."""
+        """Return the state at the time a lap begins: its wheels undeformed and just touching."""
         u, contacts = list(state.u), list(state.contacts)
         for number, part in enumerate(self.parts):
             if not isinstance(part, Wheel):

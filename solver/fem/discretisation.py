@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def choose_pins(rigid: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the unknowns of ``free`` less as many as hold the rigid motions (n, n_rigid)."""
+    """Return the unknowns ``free`` without one pin for each of the rigid motions (n, n_rigid)."""
     if not rigid.shape[1]:
         return free
     pivots = linalg.qr(rigid[free].T, mode="r", pivoting=True)[1]
@@ -38,9 +38,10 @@ class Discretisation(Nodes, Part):
     ----------
     dofs : (n_elements, 2 n_element_nodes)
     B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
-    weights : (n_elements, n_points) volume of the points, thickness or 2 pi r in it [mm3]
+    weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
     load_vector : (n,) nodal forces of the pressures at load factor one [N]
-    active : unknowns that are neither supported nor pinned
+    free : unknowns that no support holds, copies left out
+    active : unknowns of ``free`` that are not pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
     """
 
@@ -65,7 +66,7 @@ class Discretisation(Nodes, Part):
         self._hold()
 
     def _hold(self) -> None:
-        """Find supported unknowns, the rigid motions left, and as many pins to hold them."""
+        """Find the supported unknowns, the rigid motions left, and one pin for each of these."""
         fixed = np.zeros(self.n, dtype=bool)
         for boundary, axes in self.body.supports.items():
             nodes = self.boundary_nodes(boundary)
@@ -135,7 +136,7 @@ class Discretisation(Nodes, Part):
         return self.external(time) - self.internal_force(response.stress)
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
-        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         strain, weight = self.strain(step), self.weights.ravel()
         C = self.body.law.stiffness(len(strain))
         tangent = np.einsum("ap,abp,bp->p", strain, response.tangent, strain) @ weight
@@ -143,7 +144,7 @@ class Discretisation(Nodes, Part):
         return float(tangent), float(elastic)
 
     def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the point that a step strains most [mm]."""
+        """Return the point (x, y) that a step strains most [mm]."""
         at = int((self.strain(step) ** 2).sum(axis=0).argmax())
         x, y = self.points.reshape(2, -1)[:, at]
         return float(x), float(y)

@@ -81,7 +81,7 @@ class Sampler:
 def _locate(
     part: Discretisation, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return element, point number and reference coordinates of the points inside."""
+    """Return element, point number and reference coordinates of the points inside the body."""
     corners = part.X[:, part.basis.element_dofs]
     slack = 1e-9 + 0.05 * (corners.max(axis=1) - corners.min(axis=1))
     low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
@@ -125,7 +125,7 @@ def _reference(
 
 
 def error_estimate(part: Discretisation, stress: NDArray[np.float64]) -> tuple[float, float]:
-    """Return twice the energy [N mm] of recovered minus computed stress, and of the stress.
+    """Return twice the elastic energy [N mm] of recovered minus computed stress, and of stress.
 
     O.C. Zienkiewicz, J.Z. Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337-357: the square root of
     their ratio estimates the relative discretisation error in the energy norm.

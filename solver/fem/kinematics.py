@@ -23,16 +23,16 @@ def strain_operator(
     values: NDArray[np.float64],
     gradients: NDArray[np.float64],
     radius: NDArray[np.float64],
-    state: str,
+    kinematics: str,
 ) -> NDArray[np.float64]:
-    """Return B: nodal displacements of an element to Mandel strain at its points.
+    """Return B, which gives Mandel strain at the points of elements for nodal displacements.
 
     Parameters
     ----------
     values : (n_nodes, n_elements, n_points) shape functions
     gradients : (dim, n_nodes, n_elements, n_points) their global derivatives [1/mm]
     radius : (n_elements, n_points) first coordinate of the points [mm]
-    state : one of `solver.model.kinematics.KINEMATICS`; not read in three dimensions
+    kinematics : one of `solver.model.kinematics.KINEMATICS`; not read in three dimensions
 
     Returns
     -------
@@ -48,7 +48,7 @@ def strain_operator(
     for row, (a, b) in enumerate(shears, start=3):
         B[:, :, row, :, a] = along[b] / SQRT2
         B[:, :, row, :, b] = along[a] / SQRT2
-    if dim == 2 and state == "axisymmetric":
+    if dim == 2 and kinematics == "axisymmetric":
         B[:, :, 2, :, 0] = np.moveaxis(values, 0, -1) / radius[..., None]
     return B.reshape(n_elements, n_points, 3 + len(shears), dim * n_nodes)
 
@@ -66,12 +66,12 @@ def mean_dilatation(B: NDArray[np.float64], weights: NDArray[np.float64]) -> NDA
     return bar
 
 
-def rigid_motions(x: NDArray[np.float64], state: str) -> NDArray[np.float64]:
+def rigid_motions(x: NDArray[np.float64], kinematics: str) -> NDArray[np.float64]:
     """Return the rigid motions of nodes ``x`` (dim, n_nodes) as columns (dim n_nodes, n_rigid).
 
     Translations along the axes, then the rotations about the centroid (scaled to unit size): in
-    the plane of x and y, in three dimensions also of y and z and of z and x. In the axisymmetric
-    state only the translation along the axis is rigid.
+    the plane of x and y, in three dimensions also of y and z and of z and x. With axisymmetry only
+    the translation along the axis is rigid.
     """
     dim, n = x.shape
     planes = _SHEARS[: 1 if dim == 2 else 3]
@@ -84,4 +84,4 @@ def rigid_motions(x: NDArray[np.float64], state: str) -> NDArray[np.float64]:
         modes[:, a, mode] = -arm[b]
         modes[:, b, mode] = arm[a]
     flat = modes.reshape(dim * n, dim + len(planes))
-    return flat[:, 1:2] if dim == 2 and state == "axisymmetric" else flat
+    return flat[:, 1:2] if dim == 2 and kinematics == "axisymmetric" else flat

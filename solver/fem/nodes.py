@@ -1,4 +1,4 @@
-"""The nodes of a body, its quadrature, and which nodes repeat others."""
+"""The nodes of a body, its quadrature, and the copies of nodes on a periodic body."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Nodes:
     basis : elements and quadrature, of scikit-fem
     X : (2, n_nodes) node positions [mm]
     n : number of unknowns
-    same : (n_nodes,) the node whose unknowns a node has: itself, unless it is a copy
-    copied : (n,) the same for unknowns
+    same : (n_nodes,) for each node, the node whose unknowns it uses: itself, unless it is a copy
+    copied : (n,) the same for each unknown
     period : length after which a periodic body repeats itself, else 0 [mm]
     points : (2, n_elements, n_points) positions of the points [mm]
     """
@@ -49,7 +49,7 @@ class Nodes:
         self.points = np.asarray(self.basis.global_coordinates())
 
     def measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
-        """Return the depth a plane point stands for [mm]: thickness or 2 pi r."""
+        """Return the depth across the plane at positions x [mm]: thickness or 2 pi r."""
         if self.body.kinematics == "axisymmetric":
             return np.asarray(2 * np.pi * x[0])
         return self.body.thickness
@@ -59,7 +59,7 @@ class Nodes:
         return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
 
     def _copies(self) -> tuple[NDArray[np.int64], float]:
-        """Return the node whose unknowns each node has, and the period."""
+        """Return the node whose unknowns each node uses, and the period."""
         same = np.arange(self.X.shape[1])
         if self.body.periodic is None:
             return same, 0.0

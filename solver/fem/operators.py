@@ -1,4 +1,4 @@
-"""How the parts of a model answer to forces: factors, compliances, blending of tangents."""
+"""The inverse stiffness of the parts of a model: factors, compliances, blended tangents."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Operator(Protocol):
 class Stiff(Protocol):
     """A part whose stiffness is assembled.
 
-    ``active`` unknowns of all ``n`` are solved for, ``copied`` (n,) tells whose value each one
-    has; ``pattern`` is the upper triangle on the active ones.
+    The unknowns ``active`` of all ``n`` are solved for; ``copied`` (n,) gives for each unknown the
+    one whose value it takes; ``pattern`` is the upper triangle on the active ones.
     """
 
     n: int
@@ -85,7 +85,7 @@ class Factored:
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
         place = self._analysed.kept[dofs]
-        if (place < 0).all():  # a surface that supports hold
+        if (place < 0).all():  # supports hold the surface
             return np.zeros((len(rows), len(rows)))
         block = np.zeros((len(rows), self._analysed.kept.max() + 1))
         block[:, place[place >= 0]] = rows[:, place >= 0]
@@ -104,7 +104,7 @@ class PartOperators(Protocol):
 
 
 class Operators:
-    """The operators of one part; the elastic one is made once and kept.
+    """The operators of one part; the elastic one is factorised once and kept.
 
     Parameters
     ----------
@@ -159,6 +159,6 @@ class Fixed:
         self.elastic = operator
 
     def tangent(self, response: Response, blend: float) -> Operator:
-        """Return the one operator."""
+        """Return the elastic operator."""
         del response, blend
         return self.elastic

@@ -1,4 +1,4 @@
-"""What the increments ask of a body: unknowns, forces, surfaces that move."""
+"""What increments need of a body: unknowns, forces, motion of surfaces."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Part(ABC):
         return np.zeros(0)
 
     def start(self) -> NDArray[np.float64]:
-        """Return the unknowns (n,) before anything happens."""
+        """Return the unknowns (n,) before any load."""
         return np.zeros(self.n)
 
     def external(self, time: float) -> NDArray[np.float64]:
@@ -102,12 +102,12 @@ class Part(ABC):
         return more > less and bool(self.load_vector.any())
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return the unknowns with what moves by itself gone on to a time."""
+        """Return the unknowns with prescribed motions at their values for a time."""
         del time
         return u
 
     def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
-        """Return where a step (n,) strains this part most [mm]; nowhere in one without points."""
+        """Return the point (x, y) that a step (n,) strains most [mm]; NaN without points."""
         del step
         return np.nan, np.nan
 
@@ -118,9 +118,10 @@ class Part(ABC):
     def pull_back(
         self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return unknowns and rows on them from rows on a surface's displacements.
+        """Return derivative rows on this part's unknowns, after the numbers of these unknowns.
 
-        The first ``gaps`` rows are those of gaps, the others those of slips.
+        ``block`` holds the rows on the displacements of a surface; its first ``gaps`` rows are
+        derivatives of gaps, the others of slips.
         """
         del u, gaps
         return surface.dofs, block

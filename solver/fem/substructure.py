@@ -71,8 +71,8 @@ class _Condensed:
 class Substructure(Part):
     """A part with the unknowns of its contact surfaces alone.
 
-    It offers what a `Discretisation` offers to an increment; ``whole`` is the meshed body.
-    ``elastic`` are the unknowns that the condensed stiffness acts on.
+    An increment can use it like a `Discretisation`; ``whole`` is the meshed body. ``elastic`` are
+    the unknowns that the condensed stiffness acts on.
     """
 
     meshed = False
@@ -96,17 +96,17 @@ class Substructure(Part):
         return replace(surface, nodes=nodes)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
-        """Return the one operator an elastic part has."""
+        """Return the operator of an elastic part, which never changes."""
         del surfaces, linear_solver
         S = self._condensed.stiffness[np.ix_(self.active, self.active)]
         return Fixed(Dense(S, self.active, self.n))
 
     def virgin(self) -> PlasticState:
-        """Return the law's state at no points: nothing here can yield."""
+        """Return the law's state for zero points: nothing here can yield."""
         return self.body.law.initial(0, self.whole.B.shape[2])
 
     def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
-        """Return the law's response at no points."""
+        """Return the law's response for zero points."""
         del u
         return self.body.law.respond(np.zeros_like(state.plastic_strain), state)
 
@@ -120,13 +120,13 @@ class Substructure(Part):
         return force
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
-        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         del response
         energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
         return energy, energy
 
     def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
-        """Return zero work and zero least dissipation."""
+        """Return zero plastic work and zero least dissipation."""
         del before, response
         return 0.0, 0.0
 
@@ -143,7 +143,7 @@ class Substructure(Part):
 
 
 def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> str:
-    """Return a content key: equal bodies share their condensation."""
+    """Return a key made from the content: equal bodies share their condensation."""
     digest, body = sha256(), part.body
     elastic = body.law.stiffness(part.B.shape[2])
     for array in (body.mesh.doflocs, body.mesh.t, nodes, elastic):

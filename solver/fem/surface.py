@@ -32,7 +32,7 @@ class Surface:
     edges : (n_edges, 2 or 3) positions in ``nodes``: start, end (, middle)
     X : (2, n_nodes) reference positions [mm]
     measure : (n_nodes,) thickness, or 2 pi r, at the nodes [mm]
-    goes_on : whether the boundary of the body goes on smoothly beyond the start and the end
+    goes_on : whether the boundary of the body continues smoothly beyond the start and the end
     """
 
     nodes: NDArray[np.int64]
@@ -55,8 +55,8 @@ class Surface:
 def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:
     """Return the edges (n_edges, 2 or 3) of a boundary: start, end (, middle) node.
 
-    Each has the body on its left. Facet bases are not used for it: they invert the element
-    mapping to a tolerance that elements 1e-5 of the body's size cannot meet.
+    Each has the body on its left. Facet bases of scikit-fem are not used here: they invert the
+    element mapping to a tolerance that elements 1e-5 of the body's size cannot meet.
     """
     mesh, basis = part.body.mesh, part.basis
     facets = part.body.facets(boundary)
@@ -77,7 +77,7 @@ def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:
 def extract(part: Nodes, boundary: str) -> Surface:
     """Return the surface of a named boundary, which must be one open chain.
 
-    That of a periodic body goes on for half a period beyond either end.
+    The surface of a periodic body is continued for half a period beyond either end.
     """
     edges = edges_of(part, boundary)
     following = {int(start): i for i, start in enumerate(edges[:, 0])}
@@ -88,7 +88,8 @@ def extract(part: Nodes, boundary: str) -> Surface:
         order.append(following.pop(at))
         at = int(edges[order[-1], 1])
     if len(order) != len(edges):
-        raise ModelError("boundary", boundary, "a contact surface must be one open chain of edges")
+        allowed = "a contact surface must be one open chain of edges: name each piece by itself"
+        raise ModelError("boundary", boundary, allowed)
     nodes, local = np.unique(edges[order], return_inverse=True)
     X, chain = part.X[:, nodes], local.reshape(edges.shape)
     if part.period:
@@ -104,10 +105,10 @@ def extract(part: Nodes, boundary: str) -> Surface:
 
 
 def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:
-    """Return whether the boundary of a body goes on beyond the start (0) or end (1) of an edge.
+    """Return whether a boundary continues smoothly beyond the start (0) or end (1) of an edge.
 
-    It does not where it turns by more than `_CORNER`. Tangents decide, since the chords of a
-    coarse curve turn where it does not.
+    A turn by more than `_CORNER` is a corner. Tangents are compared: the chords of a coarse mesh
+    turn also where the curve is smooth.
     """
     mesh, basis = part.body.mesh, part.basis
     outside = mesh.boundary_facets()
@@ -171,7 +172,11 @@ def _tractions(
     traction: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], float]],
     points: int,
 ) -> NDArray[np.float64]:
-    """Integrate a pressure and a shear, a multiple of it against the edges' direction."""
+    """Return the nodal forces (n,) of a traction [N].
+
+    ``traction`` gives the pressure at positions and the ratio of shear to it; shear acts against
+    the direction of the edges.
+    """
     edges = edges_of(part, boundary)
     X, edges = part.X[:, edges], part.same[edges]
     force = np.zeros((2, part.X.shape[1]))

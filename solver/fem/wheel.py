@@ -1,4 +1,4 @@
-"""An elastic wheel: its rim condensed, its rotation finite.
+"""An elastic wheel, condensed to its rim, with finite rotation.
 
 Unknowns are the elastic displacements d of the rim's nodes in the frame of the hub, the
 displacement (cx, cy) of the hub and the arc w = R * rotation. A rim node is at
@@ -27,7 +27,7 @@ _X, _Y, _TURN = range(3)
 
 
 class Hub(NamedTuple):
-    """How a hub has moved: along x and y [mm], and turned counter-clockwise [rad].
+    """Motion of a hub: displacement along x and y [mm], counter-clockwise rotation [rad].
 
     ``arc`` is the rotation times the wheel's radius [mm].
     """
@@ -67,12 +67,12 @@ class Wheel(Substructure):
         return force
 
     def grows(self, before: float, after: float) -> bool:
-        """Whether force or moment on the axle grow from one time to another."""
+        """Whether the force or the moment on the axle grows from one time to another."""
         loads = (self.axle.force, self.axle.moment)
         return any(abs(load.at(after)) > abs(load.at(before)) for load in loads)
 
     def hub(self, u: NDArray[np.float64]) -> Hub:
-        """Return how the hub has moved."""
+        """Return the motion of the hub."""
         x, y, arc = (float(value) for value in u[self._hub :])
         return Hub(x, y, arc, arc / self.radius)
 
@@ -85,7 +85,7 @@ class Wheel(Substructure):
         return np.array([[c, -s], [s, c]])
 
     def _passing(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how far material moves along a rim of constant shape for an arc (2, n_nodes)."""
+        """Return the motion of material along a rim of constant shape per arc (2, n_nodes)."""
         x, y = surface.X - self.centre[:, None]
         starts, middles = surface.edges[:, :1], surface.edges[:, 2:]
         chain = np.append(np.hstack([starts, middles]), surface.edges[-1, 1])
@@ -105,14 +105,15 @@ class Wheel(Substructure):
     def pull_back(
         self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return rows on rim, hub and rotation from rows on a surface's displacements.
+        """Return derivative rows on rim, hub and rotation, after the numbers of these unknowns.
 
-        The rotation turns the wheel under the shape that its rim has. That takes no work from
-        a round elastic wheel, and changes no gap: moment comes from friction alone, on the arm
-        with which material passes. Turned with the displacements it has, the wheel changes gaps
-        as well, and pressure gets a moment: in the continuum what makes up for the other arm,
-        on a mesh of ten points of contact 1e-4 of force times radius more or less, which would
-        turn a wheel that less friction holds.
+        Rotation moves the material along the rim, and the shape of the rim stays (`_passing`).
+        This needs no work in a round elastic wheel and changes no gap: the moment comes from
+        friction alone, and its arm is the speed at which material passes. If the wheel turned
+        together with its displacements, gaps would change too, and pressure would have a moment.
+        In the continuum this moment compensates the difference of the arms. On a mesh with ten
+        points in contact it has an error of 1e-4 of force times radius, which would turn a wheel
+        that is held by less friction.
         """
         Q = self._frame(u)
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
@@ -123,7 +124,10 @@ class Wheel(Substructure):
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return ``u`` with the hub where it has to be at a time, rolling along with it."""
+        """Return ``u`` with the hub at its position for a time; a wheel free to turn rolls there.
+
+        A prescribed rotation takes its value at that time.
+        """
         out = u.copy()
         x, turn = self._hub + _X, self._hub + _TURN
         out[x] = self.axle.position.at(time)
@@ -140,13 +144,13 @@ class Wheel(Substructure):
         return out
 
     def start(self) -> NDArray[np.float64]:
-        """Return the wheel where its programs begin."""
+        """Return the undeformed wheel at the time its motion begins."""
         return self.placed(float(self.axle.position.time[0]))
 
     def placed(self, time: float) -> NDArray[np.float64]:
-        """Return the undeformed wheel where it has to be at a time.
+        """Return the undeformed wheel at its position for a time.
 
-        A wheel free to turn stands as if it had rolled there from where it was meshed.
+        A wheel free to turn has the rotation of rolling there from where it was meshed.
         """
         u = np.zeros(self.n)
         u[self._hub + _TURN] = self.radius * self.axle.turned

@@ -1,8 +1,8 @@
-"""MKL PARDISO through its documented C interface, phases apart.
+"""MKL PARDISO through its documented C interface, phase by phase.
 
-The `mkl` wheel ships the library; its phases are called here one by one (analysis once per
-pattern, a factorisation per matrix, elimination down to a Schur complement), which wrappers of
-the whole call do not offer.
+The `mkl` wheel ships the library. Its phases are called one by one (analysis once per pattern, a
+factorisation per matrix, elimination down to a Schur complement), which ready-made wrappers do
+not offer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ POSITIVE_DEFINITE, INDEFINITE = 2, -2
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """Return MKL, set to one thread a process, or None where it is not installed."""
+    """Return MKL, set to one thread per process, or None where it is not installed."""
     try:
         files = metadata.distribution("mkl").files or []
     except metadata.PackageNotFoundError:
@@ -42,7 +42,7 @@ def library() -> ctypes.CDLL | None:
 
 
 class PardisoError(RuntimeError):
-    """PARDISO's error number; `NOT_POSITIVE` is a zero or negative pivot."""
+    """An error of PARDISO with its ``code``; `NOT_POSITIVE` is a zero or negative pivot."""
 
     def __init__(self, phase: int, code: int) -> None:
         super().__init__(f"PARDISO phase {phase} failed with error {code}")
@@ -52,8 +52,8 @@ class PardisoError(RuntimeError):
 class Pardiso:
     """One analysed pattern and the factor of the matrix last given.
 
-    With ``kept`` unknowns all others are eliminated; the Schur complement on those kept is
-    factorised densely, so that compliances of kept unknowns cost no sparse solves.
+    All unknowns but those ``kept`` are eliminated. The Schur complement on those kept is
+    factorised densely, so that their compliances cost no sparse solves.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _pardiso(
 ) -> None:
     mkl = library()
     if mkl is None:
-        raise RuntimeError("MKL is not installed")
+        raise RuntimeError("MKL is not installed: pip install 'residua[mkl]'")
     error = ctypes.c_int32(0)
 
     def integer(value: int) -> Any:

@@ -1,9 +1,8 @@
 """Symmetric sparse systems behind one interface: analyse once, factorise, solve many.
 
-A matrix is given by its upper triangle in CSR form, with the unknowns ``kept`` on which
-compliances will be asked. `analyse` chooses MKL PARDISO where it is
-installed and SuperLU elsewhere; ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) decides
-otherwise.
+A matrix is given by its upper triangle in CSR form, with the unknowns ``kept`` whose compliances
+will be needed. `analyse` takes MKL PARDISO where it is installed, else SuperLU; the environment
+variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides this choice.
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ SOLVERS = ("auto", "pardiso", "superlu")
 
 
 class Singular(ArithmeticError):
-    """The matrix has no factor."""
+    """The matrix cannot be factorised."""
 
 
 class LinearSolver(Protocol):
     """An analysed pattern; after `factorise`, a factor."""
 
     def factorise(self, data: NDArray[np.float64]) -> None:
-        """Take these values of the upper triangle; raise `Singular` when there is no factor."""
+        """Factorise the upper triangle with these values; raise `Singular` if that fails."""
 
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for ``b`` (n,) or (n, k)."""
@@ -42,7 +41,7 @@ class LinearSolver(Protocol):
 
 
 class SuperLU:
-    """The factorisation every machine has."""
+    """SuperLU of SciPy, which every machine has."""
 
     def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
         self._upper = upper.copy()
@@ -113,7 +112,7 @@ class PardisoSolver:
 def _compliance(
     solver: LinearSolver, rows: NDArray[np.float64], n: int, kept: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return ``rows A^-1 rows'`` from a solution for each row."""
+    """Return ``rows A^-1 rows'`` by one solve per row."""
     columns = np.zeros((n, len(rows)))
     columns[kept] = rows.T
     W = rows @ solver.solve(columns)[kept]
@@ -141,7 +140,7 @@ def analyse(
 ) -> LinearSolver:
     """Return a solver for matrices with the pattern of ``upper``.
 
-    ``kept`` (m,), increasing, are the unknowns on which `LinearSolver.compliance` will be asked.
+    ``kept`` (m,), increasing, are the unknowns that `LinearSolver.compliance` will be called for.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """One BLAS thread: the dense blocks of an increment are small, and runs are parallel.
 
-With several threads the library spends its time waking and spinning: on two busy cores a path
+With several threads the library spends its time on starting and waiting: on two busy cores a run
 took seven times as long.
 """
 

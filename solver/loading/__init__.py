@@ -1,1 +1,1 @@
-"""A loading history walked in increments: each one solved, cut where it fails, branched from."""
+"""A loading history, walked in increments that are halved where they fail."""

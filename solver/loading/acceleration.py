@@ -1,9 +1,10 @@
-"""Sums the series of steps that a tangent which lacks something makes.
+"""Anderson acceleration of Newton's method where its tangent is not complete.
 
-The tangent has no derivative of the contact's normals and of the friction bound along a surface,
-and may be blended with the elastic stiffness. Newton's method then converges like a geometric
-series, at times with a ratio of 0.9. Anderson's mixing combines the last iterates so that the
-step left is least, which for a constant lack is Newton's method with the missing part measured.
+The tangent lacks the derivatives of contact normals and of the friction bound along a surface, and
+may be blended with the elastic stiffness. Newton's method then converges like a geometric series,
+at times with a ratio of 0.9. Anderson's mixing combines the last iterates so that the remaining
+step is least. Where the missing part is constant, it measures this part, and is Newton's method
+again.
 
 D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011)
 1715-1735, algorithm 2.
@@ -25,22 +26,22 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _SLOW = 0.6
-"""Size of a step over that of the one before above which the tangent lacks something."""
+"""Size of a step / size of the one before, above which convergence counts as slow."""
 _PATIENCE = 5
-"""Slow steps in a row before they count as a series: where points change sides there are a few."""
+"""Slow steps in a row before they count as a series: a change of contact status makes a few."""
 _WINDING = 3.0
-"""Growth of a step above which it is no part of a series."""
+"""Size of a step / size of the one before, above which it does not continue the series."""
 _ALONG = 0.7
-"""Cosine of the angle between steps above which they go in one direction."""
+"""Cosine of the angle between two steps, above which they go in one direction."""
 _DEPTH = 5
 
 
 @dataclass(slots=True)
 class Series:
-    """Steps in a row between the same contact states that are no smaller than before, or hardly.
+    """Successive steps with the same contact states that hardly decrease.
 
-    They may swing to and fro and wind about the solution. Steps that grow in one direction may be
-    a body that flows, and are left alone.
+    They may alternate, or circle about the solution. Steps that grow in one direction may mean that
+    a body flows, and are not accelerated.
     """
 
     _key: bytes = b""
@@ -51,9 +52,9 @@ class Series:
     def sum(
         self, u: Vectors, candidates: Candidates, step: Step, share: float
     ) -> tuple[Vectors, NDArray[np.float64]] | None:
-        """Return displacements and contact forces to go on from after a step, or None.
+        """Return accelerated displacements and contact forces after a step.
 
-        None where the whole step is as good, which is nearly always.
+        Nearly always convergence is fast, and None says that the step itself serves.
         """
         place = np.concatenate([*u, candidates.forces])
         now = np.concatenate([*step.u, step.forces - candidates.forces])

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 def unbearable(system: System) -> LimitLoad | None:
-    """Return why a prescribed shear has no equilibrium, if so.
+    """Return the error that a prescribed shear has no equilibrium; None if it may have one.
 
-    No stress in or inside the yield surface has a shear above the shear yield stress, and the
-    traction is the stress at the surface: without hardening nothing can balance more.
+    No stress on or inside the yield surface has a shear above the shear yield stress, and the
+    traction equals the stress at the surface: without hardening nothing can balance more.
     """
     for body in system.model.bodies:
         travelling, material = body.travelling, body.material

@@ -1,4 +1,4 @@
-"""How increments are judged, and how a path is cut into them."""
+"""When an increment has converged, and how a load is divided into increments."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Control:
 
     Attributes
     ----------
-    max_cuts : times an increment may be halved before the path ends
+    max_cuts : times an increment may be halved before the run ends with an error
     tolerances : of an increment
     """
 
@@ -40,13 +40,13 @@ class Control:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathControl(Control):
-    """How a load factor is raised and taken away.
+    """How a load factor is raised and removed.
 
     Attributes
     ----------
-    load_step : increments of loading end at the multiples of it, in load factor
-    unload_steps : equal increments from full load to none; the last takes the bodies apart
-    max_cuts : times an increment may be halved before the path ends
+    load_step : increments of loading end at its multiples, in load factor
+    unload_steps : equal increments from full load to zero; the last takes the bodies apart
+    max_cuts : times an increment may be halved before the run ends with an error
     tolerances : of an increment
     """
 
@@ -60,5 +60,5 @@ class PathControl(Control):
             raise ModelError("unload_steps", self.unload_steps, "must be at least 1")
 
     def program(self, load: float) -> Program:
-        """Return the program that raises the load factor to ``load`` and takes it away."""
+        """Return the program that raises the load factor to ``load`` and removes it."""
         return load_and_release(load, self.load_step, self.unload_steps)

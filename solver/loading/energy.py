@@ -4,8 +4,8 @@ Each term is integrated by the trapezoidal rule over increments. Virtual work th
 
     external work = change of stored energy + plastic work + work of friction and against contact
 
-exact where contact keeps its directions (small sliding); where these turn, what is missing is the
-error of the path.
+exact where the directions of contact are fixed (small sliding). Where they turn, the difference is
+the error of this integration.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def worked(parts: Sequence[Part], before: Converged, now: Converged) -> Energy:
-    """Return the work along a path when an increment has gone from ``before`` to ``now``."""
+    """Return the work so far, that of the increment from ``before`` to ``now`` included."""
     moves = zip(before.state.u, now.state.u, before.forces, now.forces, strict=True)
     work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
     so_far = before.energy

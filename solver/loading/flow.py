@@ -1,4 +1,4 @@
-"""How soft a step is: what tells a plastic mechanism from everything else."""
+"""The stiffness along a step, which tells a plastic mechanism from other failures."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from solver.materials import Response
 
 _FLOWING = 0.02
-"""Share of the elastic stiffness below which a late step tells that the structure flows."""
+"""Share of the elastic stiffness along a late step, below which the structure flows."""
 _MECHANISM = 1e-2
-"""The same for bodies that nothing loads."""
+"""The same for bodies without load."""
 _MOVES = 1e-3
-"""Share of the elastic energy of a step from which on a part moves in it."""
+"""Share of the elastic energy of a step, above which a part takes part in it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flow:
-    """Where a step met the least resistance.
+    """The step that met the least resistance.
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
-    ``place`` (x, y) [mm] say what strained most there, ``hardens`` whether its material does.
+    ``place`` (x, y) [mm] say what it strained most, ``hardens`` whether that material hardens.
     """
 
     stiffness: float = 1.0
@@ -52,7 +52,7 @@ class Flow:
 def _forms(
     parts: Sequence[Part], step: Sequence[NDArray[np.float64]], responses: Sequence[Response]
 ) -> NDArray[np.float64]:
-    """Return the tangent and the elastic quadratic form of a step, part by part (n, 2)."""
+    """Return ``step' K step`` of each part, with tangent and elastic stiffness (n_parts, 2)."""
     each = zip(parts, step, responses, strict=True)
     return np.array([part.stiffness_along(du, response) for part, du, response in each])
 
@@ -63,14 +63,14 @@ def softer(
     step: Sequence[NDArray[np.float64]],
     responses: Sequence[Response],
 ) -> Flow:
-    """Return the softer one of a flow and a step, given as displacements of each part."""
+    """Return the flow of a step (displacements of each part) if it is softer, else ``than``."""
     forms = _forms(parts, step, responses)
     tangent, elastic = forms.sum(axis=0)
     if not elastic > 0 or tangent / elastic >= than.stiffness:
         return than
     most = int((forms[:, 1] - forms[:, 0]).argmax())
     return Flow(
-        stiffness=max(float(tangent / elastic), 0.0),  # below it is rounding
+        stiffness=max(float(tangent / elastic), 0.0),  # less is rounding
         body=parts[most].body.name,
         place=parts[most].most_strained(step[most]),
         hardens=parts[most].body.material.hardens,

@@ -51,9 +51,9 @@ _PATIENCE = 15
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
 _MOVING = 0.01
-"""Share of an increment's displacements in its last step above which it has not come to rest."""
+"""Last step / displacements of the increment, above which the bodies are still moving."""
 _LATE = 1
-"""Iterations after which a step without stiffness tells that the structure flows."""
+"""Iteration from which on a step without stiffness means that the structure flows."""
 
 
 class Increment:
@@ -63,9 +63,10 @@ class Increment:
     ----------
     guess : state to iterate from, usually extrapolated; ``start`` when absent
     contact : False takes the bodies apart
+    elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
-    patient : where every body hardens, so that there is an equilibrium, iterate as often as the
-        tolerances allow: in bodies that hardly do the residual comes and goes as the energy falls
+    patient : if no body can flow without hardening, so that an equilibrium exists, use all
+        iterations: with little hardening the residual rises and falls while the energy falls
     """
 
     def __init__(
@@ -112,8 +113,8 @@ class Increment:
             residuals = self._residuals(u, responses)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
-            # bodies that overlap can be balanced as they are: what follows must not be measured
-            # against nothing
+            # overlapping bodies can begin with a residual of zero: later ones must not be compared
+            # with that
             best = max(min(best, error), tolerances.residual)
             hopeless = since_best > _PATIENCE and not self.patient
             hopeless |= error > _DIVERGED * best
@@ -145,7 +146,8 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            # what stops at rounding does not flow; what flows on without resistance is in balance
+            # an iteration that stops at rounding is no flow; a body that flows without resistance
+            # is in balance, but still moves
             softest if moving or best > _UNBALANCED * tolerances.residual else None,
         )
 
@@ -176,7 +178,7 @@ class Increment:
         inner = on_parts(self.system, candidates, candidates.forces)
         external = norm([part.external(self.time) for part in parts])
         level = external + norm(inner)
-        if external == 0:  # bodies that overlap push each other: stress alone tells how much
+        if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
         scale = max(self.start.force_scale, level)
         if scale == 0:
@@ -195,7 +197,7 @@ class Increment:
         candidates: Candidates,
         blends: Sequence[float],
     ) -> Step:
-        """Return the step of the softest tangent that has one; a lone blend is no choice."""
+        """Return the step of the least blended tangent that has one (a lone blend is no choice)."""
         for blend in blends:
             try:
                 operators = [
@@ -216,10 +218,10 @@ class Increment:
         )
 
     def _adrift(self, step: Step, responses: Sequence[Response]) -> bool:
-        """Whether a step is a plastic mechanism though nothing loads the bodies.
+        """Whether a step is a plastic mechanism although the bodies have no load.
 
-        They push each other apart by a given distance then, which plastic flow alone can do in many
-        ways: the step would be any of them, and as large as rounding makes it.
+        Overlapping bodies push each other apart by a given distance. Plastic flow can do this in
+        many ways, and rounding would choose one of them and its size.
         """
         loaded = any(part.external(self.time).any() for part in self.system.parts)
         return not loaded and mechanism(self.system.parts, step.u, responses)
@@ -231,8 +233,8 @@ class Increment:
     ) -> tuple[float, Vectors, tuple[Response, ...]]:
         trial: tuple[Vectors, tuple[Response, ...]]
 
-        # where vertices change sides the forces before the step may oppose it; those after it never
-        # do: with them its slope is the tangent's quadratic form
+        # where vertices change status, contact forces before the step may make its slope negative;
+        # with those after the step the slope is the quadratic form of the tangent
         before = candidates.forces
         if self._slope(step, residuals, candidates, before) <= 0:
             before = step.forces
@@ -286,7 +288,6 @@ class Increment:
             state=State(self.time, u, tuple(r.state for r in responses), contacts, scale),
             responses=responses,
             iterations=iterations,
-            elastic=not any(r.yielding.any() for r in responses),
             pivoted=self._pivoted,
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),

@@ -16,8 +16,8 @@ def search(slope: Callable[[float], float], start: float) -> float:
 
     In an increment of associated plasticity the energy is convex, and its slope along the step
     rises through zero; a share is accepted when the slope has dropped to a fifth of ``start``
-    in size, or when the whole step still goes downhill. Tighter than usual, because in a
-    perfectly plastic body close to its limit a loose search leaves Newton's method creeping.
+    in size, or when the energy still falls at the end of the step. This is tighter than usual: in a
+    perfectly plastic body close to its limit, a loose search makes Newton's method very slow.
 
     Parameters
     ----------

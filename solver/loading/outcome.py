@@ -1,4 +1,4 @@
-"""How an increment may fail, and what comes of a program."""
+"""How an increment may fail, and the result of a program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Yielded(SolverError):
-    """An increment that was to stay elastic did not."""
+    """A point yielded in an increment that had to stay elastic."""
 
 
 class IncrementFailed(SolverError):
@@ -30,11 +30,11 @@ class IncrementFailed(SolverError):
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """What a path has cost and done.
+    """Cost and plastic work so far.
 
-    Newton iterations of each increment, cuts, iterations that needed the inner fallback or a
-    blended tangent, CPU seconds, plastic work [N mm], least plastic dissipation at a point of an
-    increment [N mm/mm3].
+    Newton iterations of each increment, cuts, iterations whose contact problem needed pivoting or
+    whose tangent was blended, CPU seconds, plastic work [N mm], least plastic dissipation at a
+    point in an increment [N mm/mm3].
     """
 
     iterations: tuple[int, ...] = ()
@@ -59,7 +59,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A state on the path, the one before it for extrapolation, and the cost so far."""
+    """A converged state, the one before it for extrapolation, and the cost so far."""
 
     now: Converged
     before: State | None
@@ -67,7 +67,7 @@ class Point:
 
 
 class PathEnded(Exception):
-    """A path has come to its end: why, and its last point."""
+    """The walk cannot continue: the error, and the last point reached."""
 
     def __init__(self, error: NotConverged, point: Point) -> None:
         super().__init__(str(error))
@@ -81,9 +81,9 @@ class Settled:
 
     Attributes
     ----------
-    times : increments in place of one
-    error : estimated error that these leave, in the unit of what was measured; NaN where unknown
-    failed : increments in place of one that failed, 0 where none did
+    times : number of increments in place of one of the program
+    error : estimated error that is left, in the unit of what was measured; NaN where unknown
+    failed : the same number in the attempt that failed, 0 if none did
     """
 
     times: int = 1
@@ -93,15 +93,15 @@ class Settled:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What came of a program.
+    """The result of a program.
 
     Attributes
     ----------
-    tally : what it cost
+    tally : its cost
     last : the last state reached
     points : states at the ends of the stages of the last lap, by name
-    traces : what was taken of each lap that came to its end
-    error : why the path ended before its program did
+    traces : what the walker's ``trace`` returned for each complete lap
+    error : why the program was not walked to its end; None if it was
     settled : how finely it was walked
     """
 

@@ -1,8 +1,7 @@
-"""A loading history as data: laps of stages, and the increments they ask for.
+"""A loading history as data: laps of stages, and the increments of these.
 
-Time orders what happens; loads and motions are amplitudes over it, declared with the bodies. Where
-bodies have a pressure and no amplitude, time is the load factor, and goes back when they are
-released.
+Loads and motions are amplitudes over time, declared with the bodies. Where the pressures of bodies
+have no amplitude, time is the load factor, and goes back to zero when they are released.
 """
 
 from __future__ import annotations
@@ -17,22 +16,22 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 ROUNDING = 1e-9
-"""Relative difference below which two times are one."""
+"""Relative difference below which two times are the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stage:
-    """A part of a history that goes from where the one before ended to a time.
+    """A part of a loading history, from the end of the stage before to a time.
 
     Attributes
     ----------
-    name : under which the state at its end is kept
+    name : name of the state at its end
     target : time at its end
-    steps : equal increments, where ``step`` is 0
-    step : increments end at the multiples of it, and the last one at the target
+    steps : number of equal increments, where ``step`` is 0
+    step : if not 0, increments end at its multiples, and the last one at the target
     apart : whether the last increment takes the bodies apart
-    turns : whether another motion begins: how gaps closed before says nothing of how they will
-    refined : whether `Program.refined` cuts its increments
+    turns : whether another motion begins, for which the rates of gap and slip so far mean nothing
+    refined : whether `Program.refined` divides its increments
     """
 
     name: str
@@ -64,7 +63,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Lap:
-    """Stages from a time on. At its beginning what moves is set down where it has to be."""
+    """Stages from a time on. At its beginning wheels are set down at their position."""
 
     stages: tuple[Stage, ...]
     start: float = 0.0
@@ -72,7 +71,7 @@ class Lap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """Where an increment of a program ends, and what is special about it.
+    """The end of an increment of a program, and what is special about it.
 
     ``begins`` (time) opens a lap after the first one, ``keeps`` (name) is the stage that it ends,
     ``closes`` says that the lap ends with it.
@@ -92,12 +91,12 @@ class Program:
 
     Attributes
     ----------
-    laps : one after another
-    cycle : laps after which the same comes again; 0 where nothing does. When nothing yields in a
-        whole cycle, the laps after it are like it and are not walked
-    retraces : whether the loads grow with time in the first stage of a lone lap and go back in the
-        others, so that elastic bodies need one increment and come back to where they began
-    place : says in words where a time is
+    laps : in their order
+    cycle : laps after which the same loading repeats itself; 0 if it does not. When nothing yields
+        in a whole cycle, later laps repeat its states and are not computed
+    retraces : whether there is one lap whose loads grow with time in the first stage and go back
+        in the others: elastic bodies then need one increment, and return to their first state
+    place : (time) -> words for it in messages
     """
 
     laps: tuple[Lap, ...]
@@ -107,7 +106,7 @@ class Program:
 
     @cached_property
     def targets(self) -> tuple[Target, ...]:
-        """Where its increments end, one after another."""
+        """The ends of its increments, in their order."""
         out: list[Target] = []
         for lap in self.laps:
             now = lap.start
@@ -131,7 +130,7 @@ class Program:
         return tuple(out)
 
     def refined(self, times: int) -> Program:
-        """Return the program with so many increments in place of one, in stages that allow it."""
+        """Return the program with ``times`` increments in place of one, in `refined` stages."""
 
         def cut(stage: Stage) -> Stage:
             return replace(stage, steps=stage.steps * times) if stage.refined else stage
@@ -150,7 +149,7 @@ def shared(one: Program, other: Program) -> int:
 
 
 def load_and_release(load: float, step: float, unload_steps: int) -> Program:
-    """Return the program that raises a load factor to ``load`` and takes it and the bodies away."""
+    """Return the program that raises a load factor to ``load``, removes it and parts the bodies."""
     loaded = Stage(name="loaded", target=load, step=step)
     unloaded = Stage(name="unloaded", target=0.0, steps=unload_steps, apart=True)
     return Program(laps=(Lap((loaded, unloaded)),), retraces=True)

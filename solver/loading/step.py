@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Displacements of each part, contact forces and statuses, and whether these were pivoted."""
+    """Displacements of each part, contact forces and status, and whether pivoting found these."""
 
     u: Vectors
     forces: NDArray[np.float64]
@@ -51,8 +51,8 @@ def newton_step(
     residuals : external minus internal forces of each part, contact forces left out [N]
     contact : False leaves floating bodies where they are
     """
-    # all large forces balance first: what is left to solve for is small, and rounding of
-    # the factor, about 1e-16 (size of the body / smallest element)^2, acts on that alone
+    # add up all large forces before solving: the rest is small, and rounding of the factor, about
+    # 1e-16 (size of the body / smallest element)^2, acts on this rest alone
     held = on_parts(system, candidates, candidates.forces)
     balanced = [r + c for r, c in zip(residuals, held, strict=True)]
     W = candidates.compliance(operators)
@@ -96,12 +96,12 @@ def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
 
 
 def apart(system: System, candidates: Candidates) -> str:
-    """Return which bodies are held by contact alone, where nothing touches yet."""
+    """Return a message on bodies that contact alone holds but that do not touch; else empty."""
     floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
     if not floating or candidates.forces.any():
         return ""
     gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
     return (
         f"; body {' and '.join(floating)} is held by contact alone and stands {gap:.3g} mm "
-        "apart: the load must push it towards what holds it"
+        "apart: the load must push it towards the body that is to hold it"
     )

@@ -32,7 +32,10 @@ class Stepper:
     Parameters
     ----------
     report : called after every increment
-    place : says in words where on the path a time is
+
+    Attributes
+    ----------
+    place : (time) -> words for it in messages
     """
 
     def __init__(
@@ -40,26 +43,25 @@ class Stepper:
         system: System,
         control: Control,
         report: Report | None = None,
-        place: Callable[[float], str] = "load factor {:.6g}".format,
     ) -> None:
         self.system = system
         self.control = control
-        self.place = place
+        self.place: Callable[[float], str] = "load factor {:.6g}".format
         self._report = report or (lambda: None)
         self._clock = clock.process_time()
 
     def rest(self, state: State, tally: Tally | None = None) -> Point:
-        """Return the first point of a path: a state without contact forces."""
+        """Return a state without contact forces as the first point of a lap."""
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         stresses = zip(self.system.parts, at_rest.responses, strict=True)
         energy = Energy(stored=sum(elastic_energy(part, r.stress) for part, r in stresses))
         return Point(replace(at_rest, state=state, energy=energy), None, tally or Tally())
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
-        """Return the first point of a lap: what moves is set down, what overlaps pushed apart.
+        """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
 
-        Overlapping bodies push each other apart before any load acts, so that what they resist is
-        not taken for a limit load. Raises `PathEnded` where they do not find their balance.
+        This is done before any load acts, so that its failure is not taken for a limit load. Raises
+        `PathEnded` where overlapping bodies find no equilibrium.
         """
         point = self.rest(self.system.set_down(state, time), tally)
         if not self.system.overlapping:
@@ -69,7 +71,10 @@ class Stepper:
                 self.system, point.now.state, time, tolerances=self.control.tolerances
             ).solve()
         except IncrementFailed as failure:
-            error = NotConverged(f"the overlap of the bodies could not be resolved: {failure}")
+            error = NotConverged(
+                "the overlap of the bodies before loading could not be pushed apart: "
+                f"{failure}; move the bodies until they just touch"
+            )
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
         pushed = self._worked(point.now, pushed)
         return Point(pushed, None, self._timed(point.tally.plus(pushed)))
@@ -113,8 +118,8 @@ class Stepper:
     def elastic(self, point: Point, target: float) -> Point | None:
         """Return the point at time ``target`` in one increment, None where something yields.
 
-        One increment is exact where the history of friction cannot matter: no friction, or
-        surfaces that fit before loading, where everything grows in proportion.
+        One increment is exact where the history of friction does not matter: no friction, or
+        surfaces in full contact before loading, where everything is proportional to the load.
         """
         if not self.system.proportional:
             return None
@@ -128,7 +133,7 @@ class Stepper:
             ).solve()
         except (Yielded, IncrementFailed):
             return None
-        if converged.strayed:  # stepping tells at which load
+        if converged.strayed:  # the walk in steps finds at which load
             return None
         converged = self._worked(point.now, converged)
         self._report()
@@ -137,13 +142,13 @@ class Stepper:
     def _predict(self, before: State | None, now: State, time: float) -> State | None:
         """Return the state an increment iterates from, or None for the last converged one.
 
-        Under a load that moves over a body the next state is not on the line through the last two:
-        then only what moves goes on.
+        Under a load that moves along a body the next state is not on the line through the last two:
+        then only the prescribed motions go on.
         """
         return self.system.moved(now, time) if self.system.moves else extrapolate(before, now, time)
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
-        """Return an increment with the work along its path up to there."""
+        """Return the increment ``now`` with the work since the lap began."""
         return replace(now, energy=worked(self.system.parts, before, now))
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
@@ -183,7 +188,7 @@ def extrapolate(before: State | None, now: State, time: float) -> State | None:
 
 
 def turned(point: Point) -> Point:
-    """Return the point where time begins to mean another motion."""
+    """Return the point without rates of gap and slip: another motion begins."""
     state = point.now.state
     contacts = tuple(contact.halted() for contact in state.contacts)
     return replace(point, now=replace(point.now, state=replace(state, contacts=contacts)))

@@ -1,8 +1,8 @@
 """Walks programs over one system: lap by lap, stage by stage.
 
-Programs that begin alike are walked together as far as they are alike: a **branch** leaves the path
-before it at the last increment both have. What a program gives does not depend on which others are
-walked with it, so a sweep on one path gives bit for bit what separate runs give.
+Programs that begin with the same increments share these: a **branch** starts from the state after
+the last increment that two programs have in common. The result of a program does not depend on the
+others that are walked with it: it is bit for bit that of a run by itself.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ if TYPE_CHECKING:
 HALVINGS = 6
 """Most times that `Settling` halves the increments."""
 _NOTHING = 1e-6
-"""Plastic work of a lap over all of it so far, below which nothing has yielded."""
+"""Plastic work of a lap / plastic work so far, below which the lap counts as elastic."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settling:
-    """Increments small enough: halved until the first lap leaves the same.
+    """How small increments must be: halved until the result of the first lap no longer changes.
 
-    Backward Euler in the plastic strain is of first order in the increment, so the change that
-    halving makes estimates the error that is left.
+    Backward Euler in the plastic strain is of first order in the increment, so the change by
+    halving estimates the error that is left.
 
     Attributes
     ----------
@@ -58,10 +58,10 @@ class Settling:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Walk:
-    """Where a walk has come to.
+    """A walk so far.
 
-    ``points`` are those of the lap, ``work`` is the plastic work before it [N mm]; ``past`` are the
-    points of the laps before, and whether anything yielded in them.
+    ``points`` are those of the present lap, ``work`` is the plastic work before it [N mm]; ``past``
+    are the points of the laps before, and whether anything yielded in them.
     """
 
     point: Point
@@ -77,8 +77,8 @@ class Walker:
 
     Parameters
     ----------
-    trace : (states at the ends of a lap's stages, by name) -> what is taken of it
-    settling : how increments are chosen; those of the program as they are when absent
+    trace : (states at the ends of a lap's stages, by name) -> what is kept of the lap
+    settling : how increments are halved; when absent, those of the program are used
     report : called after every increment
     """
 
@@ -97,10 +97,10 @@ class Walker:
         self._stepper = Stepper(system, control, report)
 
     def walk(self, programs: Sequence[Program]) -> Iterator[Outcome]:
-        """Yield the outcome of each program, as each becomes known.
+        """Yield the outcome of each program as soon as it is known.
 
-        Programs in an order in which each shares as much as it can with the one before it cost
-        least; those of growing loads do.
+        The cost is least when each program shares as many increments as possible with the one
+        before it, as programs of increasing loads do.
         """
         last, settled = programs[0], Settled()
         self._stepper.place = last.place
@@ -145,7 +145,7 @@ class Walker:
         return _Walk(point=point, work=point.tally.plastic_work, error=error)
 
     def _directly(self, program: Program, start: _Walk | None) -> _Walk | None:
-        """Return the walk of a program that yields nothing, in one increment, or None.
+        """Return the walk of a program in which nothing yields, in one increment; else None.
 
         Without yielding, unloading restores the state before any load exactly.
         """
@@ -191,7 +191,7 @@ class Walker:
         return replace(walk, point=point, points=points)
 
     def _closed(self, walk: _Walk, program: Program) -> _Walk:
-        """Return the walk with its lap, which has come to its end, taken down."""
+        """Return the walk with the results of its lap, which is complete."""
         work = walk.point.tally.plastic_work
         yielded = work - walk.work > _NOTHING * work
         past = (*walk.past, (walk.points, yielded))[-program.cycle :] if program.cycle else ()
@@ -199,9 +199,9 @@ class Walker:
         return replace(walk, past=past, traces=traces)
 
     def _settle(self, program: Program) -> tuple[Settled, _Walk]:
-        """Walk the first lap with ever smaller increments, until it leaves the same.
+        """Walk the first lap with ever smaller increments, until its result no longer changes.
 
-        Where smaller increments fail, what the larger ones gave stands.
+        Where smaller increments fail, the result of the larger ones is kept.
         """
         assert self._settling is not None
         tolerance = self._settling.tolerance
@@ -224,7 +224,7 @@ class Walker:
                 coarse = left
             elif not failed:
                 break
-            # what larger increments have cost stays in the tally
+            # the tally keeps the time that the larger increments have cost
             tally = Tally(seconds=walk.point.tally.seconds)
         assert taken is not None
         return settled, taken
@@ -237,7 +237,7 @@ def _first_lap(program: Program) -> Sequence[Target]:
 
 
 def _repeated(walk: _Walk, cycle: int) -> _Walk:
-    """Return the walk after a lap that is like the one a cycle before it."""
+    """Return the walk after a lap that repeats the one a cycle before it."""
     points, _ = walk.past[0]
     return replace(
         walk,

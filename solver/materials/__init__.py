@@ -1,7 +1,7 @@
 """Material laws: (strain, state) -> (stress, tangent, new state, yielding).
 
 `Law` is the contract. `Material` is the law of the package, made of `Elasticity`, a `VonMises`
-surface and `LinearHardening`; `PlaneStress` takes any law to plane stress.
+surface and `LinearHardening`; `PlaneStress` makes any law one for plane stress.
 """
 
 from solver.materials.elasticity import Elasticity

@@ -1,4 +1,4 @@
-"""Attributes of a law that are computed unless a law has them as its own."""
+"""Attributes that `Law` computes, and that a subclass may have as fields instead."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ else:
     class attribute:  # noqa: N801
         """A property that a subclass may also have as a field of its dataclass.
 
-        A plain property would be taken for the field's default value, and could not be set.
+        With a plain property, ``dataclass`` would take the property for the field's default value,
+        and the field could not be set.
         """
 
         def __init__(self, compute: Callable[[Any], Any]) -> None:

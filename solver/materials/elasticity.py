@@ -38,7 +38,7 @@ class Elasticity:
 
     @property
     def plane_strain_modulus(self) -> float:
-        """E / (1 - nu^2): stress over strain in a plate that cannot strain across [MPa]."""
+        """E / (1 - nu^2): stress / strain in tension, one lateral strain held at zero [MPa]."""
         return self.youngs_modulus / (1 - self.poisson_ratio**2)
 
     def stiffness(self, n_components: int) -> NDArray[np.float64]:
@@ -56,7 +56,7 @@ class Elasticity:
     def biaxial_stress(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the two normal stresses (2, n) of two normal elastic strains (2, n) [MPa].
 
-        The stress across both is zero, as at a free surface.
+        The third normal stress is zero, as at a free surface.
         """
         nu = self.poisson_ratio
         return self.plane_strain_modulus * np.stack(

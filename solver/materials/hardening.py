@@ -36,13 +36,13 @@ class LinearHardening:
         return 2 / 3 * self.kinematic_modulus
 
     def flow_stress(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the size Re + Hi p (n,) of the surface for equivalent plastic strain p (n,)."""
+        """Return the size Re + Hi p (n,) of the yield surface at equivalent plastic strain p."""
         return self.yield_stress + self.isotropic_modulus * accumulated
 
     def strength(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the stress Re + H p (n,) that tension reaches with plastic strain p (n,)."""
+        """Return the stress Re + H p (n,) of the tension curve at plastic strain p (n,) [MPa]."""
         return self.yield_stress + self.modulus * accumulated
 
     def back_stress(self, plastic_strain: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the centre of the surface (n_components, n) for Mandel plastic strain [MPa]."""
+        """Return the centre of the yield surface (n_components, n) for Mandel strain [MPa]."""
         return self.prager_modulus * plastic_strain

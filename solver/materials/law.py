@@ -1,13 +1,13 @@
-"""The contract of a material law: what bodies, contact and audit may ask of it.
+"""The contract of a material law: what bodies, contact and audit use of it.
 
-A law answers a strain with stress, tangent and new internal variables (`Law.respond`). It never
-changes the state it is given; a state becomes history only when the increment that made it has
-converged. Arrays have their components first and their points last, and the number of components
-is that of the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
+A law gives stress, tangent and new internal variables for a strain (`Law.respond`). It never
+changes the state it is given; the new state replaces it only when the increment has converged.
+Arrays have their components first and their points last, and the number of components is that of
+the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
 
-A law of one's own gives `elasticity`, `flow_stress` and `respond`. The rest follows from them for
-associated flow on a surface of von Mises, and may be replaced piece by piece; what is written as an
-attribute may be a property, or a field of a dataclass.
+A new law must define `elasticity`, `flow_stress` and `respond`. All else has a default for
+associated flow on a von Mises surface, which a law may override. What is marked as an attribute
+here may be a property or a field of a dataclass there.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Law(ABC):
-    """An elastic-plastic law with small strains and no dependence on time."""
+    """An elastic-plastic law for small strains, independent of the rate of loading."""
 
     __slots__ = ()
 
@@ -41,7 +41,7 @@ class Law(ABC):
 
     @attribute
     def elasticity(self) -> Elasticity:
-        """How it answers below yield."""
+        """The elastic constants."""
         raise NotImplementedError(f"{type(self).__name__} must give its elasticity")
 
     @attribute
@@ -51,16 +51,19 @@ class Law(ABC):
 
     @abstractmethod
     def flow_stress(self, state: PlasticState) -> Array:
-        """Return the size of the yield surface (n_points,), as a tension [MPa]; inf: elastic."""
+        """Return the size of the yield surface (n_points,), as a tensile stress [MPa].
+
+        An elastic law returns inf.
+        """
 
     def back_stress(self, state: PlasticState) -> Array:
         """Return the centre of the yield surface (n_components, n_points), Mandel [MPa]."""
         return np.zeros_like(state.plastic_strain)
 
-    # -- its answer ----------------------------------------------------------------------------
+    # -- its response --------------------------------------------------------------------------
 
     def initial(self, n_points: int, n_components: int) -> PlasticState:
-        """Return the internal variables before any load; laws that need more give their own."""
+        """Return the internal variables before any load; a law with more of them overrides this."""
         return PlasticState.virgin(n_points, n_components)
 
     @abstractmethod
@@ -78,14 +81,14 @@ class Law(ABC):
         return self.elasticity.stiffness(n_components)
 
     def in_plane_stress(self) -> Law | None:
-        """Return a law of its own for plane stress; None where `PlaneStress` shall wrap it."""
+        """Return a special form of this law for plane stress; None means `PlaneStress`."""
         return None
 
     # -- its strength --------------------------------------------------------------------------
 
     @attribute
     def yield_stress(self) -> float:
-        """Tension at first yield [MPa]; inf if it never yields."""
+        """Tensile stress at first yield [MPa]; inf if it never yields."""
         return float(self.flow_stress(self.initial(1, 4))[0])
 
     @attribute
@@ -100,30 +103,33 @@ class Law(ABC):
 
     @attribute
     def hardens(self) -> bool:
-        """Whether stress grows with plastic strain without end, so that there is no limit load."""
+        """Whether stress grows with plastic strain without bound, so that no limit load exists."""
         return False
 
     def strength(self, state: PlasticState) -> Array:
-        """Return the tension (n_points,) that one loading to this plastic strain reaches [MPa]."""
+        """Return the stress (n_points,) of the tension curve at this plastic strain [MPa]."""
         return self.flow_stress(state)
 
     def shear_strength(self, state: PlasticState) -> Array:
-        """Return the shear stress (n_points,) that one loading in shear reaches [MPa]."""
+        """Return the stress (n_points,) of the curve in pure shear at this plastic strain [MPa]."""
         return self.surface.shear(self.strength(state))
 
-    # -- what it demands -----------------------------------------------------------------------
+    # -- its conditions ------------------------------------------------------------------------
 
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
-        """Return how far stress is beyond the yield surface (n_points,) [MPa]; below 0 inside."""
+        """Return the yield function (n_points,) [MPa]: negative inside the yield surface."""
         relative = stress - self.back_stress(state)
         return self.surface.equivalent(relative) - self.flow_stress(state)
 
     def flow_direction(self, stress: Array, state: PlasticState) -> Array:
-        """Return plastic strain over the plastic multiplier (n_components, n_points), Mandel."""
+        """Return the flow direction (n_components, n_points), Mandel.
+
+        It is the increment of plastic strain / plastic multiplier.
+        """
         return self.surface.normal(stress - self.back_stress(state))
 
     def dissipation(self, before: PlasticState, response: Response) -> Array:
-        """Return the work (n_points,) an increment turns into heat [N mm/mm3]."""
+        """Return the work (n_points,) that an increment turns into heat [N mm/mm3]."""
         flow = response.state.plastic_strain - before.plastic_strain
         back = self.back_stress(response.state)
         return np.asarray(((response.stress - back) * flow).sum(axis=0))
@@ -131,16 +137,16 @@ class Law(ABC):
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
     ) -> Array:
-        """Return by how much an increment breaks this law (n_points,) [MPa].
+        """Return the error of an increment with respect to this law (n_points,) [MPa].
 
-        The law is stated here, not solved, so that `respond` is tested without being called.
-        With dp the growth of the accumulated plastic strain, backward Euler asks that
+        The conditions are evaluated here, not solved, so that `respond` is checked without being
+        called. With dp the growth of the accumulated plastic strain, backward Euler requires:
 
         - stress = C : (strain - plastic strain)
         - the yield value is not above 0, and is 0 where dp > 0
         - plastic strain grew by dp times the flow direction at the end, dp >= 0
 
-        The largest miss counts; a miss of strain is made a stress by 2 G.
+        The largest error counts; an error of strain is multiplied by 2 G.
 
         Parameters
         ----------

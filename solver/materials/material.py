@@ -107,7 +107,7 @@ class Material(Law):
 
     @property
     def hardens(self) -> bool:
-        """Whether stress goes on growing with plastic strain."""
+        """Whether stress grows with plastic strain."""
         return self.plastic_modulus > 0
 
     def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:

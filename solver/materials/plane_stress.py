@@ -1,4 +1,4 @@
-"""Plane stress of any law: the thickness strain is solved for at each point."""
+"""Plane stress for any law: the thickness strain is solved for at each point."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 _ZZ = 2
 _ROUNDING = float(np.finfo(float).eps)
-"""Stress zz over the size of the terms it is a sum of, from which on it is rounding."""
+"""Stress zz / size of the terms it is a sum of, below which it is rounding."""
 _SMALL = 1e-9
-"""The same for laws that solve an equation of their own and are less exact."""
+"""The same for laws that solve an equation by iteration, and are less exact."""
 _MAX_ITERATIONS = 100
 
 
@@ -41,16 +41,16 @@ def condensed(stiffness: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Law):
-    """A law in plane stress, of four components; the zz row of strain is not read.
+    """Any law in plane stress, with four components; the zz row of strain is not read.
 
-    1. zz strain from the elastic stiffness, plastic strain frozen
-    2. Newton on stress zz, which grows with strain zz; where a step leaves the bracket of
-       strains known to be too small and too large, the bracket is halved instead
+    1. strain zz from the elastic stiffness, plastic strain frozen
+    2. Newton's method for stress zz = 0; stress zz grows with strain zz. Where a step leaves the
+       bracket of strains known to be too small and too large, the bracket is halved instead
     3. tangent condensed, stress zz set to zero
 
     Attributes
     ----------
-    law : which asks for all strains
+    law : the wrapped law, which needs all strains
 
     References
     ----------
@@ -62,54 +62,54 @@ class PlaneStress(Law):
 
     @property
     def elasticity(self) -> Elasticity:
-        """That of the law."""
+        """The elastic constants of the wrapped law."""
         return self.law.elasticity
 
     @property
     def surface(self) -> YieldSurface:
-        """That of the law."""
+        """The yield surface of the wrapped law."""
         return self.law.surface
 
     @property
     def yield_stress(self) -> float:
-        """That of the law."""
+        """The yield stress of the wrapped law [MPa]."""
         return self.law.yield_stress
 
     @property
     def hardens(self) -> bool:
-        """Whether the law hardens."""
+        """Whether the wrapped law hardens."""
         return self.law.hardens
 
     def initial(self, n_points: int, n_components: int) -> PlasticState:
-        """Return the initial state of the law."""
+        """Return the initial state of the wrapped law."""
         return self.law.initial(n_points, n_components)
 
     def flow_stress(self, state: PlasticState) -> Array:
-        """Return that of the law."""
+        """Return the flow stress of the wrapped law [MPa]."""
         return self.law.flow_stress(state)
 
     def back_stress(self, state: PlasticState) -> Array:
-        """Return that of the law."""
+        """Return the back stress of the wrapped law [MPa]."""
         return self.law.back_stress(state)
 
     def strength(self, state: PlasticState) -> Array:
-        """Return that of the law."""
+        """Return the strength of the wrapped law [MPa]."""
         return self.law.strength(state)
 
     def shear_strength(self, state: PlasticState) -> Array:
-        """Return that of the law."""
+        """Return the strength in shear of the wrapped law [MPa]."""
         return self.law.shear_strength(state)
 
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
-        """Return that of the law."""
+        """Return the yield function of the wrapped law [MPa]."""
         return self.law.yield_value(stress, state)
 
     def flow_direction(self, stress: Array, state: PlasticState) -> Array:
-        """Return that of the law."""
+        """Return the flow direction of the wrapped law."""
         return self.law.flow_direction(stress, state)
 
     def dissipation(self, before: PlasticState, response: Response) -> Array:
-        """Return that of the law."""
+        """Return the dissipation of the wrapped law [N mm/mm3]."""
         return self.law.dissipation(before, response)
 
     def stiffness(self, n_components: int) -> Array:
@@ -117,9 +117,9 @@ class PlaneStress(Law):
         return condensed(self.law.stiffness(n_components))
 
     def respond(self, strain: Array, state: PlasticState) -> Response:
-        """Return the law's response at the thickness strain that leaves no stress zz.
+        """Return the response of the wrapped law at the thickness strain that makes stress zz zero.
 
-        Where none is found stress is NaN, which no increment takes for an equilibrium.
+        Where no such strain is found stress is NaN, and the increment does not converge.
         """
         C = self.law.stiffness(len(strain))
         elastic = strain - state.plastic_strain
@@ -144,7 +144,7 @@ class PlaneStress(Law):
     def _thickness_strain(
         self, strain: Array, state: PlasticState, scale: Array, stiff: float
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the strain zz (n,) of points, and where it leaves no stress zz."""
+        """Return the strain zz (n,) of points, and at which of them it makes stress zz zero."""
         zz = strain[_ZZ].copy()
         n = len(zz)
         low, high = np.full(n, -np.inf), np.full(n, np.inf)
@@ -162,7 +162,7 @@ class PlaneStress(Law):
             small = np.minimum(np.abs(off), least[going]) <= _SMALL * scale[going]
             done = (np.abs(off) <= _ROUNDING * scale[going]) | (small & ~better)
             least[going] = np.where(better, np.abs(off), least[going])
-            # uphill everywhere: where the tangent is not, the elastic stiffness gives the way
+            # stress zz grows with strain zz: a tangent that is not positive gives no direction
             step = zz[going] - off / np.where(slope > 0, slope, stiff)
             inside = (step > low[going]) & (step < high[going])
             middle = 0.5 * (low[going] + high[going])

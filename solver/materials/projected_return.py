@@ -1,8 +1,8 @@
 """Von Mises plasticity in plane stress: the projected return of Simo and Taylor.
 
-What `PlaneStress` does for any law, this does faster for linear hardening. In the modes
-``(xx + yy, xx - yy) / sqrt(2)`` and ``sqrt(2) xy`` the elastic stiffness and the deviatoric
-projection P are diagonal together, and the return is one scalar equation a point.
+For linear hardening this is faster than `PlaneStress`, which serves any law. In the modes
+``(xx + yy, xx - yy) / sqrt(2)`` and ``sqrt(2) xy`` both the elastic stiffness and the deviatoric
+projection P are diagonal, and the return is one scalar equation per point.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ _MAX_ITERATIONS = 50
 
 @dataclass(frozen=True, slots=True)
 class ProjectedReturn(PlaneStress):
-    """A law of von Mises with linear hardening in plane stress.
+    """A von Mises law with linear hardening in plane stress.
 
     Attributes
     ----------
-    law : the law where all strains are given
+    law : the same law for three-dimensional states
     hardening : how its yield surface grows and moves
     """
 

@@ -1,4 +1,4 @@
-"""What a material remembers, and what it answers."""
+"""Internal variables of a material law, and its response."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class PlasticState:
     """Internal variables at the points of a body; never changed, only replaced.
 
-    A law that remembers more inherits from this class and adds its own arrays, points last.
+    A law with more internal variables inherits from this class and adds its arrays, points last.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class PlasticState:
 
 
 class Response(NamedTuple):
-    """What a law answers to a strain.
+    """The response of a law to a strain.
 
     ``stress`` (n_components, n_points) Mandel [MPa]; ``tangent`` (n_components, n_components,
     n_points), the derivative of stress by strain [MPa]; ``state`` the new internal variables;

@@ -1,4 +1,4 @@
-"""Which stress makes a material flow, and where to: the shape of the yield surface."""
+"""The shape of a yield surface: at which stress a material yields, and in which direction."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _NOTHING = 1e-300
 
 
 class YieldSurface(Protocol):
-    """The shape of a yield surface, of any size and centred at zero."""
+    """The shape of a yield surface centred at zero; its size comes from the law."""
 
     def shear(self, tension: Tension) -> Tension:
-        """Return the shear stress that is as near to yield as a tension [MPa]."""
+        """Return the pure shear stress that is equivalent to a tensile stress [MPa]."""
 
     def equivalent(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the tension (n_points,) that is as near to yield as a stress [MPa]."""
+        """Return the equivalent tensile stress (n_points,) of a stress [MPa]."""
 
     def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivative (n_components, n_points) of `equivalent` by Mandel stress."""
@@ -33,7 +33,7 @@ class YieldSurface(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class VonMises:
-    """The surface of von Mises: yield depends on the size of the deviator alone."""
+    """The von Mises surface: yield depends on the size of the deviator alone."""
 
     def shear(self, tension: Tension) -> Tension:
         """Return k = tension / sqrt(3) [MPa]."""

@@ -1,8 +1,8 @@
-"""What a mesh must be for its answers to mean anything; refused with `ModelError` where it is not.
+"""Checks of a mesh: it must be unfolded and whole, else `ModelError` names an element or a node.
 
 Unfolded: the Jacobian of an element keeps one sign, and neighbours lie on opposite sides of the
 edge they share. Whole: one piece, without cracks and hinges. Lengths are compared with edges
-nearby and with the rounding of coordinates, so that neither unit, grading nor origin matters.
+nearby and with the rounding of coordinates, so that unit, grading and origin do not matter.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 # Least / greatest Jacobian of a folded element, and sine of the angle between the shortest and the
 # longest side of a flat one. Rectangles and right triangles of any shape pass.
 _FOLDED = 1e-6
-# Distance / shortest edge at a node. Nodes that ought to be one agree far better; a notch whose
-# flanks are nearer than this would close, and nothing here would notice.
+# Distance / shortest edge at a node, below which nodes count as one. Two nodes for one point are
+# far nearer; a notch narrower than this would close under load, and the solver would not notice.
 _CLOSED = 1e-3
 _ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
 
@@ -36,7 +36,7 @@ _ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
 def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
     """Raise `ModelError` unless the mesh of body ``name`` is unfolded and whole.
 
-    Elements and nodes go by their numbers in the mesh.
+    Errors name elements and nodes by their numbers in the mesh.
     """
     where = f'of body "{name}"'
     _check_nodes(mesh, where)
@@ -70,20 +70,20 @@ def _check_nodes(mesh: Mesh, where: str) -> None:
 def _jacobians(mesh: Mesh, kind: ElementType) -> NDArray[np.float64]:
     """Return signed Jacobians (n_elements, n_points), at nodes and integration points.
 
-    That of a straight element is linear: its extremes are at the corners.
+    The Jacobian of a straight element is linear: its extremes are at the corners.
     """
     element, nodes = mesh.elem(), mesh.dofs.element_dofs
     points = [element.doflocs.T]
     if len(nodes) > len(mesh.t):
         points += [get_quadrature(element, order)[0] for order in {kind.order, kind.full_order}]
     slopes = [element.lbasis(np.hstack(points), i)[1] for i in range(len(nodes))]
-    X = mesh.p[:, nodes] - mesh.p[:, None, nodes[0]]  # exact: a distant origin costs nothing
+    X = mesh.p[:, nodes] - mesh.p[:, None, nodes[0]]  # exact, also far from the origin
     J = np.einsum("ine,njq->ijeq", X, np.array(slopes), optimize=True)
     return np.asarray(J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0])
 
 
 def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> NDArray[np.float64]:
-    """Return the sense of every element: 1 counterclockwise, -1 clockwise."""
+    """Return the orientation of every element: 1 counterclockwise, -1 clockwise."""
     jacobian = _jacobians(mesh, kind)
     low, high = jacobian.min(axis=1), jacobian.max(axis=1)
     sense = np.where(high >= -low, 1.0, -1.0)
@@ -123,17 +123,17 @@ def _check_neighbours(mesh: Mesh, where: str, sense: NDArray[np.float64]) -> Non
 
 
 def _check_cracks(mesh: Mesh, where: str) -> None:
-    """Refuse boundary nodes that lie on another one, or on an edge between its ends."""
+    """Refuse boundary nodes that lie on another node, or on an edge between its ends."""
     start, end = mesh.p[:, mesh.facets[0]], mesh.p[:, mesh.facets[1]]
     length = np.hypot(*(end - start))
     shortest = np.full(mesh.p.shape[1], length.max())
-    for ends in mesh.facets:  # one by one: numpy 2.4 warns of nothing where it broadcasts here
+    for ends in mesh.facets:  # one by one: numpy 2.4 gives a needless warning when it broadcasts
         np.minimum.at(shortest, ends, length)
     nodes = np.unique(mesh.facets[:, mesh.boundary_facets()])
     tree = cKDTree(mesh.p[:, nodes].T)
     distance, found = tree.query(tree.data, k=2)
     nearest = np.where(found[:, 0] == np.arange(len(nodes)), found[:, 1], found[:, 0])
-    apart = "; what touches itself on purpose must be two bodies and a contact pair"
+    apart = "; surfaces meant to touch need two bodies and a contact pair"
     one, other = nodes, nodes[nearest]
     close = _close(mesh, one, np.minimum(shortest[one], shortest[other]))
     for i in np.flatnonzero(distance[:, 1] <= close)[:1]:
@@ -146,7 +146,7 @@ def _check_cracks(mesh: Mesh, where: str) -> None:
 
 
 def _close(mesh: Mesh, nodes: NDArray[np.int64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance below which nodes with edges of these lengths lie on something."""
+    """Return the distance below which nodes with edges of these lengths count as coincident."""
     return np.asarray(_CLOSED * edges + _ROUNDING * np.abs(mesh.p[:, nodes]).max(axis=0))
 
 
@@ -190,7 +190,7 @@ def _check_connected(mesh: Mesh, where: str) -> None:
     edges = np.bincount(mesh.facets[:, mesh.boundary_facets()].ravel())
     for node in np.flatnonzero(edges > 2)[:1]:
         allowed = (
-            f"at {_at(mesh, node)} is a hinge, a point that parts of the body share; they must "
-            "share an edge, or nothing"
+            f"at {_at(mesh, node)} is a hinge: parts of the body meet at this point alone; they "
+            "must share an edge, or be bodies of their own"
         )
         _refuse(f"node {node}", where, allowed)

@@ -1,7 +1,7 @@
 """Graded tensor grids and meshes mapped from them.
 
-Any scikit-fem mesh with named boundaries serves as well, also one read with
-``skfem.Mesh.load`` (meshio).
+A body takes any scikit-fem mesh with named boundaries, also one read with ``skfem.Mesh.load``
+(meshio).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _SAME = 1e-9
-"""Distance over the size of a mesh below which corners lie on one another."""
+"""Distance / size of a mesh, below which corners are merged."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> NDArray[np.float64]:
@@ -79,9 +79,9 @@ def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.floa
 
 
 def merged(mesh: MeshQuad2) -> MeshQuad2:
-    """Return the mesh with corners that lie on one another made one; boundary names are kept.
+    """Return the mesh with coincident corners merged; boundary names are kept.
 
-    A grid bent until its ends meet becomes a ring; what is inside it now is no boundary.
+    A grid bent until its ends meet becomes a closed ring: its ends are no boundary any more.
     """
     corners = mesh.p[:, : mesh.nvertices]
     tolerance = _SAME * float(np.ptp(corners, axis=1).max())

@@ -1,1 +1,1 @@
-"""What the user declares: bodies, what drives them, contact pairs, and the model they make."""
+"""What the user declares: bodies, their loads and motions, contact pairs, and the model."""

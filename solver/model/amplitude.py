@@ -1,4 +1,4 @@
-"""Numbers that change in time."""
+"""Amplitudes: loads and motions as functions of time."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Amplitude:
-    """A number over time, piecewise linear between knots and constant beyond them.
+    """A number as a function of time: linear between knots, constant before and after them.
 
-    Time orders what happens and has no unit.
+    Time gives the order of events and has no unit.
 
     Attributes
     ----------
     time : (n,) knots, not decreasing
-    value : (n,) the number there
+    value : (n,) the number at the knots
     """
 
     time: NDArray[np.float64]
@@ -32,14 +32,16 @@ class Amplitude:
         time, value = np.asarray(self.time, dtype=float), np.asarray(self.value, dtype=float)
         if time.ndim != 1 or not len(time) or value.shape != time.shape:
             shapes = f"{time.shape} and {value.shape}"
-            raise ModelError("amplitude", shapes, "time and value must be as long as each other")
+            raise ModelError(
+                "amplitude", shapes, "time and value must be lists as long as each other"
+            )
         if not (np.isfinite(time).all() and np.isfinite(value).all()):
             raise ModelError("amplitude", "nan or inf", "time and value must be finite")
         if (np.diff(time) < 0).any():
             raise ModelError("amplitude.time", time.tolist(), "must not decrease")
 
     def times(self, factor: float) -> Amplitude:
-        """Return ``factor`` times the number."""
+        """Return the amplitude with its values multiplied by ``factor``."""
         return Amplitude(self.time, factor * self.value)
 
     def at(self, time: float) -> float:

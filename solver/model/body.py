@@ -33,19 +33,19 @@ class Body:
     ----------
     name : unique in its model
     mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
-    material : its law, a `Material` or one of the user's own (`solver.materials.Law`)
+    material : its law, a `Material` or a law of your own (`solver.materials.Law`)
     kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
     element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
     full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
     thickness : of plane bodies [mm]
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
     pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]
-    amplitude : of the pressures over time; when absent time is the load factor
+    amplitude : load factor of the pressures over time; when absent, time is the load factor
     condense : reduce the body to its contact surfaces where its material is elastic
     axle : makes an elastic body a wheel; its supports then hold it to the hub
     travelling : a pressure that moves along a boundary
-    periodic : two straight boundaries, the second a copy of the first one period along x; the
-        body repeats itself beyond them
+    periodic : two straight boundaries, the second a copy of the first, shifted by one period along
+        x; the body repeats itself beyond them
     """
 
     name: str
@@ -77,7 +77,6 @@ class Body:
                 "element", self.element, f"needs cells of {corners} corners; the mesh of body "
                 f"{self.name!r} has {self.mesh.t.shape[0]}",
             )  # fmt: skip
-        # a wheel is cut from hub to rim, far from where it rolls
         check_mesh(self.mesh, self.name, element)
         if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:
             raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
@@ -92,7 +91,7 @@ class Body:
         if self.travelling is not None:
             self.facets(self.travelling.boundary, "travelling", outer=True)
             if self.material.elastic and self.condense:
-                raise ModelError("travelling", self.name, "needs condense=False on elastic bodies")
+                raise ModelError("travelling", self.name, "an elastic body needs condense=False")
         if self.periodic is not None:
             self._check_periodic(self.periodic)
         moved = self.axle is not None or self.travelling is not None
@@ -105,30 +104,32 @@ class Body:
 
     @cached_property
     def law(self) -> Law:
-        """How its material answers in its two-dimensional state."""
+        """The material law in the kinematics of the body."""
         if self.kinematics != "plane_stress":
             return self.material
         return self.material.in_plane_stress() or PlaneStress(self.material)
 
     def load_factor(self, time: float) -> float:
-        """Return the factor of the pressures at a time."""
+        """Return the load factor of the pressures at a time."""
         return time if self.amplitude is None else self.amplitude.at(time)
 
     def _check_periodic(self, sides: tuple[str, str]) -> None:
         if not isinstance(sides, tuple) or len(sides) != 2:
             raise ModelError("periodic", sides, "must be two names of boundaries")
         if self.kinematics == "axisymmetric":
-            raise ModelError("periodic", sides, "an axisymmetric body does not repeat itself")
+            raise ModelError("periodic", sides, "an axisymmetric body cannot be periodic")
         for boundary in sides:
             self.facets(boundary, "periodic", outer=True)
             for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
                 if boundary in names:
-                    raise ModelError(f"{kind}.{boundary}", names[boundary], "is periodic")
+                    allowed = "must not be given on a side of a periodic body"
+                    raise ModelError(f"{kind}.{boundary}", names[boundary], allowed)
 
     def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:
-        """Return the facet numbers of a named boundary, with ``outer`` one of the body's outside.
+        """Return the facet numbers of a named boundary.
 
-        Supports may hold facets inside the body; pressure and contact need an outside to act on.
+        With ``outer`` they must lie on the outside of the body: pressure and contact act there
+        alone, while supports may hold facets inside. ``field`` is the input that an error names.
         """
         known = self.mesh.boundaries or {}
         if boundary not in known or len(known[boundary]) == 0:
@@ -140,7 +141,7 @@ class Body:
             allowed = f"must be a boundary of facet numbers from 0 to {count - 1}"
             raise ModelError(field, boundary, allowed)
         if len(np.unique(facets)) < len(facets):
-            raise ModelError(field, boundary, "must be a boundary that has each facet once")
+            raise ModelError(field, boundary, "must be a boundary that lists each facet once")
         inside = facets[self.mesh.f2t[1, facets] != -1] if outer else facets[:0]
         if len(inside):
             first, second = self.mesh.f2t[:, inside[0]]

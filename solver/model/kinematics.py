@@ -1,4 +1,4 @@
-"""How a two-dimensional body moves out of its plane."""
+"""Kinematics of a two-dimensional body: what is assumed in the third direction."""
 
 from __future__ import annotations
 

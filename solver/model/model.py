@@ -1,4 +1,4 @@
-"""Model = bodies + contact pairs: what is solved, checked as a whole."""
+"""Model = bodies + contact pairs, checked as a whole."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from solver.errors import ModelError
 from solver.model.body import Body
 
 LEAST_FRICTION = 1e-10
-"""Friction of this and less is none. All it carries is within the tolerance of normal forces in
-the contact problem, a hundredth of the imbalance and a thousandth of the contact violation an
-increment may leave."""
+"""A coefficient of friction up to this value counts as zero. The forces it allows are below the
+tolerance of normal forces in the contact problem: a hundredth of the out-of-balance force and a
+thousandth of the contact violation that an increment may leave."""
 
 
 def effective_friction(friction: float) -> float:
-    """Return the coefficient that is solved with: zero where friction is lost in rounding."""
+    """Return the coefficient that the solver uses: zero up to `LEAST_FRICTION`."""
     return friction if friction > LEAST_FRICTION else 0.0
 
 
@@ -28,14 +28,14 @@ class ContactPair:
 
     Attributes
     ----------
-    slave, master : ``(body name, boundary name)``. The slave is the body whose surface ends at
-        a corner, else the finer or yielding one; pressure lives on its vertices
-    friction : Coulomb coefficient; 0 leaves out the tangential unknowns, and so does what is no
-        more than rounding (`effective_friction`)
-    shear_limit : largest contact shear over the initial shear yield stress of the weaker body,
-        whatever the pressure; inf (default) is none. Where friction could carry more, the
-        surface layer shears instead of slipping, and without bound as the mesh is refined
-    sliding : ``small`` pairs the surfaces where they are before loading, consistently with
+    slave, master : ``(body name, boundary name)``. Choose as slave the surface that ends at a
+        corner, else the one that is finer or yields; contact pressure belongs to its vertices
+    friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
+        leaves out the tangential unknowns
+    shear_limit : largest contact shear / initial shear yield stress of the weaker body, at any
+        pressure; inf (default) sets no limit. Where friction could carry more than the material,
+        the surface layer flows instead of slipping, and its strain grows as the mesh is refined
+    sliding : ``small`` pairs the surfaces in their positions before loading, consistent with
         small strains (and exactly linear between changes of status); ``finite`` pairs them
         anew in every iteration
     """
@@ -61,8 +61,8 @@ class Model:
 
     Attributes
     ----------
-    bodies : with different names and the same kinematics
-    contacts : pairs of their boundaries
+    bodies : bodies with different names and the same kinematics
+    contacts : pairs of boundaries that may touch
     """
 
     bodies: tuple[Body, ...]

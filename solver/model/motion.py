@@ -1,4 +1,4 @@
-"""What moves over a body: a wheel's axle, or a pressure that travels."""
+"""Loads that move along a body: the axle of a wheel, or a travelling pressure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Axle:
     moment : moment on the axle, positive counter-clockwise [N mm]
     position : position of the axle along x from where it was meshed [mm]
     rotation : rotation of the hub, when it is prescribed instead of the moment [rad]
-    turned : rotation at the start that brings the meshed rim to the track [rad]
+    turned : rotation before the start, which brings the fine part of the rim to the track [rad]
     """
 
     centre: tuple[float, float]
@@ -45,9 +45,9 @@ class TravellingPressure:
     ----------
     boundary : name of the boundary it acts on
     half_width, peak : a [mm] and p0 [MPa]
-    amplitude : share of the pressure
-    position : of its centre along x [mm]
-    shear_ratio : shear along +x over pressure
+    amplitude : factor of the pressure
+    position : position of its centre along x [mm]
+    shear_ratio : shear along +x / pressure
     """
 
     boundary: str
@@ -58,7 +58,7 @@ class TravellingPressure:
     shear_ratio: Amplitude
 
     def now(self, time: float) -> tuple[float, float, float]:
-        """Return the share of the pressure, its centre [mm] and the ratio of shear to it."""
+        """Return the factor of the pressure, its centre [mm] and the ratio of shear to it."""
         return self.amplitude.at(time), self.position.at(time), self.shear_ratio.at(time)
 
     def at(
@@ -66,7 +66,7 @@ class TravellingPressure:
     ) -> tuple[NDArray[np.float64], float]:
         """Return the pressure at positions x [MPa] and the ratio of shear to it.
 
-        On a periodic body the pressure comes back after each ``period`` [mm].
+        On a periodic body the pressure repeats itself after each ``period`` [mm].
         """
         amplitude, centre, ratio = self.now(time)
         away = x - centre

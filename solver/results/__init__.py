@@ -1,1 +1,1 @@
-"""What is looked at when a path has been walked: fields, figures, the audit."""
+"""Results of a walk: fields, figures, the audit."""

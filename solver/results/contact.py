@@ -1,4 +1,4 @@
-"""Contact pressure, shear and gap along the surface, and how wide and high the contact is."""
+"""Contact pressure, shear and gap along the surface, half-width and peak of the contact."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PEAK_CONTACT_PRESSURE = declare(
 
 
 def contact(look: Look) -> Values:
-    """Return what acts between the bodies."""
+    """Return pressure, shear and gap along the surface, the half-width and the peak pressure."""
     along = [look.touch.along(c, look.view.s + centre) for c, centre in look.stages]
     width, peak = look.touch.extent(look.loaded)
     lines = (CONTACT_PRESSURE, CONTACT_SHEAR, CONTACT_GAP)

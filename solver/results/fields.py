@@ -38,7 +38,7 @@ SURFACE_MISES = declare(
 
 
 def maps(look: Look) -> Values:
-    """Return what is left, and what is under load, around the contact."""
+    """Return maps around the contact: residual stress, plastic strain, stress under load."""
     samples = look.samples
     residual = samples.on_map(lambda body: samples.stress(body, look.unloaded))
     under_load = samples.on_map(lambda body: samples.stress(body, look.loaded))
@@ -52,13 +52,13 @@ def maps(look: Look) -> Values:
 
 
 def profiles(look: Look) -> Values:
-    """Return what is left below the surface."""
+    """Return residual stress and plastic strain along depth."""
     stress, strain = look.samples.profile(look.unloaded)
     return {RESIDUAL_PROFILE: stress, PLASTIC_STRAIN_PROFILE: strain}
 
 
 def surfaces(look: Look) -> Values:
-    """Return what is left along the contact surfaces, and how far the lower one yields."""
+    """Return residual stress along the contact surfaces, and von Mises stress of the lower one."""
     samples, bodies = look.samples, look.view.surfaces
     return {
         SURFACE_RESIDUAL: np.stack([samples.on_surface(body, look.unloaded) for body in bodies]),

@@ -1,4 +1,4 @@
-"""Numbers that every run has: extremes, and what the run has cost."""
+"""Figures of every run: extreme values, and the cost of the run."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ PEAK_RESIDUAL_TENSION = declare(
 PEAK_RESIDUAL_COMPRESSION = declare(
     "peak_residual_compression", "smallest normal component of the residual stress", "MPa"
 )
-PLASTIC_WORK = declare("plastic_work", "plastic work of the computed part of the bodies", "N mm")
+PLASTIC_WORK = declare("plastic_work", "plastic work in the meshed part of the bodies", "N mm")
 
 INCREMENTS = declare("increments", "load increments", count=True)
 CUT_INCREMENTS = declare("cut_increments", "load increments that were cut", count=True)
 ITERATIONS = declare("iterations", "Newton iterations", count=True)
-MEDIAN_ITERATIONS = declare("median_iterations", "median Newton iterations an increment")
+MEDIAN_ITERATIONS = declare("median_iterations", "median Newton iterations per increment")
 INNER_FALLBACKS = declare(
     "inner_fallbacks", "iterations whose contact problem needed pivoting", count=True
 )
@@ -55,7 +55,7 @@ def extremes(look: Look) -> Values:
 
 
 def cost(look: Look) -> Values:
-    """Return what the run has cost."""
+    """Return the cost of the run."""
     tally = look.outcome.tally
     return {
         INCREMENTS: len(tally.iterations),

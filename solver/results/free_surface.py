@@ -1,13 +1,12 @@
-"""Stress at a surface that nothing acts on, from what is known of it there.
+"""Stress at a free surface without extrapolation.
 
-Recovered nodal stress goes on to the surface along the line through the integration points of
-the first elements. Where the line is no good, because flow begins within an element, two values
-need none:
+Recovered nodal stress is extrapolated to the surface from the integration points of the first
+elements. This is wrong where flow begins within an element. Two values need no extrapolation:
 
-- the stress at the first row of integration points, though that is of a depth of its own;
-- the stress that the conditions of a free surface leave. With t along the surface and n across it
-  ``sigma_nn = sigma_tn = 0``. Hooke's law between the other two components is then biaxial,
-  whatever the strain across the surface:
+- the stress at the first row of integration points, which is some way below the surface;
+- the stress by the conditions of a free surface. With t along the surface and n across it
+  ``sigma_nn = sigma_tn = 0``. Hooke's law for the other two components is then biaxial, and the
+  strain across the surface does not enter:
 
       e_t = eps_t - ep_t,   e_z = eps_z - ep_z
       sigma_t = E / (1 - nu^2) (e_t + nu e_z)
@@ -18,16 +17,16 @@ need none:
   ``ep`` is that of the first row, so that the error is of first order in the side of the element:
   E / (1 - nu^2) times the change of ``ep_t + nu ep_z`` from the surface to that row.
 
-Where plastic strain is level or nothing below the surface, as free rolling leaves it, both are
-well ahead of the nodal value. Where it changes, strain of the surface and plastic strain of the
-row do not belong together, and the free surface is the worst of the three: a change of 1e-3 is
-220 MPa of steel. It is so under a braked wheel, where the first row settles best, and in a bore
-that yielded, where stress is smooth and the nodal value is nearest.
+Where plastic strain is constant or zero below the surface, as after free rolling, both values are
+much better than the nodal one. Where it varies, strain at the surface and plastic strain of the
+first row are those of different depths, and the free-surface value is the worst of the three: a
+difference of 1e-3 is 220 MPa in steel. This happens under a braked wheel, where the value of the
+first row is best, and in a bore that yielded, where stress is smooth and the nodal value is best.
 
 Both are taken in columns: a point of the first row and its foot, the point of the edge with the
-same coordinate along it. A quadratic displacement has its derivative one order more exact at the
-two Gauss points of the edge than elsewhere, and right there stand the columns of the 2 x 2 points
-of an eight-node quadrilateral. Other rules have their columns elsewhere, and lose that order.
+same coordinate along it. The derivative of a quadratic displacement is one order more exact at the
+two Gauss points of the edge than elsewhere, and the 2 x 2 points of an eight-node quadrilateral
+have their columns exactly there. Other integration rules do not, and lose this order.
 
 References
 ----------
@@ -53,7 +52,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _ONE_ROW = 1e-6
-"""Difference of reference coordinates up to which points are of one row: rounding of the rules."""
+"""Difference of reference coordinates up to which points are in one row: rounding of the rules."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A run that has come to its end, as outputs look at it."""
+"""A finished run, as outputs see it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """One run.
+    """A finished run.
 
     Attributes
     ----------
-    parameters : of the scene, of exactly this run
-    samples : of its system where the scene is looked at
-    touch : what acts between its bodies
-    outcome : what came of its program
+    parameters : the scene's parameters for this run
+    samples : fields of its system at the positions of the scene's view
+    touch : pressure and shear on its lower body
+    outcome : the result of its program
     """
 
     parameters: Any
@@ -41,7 +41,7 @@ class Look:
 
     @property
     def view(self) -> View:
-        """Where it is looked at."""
+        """Where its results are taken."""
         return self.samples.view
 
     @property
@@ -56,12 +56,12 @@ class Look:
 
     @property
     def unloaded(self) -> Converged:
-        """The state that is left."""
+        """The state after unloading."""
         return self.outcome.points["unloaded"]
 
     @property
     def stages(self) -> list[tuple[Converged, float]]:
-        """States whose contact is recorded, with where s counts from [mm]."""
+        """States whose contact is recorded, each with the x at which s is zero [mm]."""
         states = [(name, self.outcome.points[name]) for name in self.view.stages]
         following = self.view.following
         return [(c, self.touch.centre(c) if name in following else 0.0) for name, c in states]

@@ -1,4 +1,4 @@
-"""What each pass leaves under the track, and what becomes of it from cycle to cycle."""
+"""Residual stress and plastic strain after each pass, and their change from cycle to cycle."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _creepage(samples: Samples, first: Converged, last: Converged) -> float:
 
 
 def passes(traces: Sequence[Trace], cycle: int) -> Values:
-    """Return the variables over passes; increments are those of the cycle a pass ends."""
+    """Return the variables over passes; an increment is that of the cycle ending with a pass."""
     middle = len(traces[0].strain) // 2
     accumulated, left = _increments(traces, cycle)
     shear = 2 * left[:, 3]
@@ -119,10 +119,10 @@ def passes(traces: Sequence[Trace], cycle: int) -> Values:
 def shakedown(
     traces: Sequence[Trace], cycle: int, yield_strain: float, *, periodic: bool, hardens: bool
 ) -> Shakedown:
-    """Return the state the passes tend to.
+    """Return the shakedown state that the passes tend to.
 
-    On a track with ends only a body that stays elastic is decided: the ends hold back the layer
-    that ratchetting moves, until it looks like a closed cycle.
+    On a track with ends a body that yields stays undecided: the ends hold back the layer that
+    ratchetting moves, until the cycle seems closed.
     """
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)

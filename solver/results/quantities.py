@@ -1,4 +1,4 @@
-"""What a number of a record means: declared once, in the module that computes it.
+"""The meaning of each number in a record, declared once, in the module that computes it.
 
 The data set, the captions of pictures and the pages read these declarations. `QUANTITIES` is
 complete when `solver.scenes` has been imported.
@@ -22,13 +22,13 @@ class Quantity:
 
     Attributes
     ----------
-    name : of the variable; a coordinate has its own name for its only dimension
+    name : name of the variable; the only dimension of a coordinate has the same name
     long_name : what it is, in words
     units : as the CF conventions write them
-    dims : its dimensions; none for one number a run
-    standard_name : of the CF conventions, where there is one
+    dims : its dimensions; none for one number per run
+    standard_name : name in the CF conventions, where there is one
     count : whether it is a whole number
-    flags : what its values mean, where they are no numbers
+    flags : enumeration of its values, where they stand for words
     beside : more attributes of the CF conventions
     """
 
@@ -86,7 +86,8 @@ def declare(
     ValueError : the name is declared already
     """
     if name in QUANTITIES:
-        raise ValueError(f"{name} is declared already: {QUANTITIES[name].long_name}")
+        known = QUANTITIES[name].long_name
+        raise ValueError(f"{name} is declared already, as {known!r}: choose another name")
     QUANTITIES[name] = Quantity(
         name=name,
         long_name=long_name,

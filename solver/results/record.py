@@ -1,4 +1,4 @@
-"""What one run gives: labelled numpy arrays, ready to become a data set."""
+"""The record of a run: labelled numpy arrays, ready to become a data set."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fields of a system sampled where a view looks."""
+"""Fields of a system, sampled at the positions of a view."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Nodal:
-    """Fields at the nodes of a system's bodies; what recovers them is set up once."""
+    """Fields at the nodes of a system's bodies; the recovery operators are built once."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -93,9 +93,10 @@ class Samples(Nodal):
         return np.asarray(self._lines(u).reshape(2, len(self.view.station), -1)[:, :, 0])
 
     def surface_mises(self, converged: Converged, centre: float) -> Array:
-        """Return von Mises stress along s at the surface whose profiles are taken.
+        """Return von Mises stress along s at the surface of the profile body [MPa].
 
-        It is recovered itself: that of a recovered stress would go far beyond the strength.
+        Von Mises stress is recovered from the points; that of recovered stress would go far
+        beyond the strength.
         """
         name = self.view.profile_body
         body = self.system.full(name)

@@ -1,4 +1,4 @@
-"""What becomes of a body that the same load passes again and again.
+"""The shakedown state of a body that the same load passes again and again.
 
 ============================  ===============================================================
 elastic                       it never yields
@@ -9,8 +9,8 @@ undecided                     the cycles have not become steady
 ============================  ===============================================================
 
 The *signed* plastic strain tells a closed cycle from an open one; the accumulated strain tells
-whether there is flow at all. Both are judged by the bounds between which they tend, and decided
-only where the whole of these bounds agrees.
+whether there is flow at all. For each the bounds of its limit over many cycles are found, and a
+state is decided only if it is the same for all values within the bounds.
 
 K.L. Johnson, Contact Mechanics (1985), section 9.2.
 """
@@ -31,20 +31,21 @@ if TYPE_CHECKING:
 QUIET = 1e-3
 """Accumulated plastic strain of a cycle, over the yield strain, below which nothing flows."""
 CLOSED = 0.05
-"""Plastic strain left by a cycle over that accumulated in it, up to which the cycle is closed; also
-the part of the largest accumulation up to which that of a depth is not told from interpolation."""
+"""Plastic strain left by a cycle / strain accumulated in it, up to which the cycle is closed. Also
+the share of the largest accumulated strain, up to which that at a depth may be an interpolation
+error, and is left out."""
 STEADY = 0.02
-"""Relative change from cycle to cycle, with twice that over the second half of a sequence, up to
-which it has come to its limit."""
+"""Relative change from cycle to cycle, up to which a sequence has reached its limit. Over the
+second half of the sequence twice this change is allowed."""
 AT_REST = 2e-3
-"""Relative change from cycle to cycle below which what came before does not matter."""
+"""Relative change from cycle to cycle, below which earlier values do not matter."""
 KEPT = 0.8
-"""Part of its value half-way that a sequence must keep to tend to anything but zero. A decay as
-1 / n^p keeps 1 / 2^p of it, however long it has lasted."""
+"""Last value of a sequence / its value half-way, below which its limit may be zero. A decay as
+1 / n^p has the ratio 1 / 2^p, however long it has lasted."""
 SLOWEST = 0.95
-"""Ratio of successive changes above which a sequence tends nowhere yet."""
+"""Ratio of successive changes, above which no limit can be extrapolated."""
 KNOWN = 0.1
-"""Distance of the bounds of a limit, over the upper one, up to which their mean is the limit."""
+"""Distance between the bounds of a limit / the upper one, up to which their mean is the limit."""
 
 
 class ShakedownState(IntEnum):
@@ -59,7 +60,7 @@ class ShakedownState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Shakedown:
-    """The state, and the plastic strain a cycle accumulates and leaves in the end (NaN unknown)."""
+    """The state, and the limits of the plastic strain a cycle accumulates and leaves (or NaN)."""
 
     state: ShakedownState
     accumulated: float
@@ -68,7 +69,7 @@ class Shakedown:
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Bounds of what a sequence of numbers that are not negative tends to."""
+    """Bounds of the limit of a sequence of non-negative numbers."""
 
     low: float
     high: float
@@ -77,10 +78,11 @@ class Limit:
     def of(cls, sequence: Array) -> Limit:
         """Return the limit of a sequence (n,) from its last four values, or three.
 
-        A steady sequence has come to its limit, one that changes geometrically is extrapolated
-        (Aitken's process), one that goes up and down keeps within what it showed, any other one
-        goes on as it does. Two triples of values have each their say. What has fallen too far
-        since half-way may go on to zero.
+        A steady sequence has reached its limit. Otherwise the last two triples of values give
+        bounds each, and the limit may be anywhere between all of these: a geometric change is
+        extrapolated (Aitken's process), values that go up and down stay within their range, any
+        others may grow without bound or fall to zero. A sequence that has fallen too far since
+        half-way may also fall to zero.
         """
         if len(sequence) < 3:
             return cls(0.0, np.inf)
@@ -101,7 +103,7 @@ class Limit:
 
 
 def _tends(first: float, second: float, third: float) -> tuple[float, float]:
-    """Return the bounds of the limit that three successive values show."""
+    """Return the bounds of the limit that follow from three successive values."""
     before, last = second - first, third - second
     if abs(last) <= AT_REST * abs(third):
         return third, third
@@ -116,15 +118,15 @@ def _tends(first: float, second: float, third: float) -> tuple[float, float]:
 def classify(
     accumulated: Array, net: Array, yield_strain: float, *, hardens: bool = False
 ) -> Shakedown:
-    """Return the shakedown state from what each cycle did.
+    """Return the shakedown state from the plastic strain of each cycle.
 
     Parameters
     ----------
     accumulated : (n_cycles, n_depths) equivalent plastic strain accumulated in a cycle
     net : (n_cycles, n_depths) equivalent of the signed plastic strain a cycle leaves
     yield_strain : yield stress / Young's modulus
-    hardens : whether linear hardening bounds plastic strain, so that no cycle can go on leaving
-        some: ratchetting then has not come to its end, however slow it is
+    hardens : whether linear hardening bounds plastic strain: ratchetting then must end some time,
+        and cycles that still leave plastic strain are undecided, however little they leave
     """
     if not accumulated.any():
         return Shakedown(ShakedownState.ELASTIC, 0.0, 0.0)

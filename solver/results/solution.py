@@ -1,4 +1,4 @@
-"""Solve a model of the user's own: load it, release it, look at what is left."""
+"""Solve a model of your own: load it, release it, and read both states."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.model.model import Model
 
-Stage = Literal["loaded", "unloaded"]
+StageName = Literal["loaded", "unloaded"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +33,9 @@ class Solution:
     Attributes
     ----------
     system : the model's parts and interfaces
+    load : the load factor reached
     loaded, unloaded : the converged states
-    tally : what it cost
+    tally : its cost
     """
 
     system: System
@@ -43,7 +44,7 @@ class Solution:
     unloaded: Converged
     tally: Tally
 
-    def _at(self, stage: Stage) -> Converged:
+    def _at(self, stage: StageName) -> Converged:
         if stage not in ("loaded", "unloaded"):
             raise ModelError("stage", stage, "must be loaded or unloaded")
         return self.loaded if stage == "loaded" else self.unloaded
@@ -52,11 +53,11 @@ class Solution:
         """Return node positions (2, n_nodes) of a body [mm]."""
         return self.system.full(body).X
 
-    def displacement(self, body: str, stage: Stage = "unloaded") -> NDArray[np.float64]:
+    def displacement(self, body: str, stage: StageName = "unloaded") -> NDArray[np.float64]:
         """Return nodal displacements (2, n_nodes) [mm]."""
         return self.system.displacement(body, self._at(stage).state).reshape(-1, 2).T
 
-    def stress(self, body: str, stage: Stage = "unloaded") -> NDArray[np.float64]:
+    def stress(self, body: str, stage: StageName = "unloaded") -> NDArray[np.float64]:
         """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
 
         Unloaded, this is the residual stress.
@@ -68,7 +69,7 @@ class Solution:
         return Nodal(self.system).plastic_strain(body, self.unloaded)
 
     def contact(
-        self, pair: int = 0, stage: Stage = "loaded"
+        self, pair: int = 0, stage: StageName = "loaded"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave."""
         chain = self.system.interfaces[pair].slave_surface
@@ -76,7 +77,7 @@ class Solution:
         return chain.X[:, chain.vertices], pressure, shear
 
     def audit(self) -> Audit:
-        """Return what this solution proves about itself."""
+        """Return the audit: figures of this solution, violated conditions and warnings."""
         return audit(self.system, self.loaded, self.unloaded, self.tally.dissipation)
 
 

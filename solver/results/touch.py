@@ -1,4 +1,4 @@
-"""What acts between the bodies of a run: in contact, or as prescribed."""
+"""Pressure and shear on the lower body of a run: of contact, or prescribed."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 
 class Touch(Protocol):
-    """What acts on the lower body, whose surface runs along x."""
+    """Pressure and shear on the lower body, whose surface runs along x."""
 
     def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
         """Return pressure, shear along +x [MPa] and gap [mm] at positions x (n,).
 
-        NaN beyond the surface, and for a gap there is not: bodies taken apart have none to speak
-        of, a prescribed pressure has none.
+        NaN beyond the surface. The gap is NaN also for bodies taken apart and for a prescribed
+        pressure.
         """
 
     def extent(self, converged: Converged) -> tuple[float, float]:
@@ -42,8 +42,8 @@ class Touch(Protocol):
 class Contact:
     """The first interface of a system.
 
-    In every scene the lower body's +x is the opposite of the slave's own tangent. ``symmetric``
-    tells that the other half of the contact is not computed.
+    In every scene +x of the lower body is opposite to the tangent of the slave. ``symmetric``
+    means that the other half of the contact is not computed.
     """
 
     def __init__(self, system: System, *, symmetric: bool) -> None:
@@ -66,7 +66,7 @@ class Contact:
             found = np.interp(x, self._x[order], values[order], left=left, right=right)
             return np.asarray(found)
 
-        # contact does not go on where the surface of the pair ends and that of the body does not
+        # zero pressure beyond the surface of the pair, where the surface of the body goes on
         free = np.where(self._interface.slave_surface.goes_on, 0.0, np.nan)
         free = free if self._x[0] < self._x[-1] else free[::-1]
         nowhere = np.full(2, np.nan)
@@ -92,7 +92,7 @@ class Contact:
 
 
 class Prescribed:
-    """A travelling pressure over a surface that repeats itself after ``period``, if not 0."""
+    """A travelling pressure; its surface repeats itself after ``period``, unless that is 0."""
 
     def __init__(self, travelling: TravellingPressure, period: float) -> None:
         self._travelling = travelling

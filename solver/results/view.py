@@ -1,4 +1,4 @@
-"""Where a scene is looked at."""
+"""Where the results of a scene are taken."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ BODY = declare("body", "body", "", dims=("body",))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """Where a scene is looked at; independent of its mesh, so that runs can be compared.
+    """Where the results of a scene are taken; independent of its mesh, so that runs compare.
 
     Attributes
     ----------
@@ -46,10 +46,10 @@ class View:
     s : positions along the contact surface from its centre [mm]
     profile_body : the body whose profiles are taken
     surfaces : body -> boundary that is its contact surface, in the order of the dimension
-    stages : states whose contact is recorded, by the names that the program gives them
-    loaded : the one of them that is looked at as the state under load
-    following : those of them at which ``s`` counts from where the load is, not from x = 0
-    symmetric : whether the bodies are one half of what is symmetric about x = 0
+    stages : states whose contact is recorded, by the names of the program's stages
+    loaded : the one of them that is taken as the state under load
+    following : those of them in which ``s`` is zero where the load is, not at x = 0
+    symmetric : whether the bodies are one half of a model symmetric about x = 0
     """
 
     x: Array

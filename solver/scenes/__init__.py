@@ -1,7 +1,7 @@
 """The named scenes: parameters in, records out.
 
-A scene is a parameter class and a function that walks one loading path. Runs that
-differ only in the scene's ``branch`` parameter share one path.
+A `Scene` is data: parameters, model, program, view and outputs. Runs that differ only in the
+scene's ``branch`` parameter share the increments they have in common.
 """
 
 from __future__ import annotations

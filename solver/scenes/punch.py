@@ -4,9 +4,9 @@ A square-cornered punch of half-width a and a half-plane of the same material, s
 x = 0, so that half of it is meshed. Uniform pressure on top of the punch is raised to
 ``load_ratio * yield_stress`` and removed. The punch is held by contact alone.
 
-The outer dimensions are not given in the source; they are parameters here. A finite half-plane
-costs an error that falls as one over its size: 40 a lacks less than 1 % of the residual tension
-and 2 % of the plastic work.
+The outer dimensions are not given in the source; they are parameters here. The error of a finite
+half-plane is inversely proportional to its size: with 40 a, residual tension is less than 1 % and
+plastic work less than 2 % too small.
 
 P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1.
 """
@@ -87,7 +87,7 @@ class PunchParameters(ContactParameters):
             raise ModelError(
                 "smallest_element", self.smallest_element,
                 f"makes {elements} elements with growth {self.growth:g}; at most "
-                f"{_MOST_ELEMENTS} are allowed: grow faster or start larger",
+                f"{_MOST_ELEMENTS} are allowed: raise growth or smallest_element",
             )  # fmt: skip
 
 
@@ -144,7 +144,7 @@ def program(parameters: PunchParameters) -> Program:
 
 
 def view(parameters: PunchParameters) -> View:
-    """Return where the punch is looked at: a function of its dimensions, not of its mesh."""
+    """Return where the results are taken: a function of dimensions, not of the mesh."""
     a = parameters.half_width
     height = min(0.6, parameters.punch_height) * a
     inside = np.unique(np.concatenate([[0.005, 0.01, 0.028, 0.05, 0.1],
@@ -182,11 +182,11 @@ MAX_PLASTIC_STRAIN = {
 FREE_SURFACE = declare("audit_free_surface", "residual stress across the free side / yield stress")
 SELF_EQUILIBRIUM = declare("audit_self_equilibrium", "net residual force on a cut plane, relative")
 _INSIDE = {"half_plane": 0.005, "punch": 0.028}
-"""Where residual stress is read, from the corner / a: as published."""
+"""Distance from the corner / a, at which residual stress is read, as in the publication."""
 
 
 def figures(look: Look) -> Values:
-    """Return the figures this scene is judged by."""
+    """Return the figures of the punch, those of the publication among them."""
     samples, system, unloaded = look.samples, look.system, look.unloaded
     a, s = look.parameters.half_width, look.view.s
     out: dict[Quantity, float] = {}
@@ -201,7 +201,7 @@ def figures(look: Look) -> Values:
     nodes = system.full("punch").boundary_nodes("right")
     side = samples.stress("punch", unloaded)[0, nodes]
     out[FREE_SURFACE] = float(np.abs(side).max() / look.parameters.yield_stress)
-    # nothing pushes on the half-plane any more: no level cut carries a force
+    # nothing pushes on the half-plane any more: a horizontal cut carries no normal force
     width = float(system.full("half_plane").X[0].max())
     line = np.linspace(0.0, width * (1 - 1e-9), 8000)
     cut = np.stack([line, np.full_like(line, -0.5 * a)])

@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 
 CREEPAGE = declare("creepage", "creepage of the last pass")
 TRAVEL = declare("travel", "length rolled in the last pass", "mm")
-ADVANCE = declare("advance", "advance of an increment that was taken", "mm")
+ADVANCE = declare("advance", "advance of an increment, as used", "mm")
 ADVANCE_ERROR = declare(
     "advance_error",
-    "estimated error of residual stress under mid-track that the advance leaves", "MPa",
+    "estimated error of residual stress under mid-track by the advance of increments", "MPa",
 )  # fmt: skip
 SURFACE = {
     "x": declare(
@@ -114,10 +114,10 @@ SHAKEDOWN_STATE = declare(
     "shakedown_state", "shakedown state that the passes tend to", flags=ShakedownState
 )
 STEADY_PLASTIC_INCREMENT = declare(
-    "steady_plastic_increment", "plastic strain accumulated in a cycle, in the end"
+    "steady_plastic_increment", "limit of the plastic strain accumulated in a cycle"
 )
 STEADY_NET_INCREMENT = declare(
-    "steady_net_increment", "signed plastic strain a cycle leaves, in the end"
+    "steady_net_increment", "limit of the signed plastic strain that a cycle leaves"
 )
 
 
@@ -127,7 +127,7 @@ def program(parameters: RollingParameters) -> Program:
 
 
 def view(parameters: RollingParameters) -> View:
-    """Return where rolling is looked at: a function of its dimensions, not of its mesh."""
+    """Return where the results are taken: a function of dimensions, not of the mesh."""
     half, a = parameters.track / 2, parameters.half_width
     depth = 5 * a
     edge = math.ceil(half + 2 * a)
@@ -146,7 +146,7 @@ def view(parameters: RollingParameters) -> View:
 
 
 def settling(parameters: RollingParameters) -> Settling | None:
-    """Return how the advance is chosen: as given, or halved until residual stress settles."""
+    """Return how the advance is halved until residual stress settles; None keeps it as given."""
     tolerance = parameters.advance_tolerance * parameters.yield_stress
     return Settling(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
 
@@ -157,7 +157,7 @@ def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
 
 
 def progress(look: Look) -> Values:
-    """Return how far the wheel came in its last pass, and in what increments."""
+    """Return the length rolled in the last pass, and the advance of its increments."""
     schedule, settled = look.parameters.schedule, look.outcome.settled
     return {
         TRAVEL: schedule.travel(look.outcome.last.state.time),
@@ -167,7 +167,7 @@ def progress(look: Look) -> Values:
 
 
 def profile_figures(look: Look) -> Values:
-    """Return the figures of the last pass under mid-track that rolling is judged by."""
+    """Return the figures of the last pass under mid-track."""
     trace: Trace = look.outcome.traces[-1]
     stress, strain = trace.stress, trace.strain
     depth = look.view.depth
@@ -187,7 +187,7 @@ def profile_figures(look: Look) -> Values:
 
 
 def wheel(look: Look) -> Values:
-    """Return the longitudinal force at mid-track and, where there is a wheel, how it stands."""
+    """Return the longitudinal force at mid-track, and height and rotation of the wheel if any."""
     out: dict[Quantity, float] = {LONGITUDINAL_FORCE: look.touch.force(look.loaded)}
     for part, u in zip(look.system.parts, look.loaded.state.u, strict=True):
         if isinstance(part, Wheel):
@@ -197,7 +197,7 @@ def wheel(look: Look) -> Values:
 
 
 def surface(look: Look) -> Values:
-    """Return residual stress at mid-track that is not extrapolated to the surface."""
+    """Return residual stress at and near the surface at mid-track, without extrapolation."""
     found = FreeSurface.of(look.system.full("half_space"), "top")
     response = look.system.response("half_space", look.unloaded)
     u = look.system.displacement("half_space", look.unloaded.state)
@@ -211,7 +211,7 @@ def surface(look: Look) -> Values:
 
 
 def cycles(look: Look) -> Values:
-    """Return what every pass left, and what the cycles tend to."""
+    """Return the results of every pass, and the shakedown state that the cycles tend to."""
     parameters = look.parameters
     cycle = parameters.schedule.cycle
     found = shakedown(
@@ -227,7 +227,7 @@ def cycles(look: Look) -> Values:
 
 
 def warnings(look: Look) -> tuple[str, ...]:
-    """Return what there is to say of the error that the advance leaves."""
+    """Return a warning where the error by the advance is above its tolerance, or unknown."""
     settled, tolerance = look.outcome.settled, settling(look.parameters)
     if tolerance is None or settled.error <= tolerance.tolerance:
         return ()
@@ -237,7 +237,8 @@ def warnings(look: Look) -> tuple[str, ...]:
     failed = f"; one of {advance / settled.failed:.3g} mm failed" if settled.failed else ""
     return (
         f"an advance of {advance / settled.times:.3g} mm still leaves {error}, "
-        f"above the tolerance of {tolerance.tolerance:.3g} MPa{failed}",
+        f"above the tolerance of {tolerance.tolerance:.3g} MPa{failed}: "
+        "reduce advance_step or raise advance_tolerance",
     )
 
 

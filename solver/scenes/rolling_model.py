@@ -36,7 +36,7 @@ _MOST_INCREMENTS = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RollingParameters(ContactParameters):
-    """Parameters of rolling (N, mm, MPa; forces a mm of width)."""
+    """Parameters of rolling (N, mm, MPa; forces per mm of width)."""
 
     yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
         502.0, "uniaxial yield stress Re of the half-space"
@@ -51,7 +51,7 @@ class RollingParameters(ContactParameters):
         "locked wheel",
     )
     control: Literal["moment", "creepage"] = described(
-        "moment", "whether the wheel turns as the moment of `traction` makes it, or as prescribed"
+        "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
     )
     given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
         0.0,
@@ -76,7 +76,7 @@ class RollingParameters(ContactParameters):
     periodic: bool = described(
         False,
         "whether the half-space, as deep as the track is long, repeats itself after each track "
-        "length with all that is on it: a track without ends",
+        "length, together with its loads: a track without ends",
     )
     element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
         1.0, "element side along the track and at the surface"
@@ -89,8 +89,8 @@ class RollingParameters(ContactParameters):
     )
     advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
         0.0,
-        "largest change / yield stress that halving the advance may make to residual stress: it is "
-        f"halved until then, {HALVINGS} times at most; 0 takes advance_step as it is",
+        "largest change of residual stress / yield stress by halving the advance: it is halved "
+        f"until the change is smaller, at most {HALVINGS} times; 0 keeps advance_step",
     )
     press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
         8, "increments of setting down, and of driving"
@@ -165,7 +165,7 @@ class RollingParameters(ContactParameters):
 
     @property
     def _turning(self) -> float:
-        """Largest length of rim that passes over a length of track."""
+        """Largest length of rim / length of track over which it passes."""
         return 1 + max(0.0, -self.given_creepage)
 
     @property
@@ -266,7 +266,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     if parameters.traction == 1.0:  # locked
         rotation = Amplitude(position.time, np.full_like(position.value, -turned))
     elif parameters.control == "creepage" or parameters.frictionless:
-        # without friction nothing turns the wheel: it is turned to roll
+        # without friction no moment turns the wheel: its rotation is prescribed as rolling
         turning = (1 - parameters.given_creepage) * position.value / R
         rotation = Amplitude(position.time, -turned - turning)
     return Body(

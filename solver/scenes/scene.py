@@ -1,4 +1,4 @@
-"""A scene is data; one driver walks every scene."""
+"""A scene is data; one driver runs every scene."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from solver.results.touch import touch_of
 from solver.results.view import View
 
 Monitor = Callable[[float], None]
-"""Called after every increment with the fraction of the path done (0-1).
-An exception it raises stops the path and reaches the caller unchanged."""
+"""Called after every increment with the fraction of the work done (0-1).
+An exception it raises stops the work and reaches the caller unchanged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,19 +37,19 @@ class Scene:
     parameters : frozen, keyword-only dataclass; every field has a default, an
         ``annotated_types`` constraint where it has a range, an ``annotated_types.Unit`` and a
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
-    branch : the parameter along which one loading path serves many runs: a larger value goes on
-        where a smaller one ends, or leaves the same path later
-    refining : parameters that change how accurate a result is, not what it is the result of:
-        runs that differ in these alone solve one problem, and can be compared
+    branch : the parameter for whose values runs share increments: the run of a larger value goes
+        on where that of a smaller one ends, or leaves it later
+    refining : parameters that change the accuracy of a result, not the problem: runs that differ
+        in these alone solve the same problem, and can be compared
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
-    view : (parameters) -> where it is looked at
-    outputs : what is computed of a run that came to its end
-    costs : what is known of every run, also of one that did not
+    view : (parameters) -> where results are taken
+    outputs : functions that compute quantities of a complete run
+    costs : functions that compute quantities of every run, also of one that failed
     trace : (samples, states of a lap) -> what is kept of each lap
-    settling : (parameters) -> how increments are chosen, or None to take those of the program
-    warnings : (run) -> what its user must be told
-    advice : what to do about an outcome
+    settling : (parameters) -> how increments are halved, or None to take those of the program
+    warnings : (run) -> texts for the user, added to the message of its record
+    advice : for an outcome, what the user can do
     """
 
     name: str
@@ -70,7 +70,7 @@ class Scene:
     def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
         """Yield one record for each value of the branch parameter, in increasing order.
 
-        Each is yielded as it becomes known; failures are records too.
+        Each is yielded as soon as it is known; a failed run gives a record too.
         """
         kind = type(getattr(parameters, self.branch))
         runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
@@ -133,7 +133,7 @@ def _merged(look: Look, outputs: Sequence[Output]) -> Values:
 
 
 def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:
-    """Return what tells a monitor, after each increment, the share of all of them."""
+    """Return the function to call after each increment: it tells the monitor the share done."""
     before = [0, *(shared(one, other) for one, other in pairwise(programs))]
     expected = sum(len(p.targets) - first for p, first in zip(programs, before, strict=True))
     done = 0

@@ -5,7 +5,7 @@ One pass takes the times
 ====================  =====================================================================
 0 to 1                the load grows where the pass begins
 1 to 2                the moment grows (left out where there is none)
-then one a millimetre the axle advances to the other end
+then 1 per millimetre the axle advances to the other end
 then 1                the load is released, and the bodies are taken apart
 then 1                the axle goes to where the next pass begins
 ====================  =====================================================================
@@ -14,16 +14,12 @@ then 1                the axle goes to where the next pass begins
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage
 from solver.model.amplitude import Amplitude
-
-if TYPE_CHECKING:
-    pass
 
 _ROUNDING = 1e-6
 
@@ -37,7 +33,7 @@ class Schedule:
     n : number of passes
     track : length rolled in a pass, centred on x = 0 [mm]
     step : advance of an increment [mm]
-    directions : (n,) +1 or -1, the way each pass goes along x
+    directions : (n,) +1 or -1, direction of each pass along x
     driven : whether a moment acts
     press, release : increments of loading and of unloading
     """
@@ -66,7 +62,7 @@ class Schedule:
 
     @property
     def cycle(self) -> int:
-        """Passes after which the same load comes again."""
+        """Passes after which the loading repeats itself."""
         return len(set(self.directions))
 
     @property
@@ -81,13 +77,13 @@ class Schedule:
         return self.marks[-1]
 
     def travel(self, time: float) -> float:
-        """Return the length rolled up to a time in the pass that it is in [mm]."""
+        """Return the length rolled at a time since its pass began [mm]."""
         number = min(int(time / self.duration + _ROUNDING), self.n - 1)
         _, driven, _, _, _ = self.marks
         return min(max(time - (number * self.duration + driven), 0.0), self.track)
 
     def place(self, time: float) -> str:
-        """Return in words where a time is."""
+        """Return the words for a time in messages: which pass, and how far."""
         number = int(time / self.duration + _ROUNDING)
         since = max(0.0, time - number * self.duration)
         loaded, driven, arrived, released, _ = self.marks
@@ -105,7 +101,7 @@ class Schedule:
 
     @property
     def drive(self) -> Amplitude:
-        """Share of the moment over time, with the way of the pass as its sign."""
+        """Share of the moment over time, with the direction of the pass as its sign."""
         share = float(self.driven)
         return self._amplitude([(0.0, 0.0, way * share, way * share, 0.0)
                                 for way in self.directions])  # fmt: skip
@@ -118,7 +114,7 @@ class Schedule:
 
     @property
     def way(self) -> Amplitude:
-        """Way along x over time, +1 or -1."""
+        """Direction along x over time, +1 or -1."""
         return self._amplitude([(float(way),) * 5 for way in self.directions])
 
     def _amplitude(self, values: list[tuple[float, ...]]) -> Amplitude:

@@ -237,7 +237,7 @@ def test_an_unmerged_node_is_refused(cells, offset, unit):
         cracked = unmerged(mesh, node, beside[right])
         said = refusal(type(mesh)(unit * (cracked.p + offset), cracked.t))
         assert said.startswith(f"nodes {node} and 25 lie on one another")
-        assert "merge them; what touches itself on purpose must be two bodies" in said
+        assert "merge them; surfaces meant to touch need two bodies" in said
 
 
 def test_an_unmerged_node_read_from_a_file_of_few_digits_is_refused():

@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import Status
 from solver.scenes.rolling_model import RollingParameters
-from tests.verification.rolling_table import CASES, YIELD, after, mid_track, passes, strain, stress
+from tests.verification.rolling_table import CASES, YIELD, after, mid_track, strain, stress
 
 # -- free rolling --------------------------------------------------------------------------------
 
@@ -83,14 +82,14 @@ def test_braking_again_doubles_the_strain_and_shifts_stress_to_compression():
         assert second.distance(first) < 0.3 * first.size
 
 
-def test_locked_wheel_strains_the_surface_beyond_small_strains_or_reaches_a_limit():
-    (record,) = passes("T4")
-    if record.status is Status.LIMIT_LOAD:
-        assert record.scalars["travel"] > 0
-    else:
-        assert record.status is Status.OK, record.message
-        assert record.scalars["depth_of_highest_plastic_strain"] == 0.0
-        assert record.scalars["surface_plastic_strain"] > 0.1
+def test_locked_wheel_strains_the_surface_beyond_small_strains():
+    """Flow widens the contact: friction stays below the shear strength, and equilibrium exists."""
+    record = after("T4")
+    assert record.scalars["audit_friction_over_strength"] < 1.0
+    assert "small-strain theory" in record.message
+    profile = strain("T4")
+    assert profile.depth_of_highest == 0.0
+    assert profile.surface > 0.1
 
 
 # -- accelerating --------------------------------------------------------------------------------

@@ -1,9 +1,9 @@
-"""What a solution must satisfy, checked after the fact and by other means than solved it.
+"""Checks of a solution by other means than those that solved it.
 
-Taken from the solver as they are: meshes, supports, the chains of edges of contact surfaces, the
-displacements of condensed bodies. `plain` evaluates bodies without the solver's operators, `law`
-states what a law demands instead of solving it, `surfaces` measures contact on the deformed bodies;
-`bodies`, `pairs` and `forces` make figures of them, and `report` holds these against their limits.
+Taken from the solver without a check: meshes, supports, the chains of edges of contact surfaces,
+the displacements of condensed bodies. `plain` evaluates bodies without the solver's operators,
+`law` repeats an increment in smaller steps, `surfaces` measures contact on the deformed bodies;
+`bodies`, `pairs` and `forces` make figures of these, and `report` compares them with their limits.
 """
 
 from __future__ import annotations

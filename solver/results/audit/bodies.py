@@ -1,4 +1,4 @@
-"""What each body must satisfy by itself: balance, its law, its loads and reactions."""
+"""Figures of each body by itself: balance, its law, its loads and reactions."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _SAMPLE = 200
 
 
 class AuditedBody:
-    """A body of a system in a converged increment; what several figures need is evaluated once.
+    """A body of a system in a converged increment; values for several figures are computed once.
 
-    ``plain`` is the body itself, shared by its states.
+    ``plain`` is the body itself, which all its states share.
     """
 
     def __init__(self, system: System, plain: PlainBody, converged: Converged) -> None:
@@ -41,7 +41,7 @@ class AuditedBody:
 
     @property
     def meshed(self) -> bool:
-        """Whether the increments solved for all of its nodes, and kept its internal variables."""
+        """Whether increments solve for all of its nodes, and not for a condensed body."""
         return self.part.meshed
 
     def _strain(self, state: State) -> Array:
@@ -55,14 +55,14 @@ class AuditedBody:
 
     @cached_property
     def stress(self) -> Array:
-        """Mandel stress (4, n_points): what the increment gave, or that of elastic strain."""
+        """Mandel stress (4, n_points): of the increment, or of elastic strain [MPa]."""
         if self.meshed:
             return self._response.stress
         return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
 
     @cached_property
     def balancing(self) -> Array:
-        """Nodal forces (n_nodes, 2) that must act on the body for its stress to hold [N]."""
+        """Nodal forces (n_nodes, 2) that are in balance with the stress of the body [N]."""
         return self.plain.forces(self.stress)
 
     @cached_property
@@ -75,10 +75,10 @@ class AuditedBody:
 
     def applied(self) -> Array:
         """Return the resultant of the loads (2,) [N]."""
-        load, travelling = self._converged.state.time, self.plain.body.travelling
+        time, travelling = self._converged.state.time, self.plain.body.travelling
         if travelling is None:
-            return self.plain.applied(load)
-        share, _, ratio = travelling.now(load)
+            return self.plain.applied(time)
+        share, _, ratio = travelling.now(time)
         whole = np.pi / 2 * travelling.half_width * travelling.peak * share
         return whole * self.plain.body.thickness * np.array([ratio, -1.0])
 
@@ -121,7 +121,7 @@ class AuditedBody:
         return float(broken.max(initial=0.0)), float(beyond.max(initial=0.0))
 
     def increment_error(self) -> float:
-        """Return the change of stress that smaller steps make where it flows, over yield stress."""
+        """Return the change of stress by smaller steps / yield stress, where the body flows."""
         law, after = self.plain.body.law, self._response.state
         if not self.meshed or law.elastic:
             return 0.0

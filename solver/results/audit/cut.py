@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def cut_force(
     system: System, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
 ) -> float:
-    """Return the normal force on a plane cut over the force its area carries at yield.
+    """Return the normal force on a plane cut / the force that its area carries at yield.
 
-    ``where`` (2, n) are points along the straight cut; ``stress`` (4, n_points) Mandel. Zero for
-    a residual stress that holds itself, but for the discretisation error.
+    ``where`` (2, n) are points along the straight cut; ``stress`` (4, n_points) Mandel. A residual
+    stress is in balance with itself: it gives zero, apart from the discretisation error.
     """
     p = system.full(body)
     along = where[:, -1] - where[:, 0]

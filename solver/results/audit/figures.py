@@ -1,4 +1,4 @@
-"""What the audit finds of every run; `docs/audit.md` tells how."""
+"""The figures of the audit, which every run has; `docs/audit.md` explains them."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ _DECLARED = [
     declare("audit_reactions", "loads, contact and reactions of a body out of balance / force"),
     declare(
         "audit_action_reaction",
-        "contact force less what the stress of either body holds / contact force",
+        "contact force minus the force by the stress of either body / contact force",
     ),
-    declare("audit_law", "stress off the material law, stated anew / yield stress"),
+    declare("audit_law", "deviation of stress from the material law / yield stress"),
     declare(
         "audit_increment_error",
-        "change of stress that four steps for one make in the last increment / yield stress",
+        "change of stress if the last increment is divided into four / yield stress",
     ),
     declare(
         "audit_overlap", "mean overlap of the deformed bodies, or mean gap where they press", "mm"
     ),
     declare("audit_closed_gap", "mean gap or overlap where the bodies press", "mm"),
-    declare("audit_slip", "friction work that slip lacks / friction work"),
-    declare("audit_energy", "work of the loads not found again / work"),
+    declare("audit_slip", "friction work missing in slip / friction work"),
+    declare("audit_energy", "work missing in the energy balance / work"),
     declare("audit_tension", "largest tensile contact force", "N"),
-    declare("audit_friction_excess", "largest tangential force beyond friction", "N"),
+    declare("audit_friction_excess", "largest tangential force above the friction bound", "N"),
     declare("audit_surface_shear", "largest contact shear / shear yield stress"),
     declare(
         "audit_friction_over_strength",
@@ -37,7 +37,7 @@ _DECLARED = [
     ),
     declare(
         "audit_contact_after_unloading",
-        "force that the stress of the released bodies still needs from loads or contact", "N",
+        "force out of balance with the stress of the released bodies", "N",
     ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LITTLE = 1e-4
-"""Contact force over the force level below which it is compared with that."""
+"""Contact force / force level, below which errors are compared with this level instead."""
 
 
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
@@ -48,15 +48,15 @@ def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converge
 
 
 def left_on(bodies: Sequence[AuditedBody]) -> float:
-    """Return the force that must act beside supports for the stress of the bodies to hold [N].
+    """Return the force other than reactions that the stress of the bodies needs for balance [N].
 
-    None does on bodies taken apart and unloaded, whatever shape they have kept.
+    On unloaded bodies taken apart no such force acts, whatever shape they have kept.
     """
     return float(np.sqrt(sum((body.balancing[body.free] ** 2).sum() for body in bodies)))
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the nodal forces (n_nodes, 2) the pairs exert on a body, in space, and its nodes."""
+    """Return nodal forces (n_nodes, 2) of the pairs on a body, in space, and where they act."""
     whole = body.plain.part
     force = np.zeros((whole.X.shape[1], 2))
     for pair in pairs:
@@ -76,12 +76,12 @@ def action_reaction(
     pairs: Sequence[AuditedPair],
     converged: Converged,
 ) -> float:
-    """Return how much the forces that bodies feel at their surfaces differ from the contact forces.
+    """Return the difference between contact forces and the forces that bodies feel, relative.
 
-    What a body feels is what its stress holds at the nodes of its contact surfaces. Resultant and
-    moment are compared on either side of every pair, so that both sides feel one and the same; the
-    figure is over the sum of normal forces of the body's least loaded pair (and the length of the
-    contact).
+    A body feels the forces that balance its stress at the nodes of its contact surfaces. Resultant
+    and moment are compared for both bodies of every pair, so that both feel the same. They are
+    divided by the sum of normal forces of the body's least loaded pair (the moment also by the
+    length of the contact).
     """
     scale = _LITTLE * converged.state.force_scale
     turning = any(pair.surfaces.pair.sliding == "finite" for pair in pairs)
@@ -108,8 +108,8 @@ def reactions(
 ) -> float:
     """Return how far loads, contact and reactions of a body are from balance, over the force level.
 
-    Pressures count by the shape of their boundary, the load of a wheel by its program; reactions
-    are what the stress exerts where supports hold.
+    The resultant of pressures comes from the shape of their boundary, that of a wheel from the
+    amplitude of its axle; reactions come from the stress where supports hold.
     """
     worst = 0.0
     for body in bodies:

@@ -1,4 +1,4 @@
-"""How far the last increment is from one of infinitely small steps."""
+"""The error of the last increment in time, estimated with smaller steps."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 def increment_error(
     law: Law, strains: tuple[Array, Array], stress: Array, before: PlasticState, steps: int = 4
 ) -> float:
-    """Return the largest change of a stress component, over the yield stress, by smaller steps.
+    """Return the largest change of a stress component by smaller steps / yield stress.
 
     Parameters
     ----------
     strains : two Mandel strains (n_components, n); the points go straight from one to the other
-    stress : what one step to the second one gives (n_components, n), Mandel [MPa]
-    before : internal variables at the first one
-    steps : how many the increment is divided into
+    stress : the result of one step to the second strain (n_components, n), Mandel [MPa]
+    before : internal variables at the first strain
+    steps : number of steps the increment is divided into
     """
     first, last = strains
     found, state = stress, before

@@ -1,4 +1,4 @@
-"""What each contact pair must satisfy, measured on the deformed bodies."""
+"""Figures of each contact pair, measured on the deformed bodies."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _PRESSED = 1e-6
-"""Force below this part of the force level is none."""
+"""Normal force / force level, below which a vertex counts as open."""
 _GAP = 2e-3
-"""Gap allowed, over the elastic approach."""
+"""Largest gap allowed / elastic approach."""
 _OVERLAP = (0.02, 2.5e-3)
-"""Overlap allowed, over the elastic approach and over the side of an element."""
+"""Largest overlap allowed / elastic approach, and / side of an element; the larger one counts."""
 _STILL = 1e-3
-"""Slip below this part of the elastic approach is none."""
+"""Least slip / elastic approach, in the work that wrong slip is compared with."""
 
 
 class AuditedPair:
@@ -78,7 +78,7 @@ class AuditedPair:
 
     @property
     def limits(self) -> dict[str, float]:
-        """What gaps and overlaps this pair is allowed [mm]."""
+        """The largest gap and overlap allowed for this pair [mm]."""
         edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
         touching = self._system.touching
         overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
@@ -101,7 +101,7 @@ class AuditedPair:
         gap, true = np.nan_to_num(self.touching.gap), np.nan_to_num(self.touching.true_gap)
         pressed = np.where(self._closed, self.normal, 0.0)
         pressed /= max(float(pressed.sum()), 1e-300)
-        # by area: the last vertex at a sharp corner is not told from its own distortion
+        # mean over the area: at a sharp corner the overlap of the last vertex is mostly distortion
         deep = np.maximum(-np.minimum(gap, true), 0.0) @ self.touching.area
         area = float(self.touching.area[self._closed].sum() or self.touching.area.sum())
         return {
@@ -115,10 +115,11 @@ class AuditedPair:
         }
 
     def _wrong_slip(self) -> float:
-        """Return the friction work that slip lacks over the work it should do.
+        """Return the friction work that is missing in slip / the work it should do.
 
-        Slip against a shear below its bound, or along it, is wrong: nothing may slip before the
-        bound is reached, and friction opposes what slips. Vertices new in contact are left out.
+        Slip is wrong where the shear is below its bound, and where it has the direction of the
+        shear: nothing may slip below the bound, and friction opposes slip. Vertices new in contact
+        are left out.
         """
         judged = self._closed & self._start.touching & (self.touching.area > 0)
         bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])

@@ -1,4 +1,4 @@
-"""A body evaluated once more, plainly: strain, nodal forces, applied forces, elastic energy.
+"""A second, plain evaluation of a body: strain, nodal forces, applied forces, elastic energy.
 
 Nothing here uses the operators that increments are solved with: gradients come from the elements
 themselves, volumes from the quadrature, and the resultants of pressures from the shape of the
@@ -63,12 +63,12 @@ class PlainBody:
 
     @property
     def _averaged(self) -> bool:
-        """Whether the element takes its change of volume from the mean over its points."""
+        """Whether the volumetric strain of an element is the mean over its points."""
         kind = element_type(self.body.element)
         return kind.mean_dilatation and self.body.kinematics != "plane_stress"
 
     def _level(self, field: Array) -> Array:
-        """Return a tensor field whose trace is that of the mean over each element."""
+        """Return a tensor field with its trace averaged over each element, where that applies."""
         if not self._averaged:
             return field
         trace = field[:3].sum(axis=0)

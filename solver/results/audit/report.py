@@ -1,4 +1,4 @@
-"""All figures of one run, the limits they must keep, and the words about them."""
+"""The audit of one run: its figures, their limits, violations and warnings."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LIMITS = {
     "audit_slip": 0.03,
     "audit_energy": 1e-5,
 }
-_TURNING = 0.02  # energy lost where the directions of contact turn within an increment
+_TURNING = 0.02  # energy error where the directions of contact turn within an increment
 _TRAVELLING = 5e-3  # of the force: the elements integrate a Hertz pressure, which has no slope
 _FORCE = 1e-6  # of the force level
 
@@ -51,7 +51,7 @@ class Audit:
 
 
 def _largest(*values: float) -> float:
-    """Return the largest value, or NaN where one is NaN, which no limit lets pass."""
+    """Return the largest value, or NaN where one is NaN: NaN violates every limit."""
     return float(np.max(values))
 
 
@@ -88,7 +88,7 @@ def audit(
 
 
 def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tuple[float, float]:
-    """Return how far either state is from the law, and beyond yield, over the strength."""
+    """Return the largest deviation from the law, and stress beyond yield, / strength."""
     broken, beyond = 0.0, 0.0
     for both in zip(bodies, released, strict=True):
         strength = max(*(body.strength for body in both), 1e-300)
@@ -99,7 +99,7 @@ def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tup
 
 
 def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
-    """Return the work of the loads that is not found again, over the largest of all works."""
+    """Return the work missing in the energy balance / the largest term of the balance."""
     work = loaded.energy
     terms = np.array([
         sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
@@ -110,7 +110,7 @@ def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
 
 
 def _strength(system: System, loaded: Converged) -> dict[str, float]:
-    """Return contact shear, and the shear friction could bear, over the shear yield stress."""
+    """Return contact shear, and friction times pressure, / shear yield stress."""
     shear, friction = 0.0, 0.0
     for k, interface in enumerate(system.interfaces):
         pressure, tangential = contact_pressure(system, loaded.state, k)
@@ -175,7 +175,8 @@ def _warnings(figures: Mapping[str, float], unloaded: Converged) -> tuple[str, .
     warnings = []
     if largest > _LARGE_STRAIN:
         warnings.append(
-            f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is stretched"
+            f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is not accurate "
+            "any more, reduce the load"
         )
     shear = figures["audit_surface_shear"]
     if shear > _SURFACE_SHEAR:

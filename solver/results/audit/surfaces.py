@@ -1,8 +1,8 @@
-"""Contact seen from the bodies alone: true gaps, slips, and the forces the bodies feel.
+"""Contact measured on the bodies alone: true gaps, slips, and the forces the bodies feel.
 
-Surfaces are taken where the bodies are after deformation, large or small, and measured point by
-point against the nearest place of the partner; no derivative row of the contact problem is used.
-Means are those under the hats of the slave's vertices, which contact forces belong to.
+Surfaces are taken in their deformed positions, and distances are measured point by point to the
+nearest place of the partner; no derivative row of the contact problem is used. Means are taken
+under the hats of the slave's vertices, to which contact forces belong.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 5
 _BLOCK = 1000
-"""Points looked at together: each against every edge."""
+"""Points treated at once, each with every edge."""
 _BESIDE = 1e-9
-"""Distance over an edge's length by which a line may pass beside it."""
+"""Distance / length of an edge, by which a line may miss the edge and still count as meeting it."""
 
 
 def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
-    """Return where the nodes of a whole body are (2, n) [mm], and how it has turned (2, 2)."""
+    """Return the positions of the nodes of a whole body (2, n) [mm], and its rotation (2, 2)."""
     whole, part = system.full(name), system.parts[system.part(name)]
     d = system.displacement(name, state).reshape(-1, 2).T
     if not isinstance(part, Wheel):
@@ -50,16 +50,16 @@ def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Touching:
-    """One pair at one state.
+    """One pair in one state.
 
     Attributes
     ----------
     area : (n,) integral of the hat of a slave vertex where the master faces it [mm2]
-    gap : (n,) mean gap under the hat in the kinematics of the pair, NaN where nothing faces [mm]
-    true_gap : (n,) the same of the deformed bodies, which small sliding neglects [mm]
+    gap : (n,) mean gap under the hat in the kinematics of the pair, NaN without a partner [mm]
+    true_gap : (n,) the same on the deformed bodies, from which small sliding may differ [mm]
     slip : (n,) mean slip of the increment [mm]
     edge : (n,) mean length of the edges at a vertex [mm]
-    on_slave, on_master : nodal forces (n_nodes, 2) that the contact forces amount to [N]
+    on_slave, on_master : nodal forces (n_nodes, 2) equivalent to the contact forces [N]
     """
 
     area: Array
@@ -149,8 +149,8 @@ def _points(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return edge, place on it and weight of points (n,) that integrate over the slave.
 
-    The edges are cut opposite the master's vertices, where what is integrated has kinks; where
-    the surfaces touch, which is where it matters, it is the same along either's normals.
+    The edges are cut opposite the master's vertices, where the integrand has kinks. Where the
+    surfaces touch, the normals of the master, used here, are also those of the slave.
     """
     last = len(master.edges) - 1
     corners = np.append(np.arange(len(master.edges)), last)
@@ -187,7 +187,7 @@ def _edge_lengths(surface: Surface) -> Array:
 
 
 def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) -> Array:
-    """Return unit normals (2, n): those of the vertices, one-sided at the ends, interpolated."""
+    """Return unit normals (2, n), interpolated between vertices; one-sided at the chain's ends."""
     tangents = [
         (x[:, surface.edges] * shape_derivatives(np.array(end), surface.edges.shape[1])).sum(
             axis=-1
@@ -203,10 +203,10 @@ def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) ->
 
 
 class _Partner:
-    """The places of a surface that lines through points (2, n) along ``way`` meet from outside.
+    """The places where lines through points (2, n) along ``way`` meet a surface from outside.
 
-    Of several the nearest, but none farther behind a point than ``reach`` [mm]. ``faces`` (n,) is 1
-    where there is one, else 0.
+    Of several places on a line the nearest counts, if it is at most ``reach`` [mm] behind the
+    point. ``faces`` (n,) is 1 where there is such a place, else 0.
     """
 
     def __init__(self, x: Array, surface: Surface, points: Array, way: Array, reach: float) -> None:
@@ -226,7 +226,7 @@ class _Partner:
         self.point = self.of(x)
 
     def of(self, field: Array) -> Array:
-        """Return values (2, n) at the places of a field on the surface's nodes."""
+        """Return the values (2, n) at the places, for a field on the surface's nodes."""
         return np.asarray((field[:, self.nodes] * self.shape).sum(axis=-1))
 
     def distance(self, points: Array) -> Array:

@@ -9,9 +9,8 @@ import numpy as np
 from skfem import MeshQuad, MeshTri
 from skfem.mesh import Mesh
 
-from solver import Body, Model, PathControl, Solution, solve
 from solver.mesh import grid
-from tests.stability.closed import STEEL
+from tests.stability.kinds.plate import pull
 from tests.stability.trial import Scene, tells
 
 SIDES = {
@@ -76,19 +75,6 @@ def _twice() -> Mesh:
     return MeshQuad(mesh.p, t).with_boundaries(SIDES)
 
 
-def _solve(make: Callable[[], Mesh], element: str) -> Solution:
-    body = Body(
-        name="torn",
-        mesh=make(),
-        material=STEEL,
-        element=element,
-        kinematics="plane_stress",
-        supports={"left": "xy", "bottom": "y"},
-        pressure={"right": -10.0},
-    )
-    return solve(Model(bodies=(body,)), control=PathControl(load_step=1.0))
-
-
 MESHES: tuple[tuple[Callable[[], Mesh], str], ...] = (
     (_unmerged, "quad8"),
     (_crack, "quad8"),
@@ -106,7 +92,7 @@ def scenes() -> list[Scene]:
     return [
         Scene(
             what=f"{make.__name__} of {element}",
-            run=partial(_solve, make, element),
+            run=partial(pull, make, name="torn", element=element, left="xy"),
             refusal=tells("torn", "node|element|part|piece|connect"),
         )
         for make, element in MESHES

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from skfem import MeshQuad, MeshTri
 
-from solver import Body, Model, PathControl, Solution, solve
 from solver.mesh import grid, mapped
-from tests.stability.closed import STEEL
+from tests.stability.kinds.plate import pull
 from tests.stability.trial import Scene, numbers, tells
 
 if TYPE_CHECKING:
@@ -104,17 +103,8 @@ def _not_a_number() -> tuple[Mesh, set[int]]:
     return _points({_node(1, 1): (np.nan, 1.0)}), around | {_node(1, 1)}
 
 
-def _solve(make: Callable[[], tuple[Mesh, set[int]]], element: str) -> Solution:
-    body = Body(
-        name="crooked",
-        mesh=make()[0],
-        material=STEEL,
-        element=element,
-        kinematics="plane_stress",
-        supports={"left": "x", "bottom": "y"},
-        pressure={"right": -10.0},
-    )
-    return solve(Model(bodies=(body,)), control=PathControl(load_step=1.0))
+def _mesh(make: Callable[[], tuple[Mesh, set[int]]]) -> Mesh:
+    return make()[0]
 
 
 def _told(elements: set[int], text: str) -> bool:
@@ -138,7 +128,7 @@ def scenes() -> list[Scene]:
     return [
         Scene(
             what=f"{make.__name__} of {element}; element one of {sorted(make()[1])}",
-            run=partial(_solve, make, element),
+            run=partial(pull, partial(_mesh, make), name="crooked", element=element, left="x"),
             refusal=partial(_told, make()[1]),
         )
         for make, element in MESHES
