@@ -197,8 +197,9 @@ def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch
     advance = Stepper.reach
 
     def fails_below_3_mm(self, point, target, **options):
-        # rolling begins when the wheel has been set down and driven
-        if point.now.state.time >= 2.0 and 0.0 < target - point.now.state.time < 3.0:
+        # the wheel rolls from time 2, when it is set down and driven, to its release at 2 + track
+        now = point.now.state.time
+        if 2.0 <= now < 2.0 + fields["track"] and 0.0 < target - now < 3.0:
             raise PathEnded(NotConverged("stuck", 0.0, 1.0), point)
         return advance(self, point, target, **options)
 
