@@ -12,6 +12,7 @@ from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
 from solver.loading.control import PathControl, Tolerances
 from solver.loading.outcome import Outcome
+from solver.loading.path import Branch, Path
 from solver.loading.program import Program, Stage
 from solver.loading.walker import Walker
 from solver.materials.material import Material
@@ -28,6 +29,7 @@ __all__ = [
     "SCENES",
     "Audit",
     "Body",
+    "Branch",
     "ContactPair",
     "LimitLoad",
     "Material",
@@ -35,6 +37,7 @@ __all__ = [
     "ModelError",
     "NotConverged",
     "Outcome",
+    "Path",
     "PathControl",
     "Program",
     "Record",

@@ -33,6 +33,8 @@ def renamed(**names: str) -> Callable[[_Class], _Class]:
         def init(self: Any, *args: Any, **given: Any) -> None:
             for old in names.keys() & given.keys():
                 told(kind, old)
+                if names[old] in given:
+                    raise TypeError(f"{kind.__name__} got both {old} and {names[old]}")
                 given[names[old]] = given.pop(old)
             make(self, *args, **given)
 

@@ -217,6 +217,11 @@ class System:
         """Whether a load moves along a body."""
         return any(part.moves for part in self.parts)
 
+    @property
+    def has_amplitude(self) -> bool:
+        """Whether a pressure follows an amplitude of its own, not the time."""
+        return any(body.amplitude is not None for body in self.model.bodies)
+
     @cached_property
     def overlapping(self) -> bool:
         """Whether bodies overlap before loading; moving loads are set down so that they touch."""

@@ -19,11 +19,13 @@ def unbearable(system: System) -> LimitLoad | None:
     traction equals the stress at the surface: without hardening nothing can balance more.
     """
     for body in system.model.bodies:
-        travelling, material = body.travelling, body.material
-        if travelling is None or material.hardens:
+        travelling = body.travelling
+        if travelling is None:
             continue
-        shear = float(np.abs(travelling.shear_ratio.value).max()) * travelling.peak
-        strength = material.shear_yield_stress
+        times = np.union1d(travelling.amplitude.time, travelling.shear_ratio.time)
+        now = (travelling.now(time) for time in times)
+        shear = max(abs(share * ratio) for share, _, ratio in now) * travelling.peak
+        strength = body.material.ultimate_shear_stress
         if shear > strength:
             return LimitLoad(
                 f"the prescribed shear, {shear:.4g} MPa, is above the shear yield stress, "

@@ -70,7 +70,7 @@ class PathEnded(Exception):
     """The walk cannot continue: the error, and the last point reached."""
 
     def __init__(self, error: NotConverged, point: Point) -> None:
-        super().__init__(str(error))
+        super().__init__(error, point)
         self.error = error
         self.point = point
 

@@ -6,14 +6,15 @@ have no amplitude, time is the load factor, and goes back to zero when they are 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 ROUNDING = 1e-9
 """Relative difference below which two times are the same."""
@@ -47,6 +48,8 @@ class Stage:
             raise ModelError(f"{self.name}.steps", self.steps, "must be at least 1")
         if not self.step >= 0:
             raise ModelError(f"{self.name}.step", self.step, "must not be negative")
+        if not math.isfinite(self.target):
+            raise ModelError(f"{self.name}.target", self.target, "must be finite")
 
     def times(self, start: float) -> list[float]:
         """Return the times at which its increments end."""
@@ -54,11 +57,17 @@ class Stage:
             way = self.target - start
             shares = [1 - k / self.steps for k in range(1, self.steps)]
             return [*(self.target - way * share for share in shares), self.target]
-        times, now = [], start
-        while now + self.step < self.target * (1 - ROUNDING):
+        way = 1 if self.target >= start else -1
+        end = way * self.target
+        times, now = [], way * start
+        while now + self.step < end - ROUNDING * abs(end):
             now = (round(now / self.step) + 1) * self.step
-            times.append(now)
+            times.append(way * now)
         return [*times, self.target]
+
+    def refine(self, times: int) -> Stage:
+        """Return the stage with ``times`` increments in place of one."""
+        return replace(self, steps=self.steps * times, step=self.step / times)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +76,31 @@ class Lap:
 
     stages: tuple[Stage, ...]
     start: float = 0.0
+
+    def targets(self, first: bool) -> Iterator[Target]:
+        """Yield the ends of its increments; ``first`` tells whether no lap is before it."""
+        now, begins = self.start, None if first else self.start
+        for stage in self.stages:
+            times = stage.times(now)
+            for k, time in enumerate(times):
+                last = k + 1 == len(times)
+                yield Target(
+                    time=time,
+                    begins=begins,
+                    turns=stage.turns and k == 0,
+                    apart=stage.apart and last,
+                    keeps=stage.name if last else "",
+                    closes=last and stage is self.stages[-1],
+                )
+                begins = None
+            now = stage.target
+
+    @property
+    def count(self) -> int:
+        """Number of its increments."""
+        starts = [self.start, *(stage.target for stage in self.stages[:-1])]
+        pairs = zip(self.stages, starts, strict=True)
+        return sum(len(stage.times(now)) if stage.step else stage.steps for stage, now in pairs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,8 +128,8 @@ class Program:
     laps : in their order
     cycle : laps after which the same loading repeats itself; 0 if it does not. When nothing yields
         in a whole cycle, later laps repeat its states and are not computed
-    retraces : whether there is one lap whose loads grow with time in the first stage and go back
-        in the others: elastic bodies then need one increment, and return to their first state
+    retraces : whether it is one lap of two stages whose loads grow with time in the first and go
+        back in the second: elastic bodies then need one increment, and return to their first state
     place : (time) -> words for it in messages
     """
 
@@ -104,48 +138,47 @@ class Program:
     retraces: bool = False
     place: Callable[[float], str] = field(default="load factor {:.6g}".format, compare=False)
 
-    @cached_property
-    def targets(self) -> tuple[Target, ...]:
+    def __post_init__(self) -> None:
+        if not self.laps or not all(lap.stages for lap in self.laps):
+            raise ModelError("laps", self.laps, "must be at least one, of one stage or more each")
+        if self.retraces:
+            (lap, *more) = self.laps
+            if more or len(lap.stages) != 2 or lap.stages[1].target != lap.start:
+                allowed = "needs one lap of two stages that ends at the time at which it starts"
+                raise ModelError("retraces", self.retraces, allowed)
+
+    @property
+    def targets(self) -> list[Target]:
         """The ends of its increments, in their order."""
-        out: list[Target] = []
-        for lap in self.laps:
-            now = lap.start
-            begins = now if out else None
-            for stage in lap.stages:
-                times = stage.times(now)
-                for k, time in enumerate(times):
-                    last = k + 1 == len(times)
-                    out.append(
-                        Target(
-                            time=time,
-                            begins=begins,
-                            turns=stage.turns and k == 0,
-                            apart=stage.apart and last,
-                            keeps=stage.name if last else "",
-                            closes=last and stage is lap.stages[-1],
-                        )
-                    )
-                    begins = None
-                now = stage.target
-        return tuple(out)
+        return [t for k, lap in enumerate(self.laps) for t in lap.targets(first=k == 0)]
+
+    @property
+    def count(self) -> int:
+        """Number of its increments."""
+        return sum(lap.count for lap in self.laps)
 
     def refined(self, times: int) -> Program:
         """Return the program with ``times`` increments in place of one, in `refined` stages."""
 
-        def cut(stage: Stage) -> Stage:
-            return replace(stage, steps=stage.steps * times) if stage.refined else stage
+        def cut(lap: Lap) -> Lap:
+            stages = (stage.refine(times) if stage.refined else stage for stage in lap.stages)
+            return replace(lap, stages=tuple(stages))
 
-        laps = (replace(lap, stages=tuple(map(cut, lap.stages))) for lap in self.laps)
-        return replace(self, laps=tuple(laps))
+        return replace(self, laps=tuple(map(cut, self.laps)))
 
 
 def shared(one: Program, other: Program) -> int:
     """Return how many increments two programs have in common, from the first one on."""
-    pairs = zip(one.targets, other.targets, strict=False)
-    if one.laps[0].start != other.laps[0].start:
-        return 0
-    return next((i for i, (a, b) in enumerate(pairs) if a != b),
-                min(len(one.targets), len(other.targets)))  # fmt: skip
+    count = 0
+    for k, (mine, its) in enumerate(zip(one.laps, other.laps, strict=False)):
+        if mine == its:
+            count += mine.count
+            continue
+        if mine.start == its.start:
+            pairs = zip(mine.targets(first=k == 0), its.targets(first=k == 0), strict=False)
+            count += sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+        return count
+    return count
 
 
 def load_and_release(load: float, step: float, unload_steps: int) -> Program:

@@ -79,6 +79,13 @@ class Stepper:
         pushed = self._worked(point.now, pushed)
         return Point(pushed, None, self._timed(point.tally.plus(pushed)))
 
+    def again(self, point: Point, time: float) -> Point:
+        """Return the first point of a further lap: wheels are set down, the rest waits for it."""
+        state = point.now.state
+        if self.system.moves:
+            return self.begin(state, time, point.tally)
+        return replace(point, now=replace(point.now, state=replace(state, time=time)), before=None)
+
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`."""
         step = target - point.now.state.time

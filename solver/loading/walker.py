@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import LimitLoad
+from solver.errors import LimitLoad, ModelError
 from solver.loading.bearing import unbearable
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
@@ -110,7 +110,7 @@ class Walker:
             settled, first = self._settle(last)
             programs = [program.refined(settled.times) for program in programs]
             last = programs[0]
-            known = {len(_first_lap(last)): first}
+            known = {last.laps[0].count: first}
         for program, following in zip(programs, [*programs[1:], None], strict=True):
             alike = shared(last, program)
             known = {at: walk for at, walk in known.items() if at <= alike}
@@ -124,7 +124,7 @@ class Walker:
                     known = {min(known): known[min(known)],
                              fork: self._along(known[at], program, at, fork)}  # fmt: skip
                     at = fork
-                walk = self._along(known[at], program, at, len(program.targets))
+                walk = self._along(known[at], program, at, program.count)
                 last = program
             yield Outcome(
                 tally=walk.point.tally,
@@ -149,7 +149,8 @@ class Walker:
 
         Without yielding, unloading restores the state before any load exactly.
         """
-        if not program.retraces or start is None or start.error is not None:
+        proportional = program.retraces and not self._system.has_amplitude
+        if not proportional or start is None or start.error is not None:
             return None
         stages = program.laps[0].stages
         reached = self._stepper.elastic(start.point, stages[0].target)
@@ -181,9 +182,7 @@ class Walker:
     def _to(self, walk: _Walk, target: Target) -> _Walk:
         """Return the walk at the next target."""
         if target.begins is not None:
-            point = walk.point
-            if self._system.moves:
-                point = self._stepper.begin(point.now.state, target.begins, point.tally)
+            point = self._stepper.again(walk.point, target.begins)
             walk = replace(walk, point=point, points={}, work=point.tally.plastic_work)
         point = turned(walk.point) if target.turns else walk.point
         point = self._stepper.reach(point, target.time, contact=not target.apart)
@@ -205,11 +204,14 @@ class Walker:
         """
         assert self._settling is not None
         tolerance = self._settling.tolerance
+        if not any(stage.refined for stage in program.laps[0].stages):
+            allowed = "needs a stage of the first lap whose increments may be divided (refined)"
+            raise ModelError("settling", tolerance, allowed)
         settled, taken, coarse, tally = Settled(), None, None, Tally()
         for halved in range(HALVINGS + 1 if tolerance else 1):
             times = 2**halved
             fine = program.refined(times)
-            walk = self._along(self._start(fine, tally), fine, 0, len(_first_lap(fine)))
+            walk = self._along(self._start(fine, tally), fine, 0, fine.laps[0].count)
             failed = walk.error is not None and not isinstance(walk.error, LimitLoad)
             if failed and coarse is not None:
                 settled = replace(settled, failed=times)
@@ -228,12 +230,6 @@ class Walker:
             tally = Tally(seconds=walk.point.tally.seconds)
         assert taken is not None
         return settled, taken
-
-
-def _first_lap(program: Program) -> Sequence[Target]:
-    """Return the targets of the first lap."""
-    end = next(k for k, target in enumerate(program.targets, 1) if target.closes)
-    return program.targets[:end]
 
 
 def _repeated(walk: _Walk, cycle: int) -> _Walk:

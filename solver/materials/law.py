@@ -106,6 +106,11 @@ class Law(ABC):
         """Whether stress grows with plastic strain without bound, so that no limit load exists."""
         return False
 
+    @attribute
+    def ultimate_shear_stress(self) -> float:
+        """Shear stress that no plastic strain lets it exceed [MPa]; inf where none is known."""
+        return math.inf
+
     def strength(self, state: PlasticState) -> Array:
         """Return the stress (n_points,) of the tension curve at this plastic strain [MPa]."""
         return self.flow_stress(state)

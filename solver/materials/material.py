@@ -110,6 +110,11 @@ class Material(Law):
         """Whether stress grows with plastic strain."""
         return self.plastic_modulus > 0
 
+    @property
+    def ultimate_shear_stress(self) -> float:
+        """The shear yield stress without hardening, inf with it [MPa]."""
+        return math.inf if self.hardens else self.shear_yield_stress
+
     def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
         """Return the yield stress plus its isotropic growth (n_points,) [MPa]."""
         return self.hardening_rule.flow_stress(state.accumulated)

@@ -39,6 +39,15 @@ def condensed(stiffness: Array) -> Array:
     return out
 
 
+def _without_zz(strain: Array, state: PlasticState, C: Array) -> Array:
+    """Return strains with the zz row that makes stress zz zero, plastic strain as in a state."""
+    elastic = strain - state.plastic_strain
+    elastic[_ZZ] = 0.0
+    whole = strain.copy()
+    whole[_ZZ] = state.plastic_strain[_ZZ] - C[_ZZ] @ elastic / C[_ZZ, _ZZ]
+    return whole
+
+
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Law):
     """Any law in plane stress, with four components; the zz row of strain is not read.
@@ -74,6 +83,21 @@ class PlaneStress(Law):
     def yield_stress(self) -> float:
         """The yield stress of the wrapped law [MPa]."""
         return self.law.yield_stress
+
+    @property
+    def shear_yield_stress(self) -> float:
+        """The yield stress in shear of the wrapped law [MPa]."""
+        return self.law.shear_yield_stress
+
+    @property
+    def ultimate_shear_stress(self) -> float:
+        """The ultimate shear stress of the wrapped law [MPa]."""
+        return self.law.ultimate_shear_stress
+
+    @property
+    def elastic(self) -> bool:
+        """Whether the wrapped law never yields."""
+        return self.law.elastic
 
     @property
     def hardens(self) -> bool:
@@ -112,6 +136,13 @@ class PlaneStress(Law):
         """Return the dissipation of the wrapped law [N mm/mm3]."""
         return self.law.dissipation(before, response)
 
+    def misfit(
+        self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
+    ) -> Array:
+        """Return the misfit of the wrapped law at the thickness strain without stress zz [MPa]."""
+        C = self.law.stiffness(len(strain))
+        return self.law.misfit(_without_zz(strain, after, C), stress, before, after)
+
     def stiffness(self, n_components: int) -> Array:
         """Return the elastic stiffness, row and column zz zero [MPa]."""
         return condensed(self.law.stiffness(n_components))
@@ -122,10 +153,7 @@ class PlaneStress(Law):
         Where no such strain is found stress is NaN, and the increment does not converge.
         """
         C = self.law.stiffness(len(strain))
-        elastic = strain - state.plastic_strain
-        elastic[_ZZ] = 0.0
-        whole = strain.copy()
-        whole[_ZZ] = state.plastic_strain[_ZZ] - C[_ZZ] @ elastic / C[_ZZ, _ZZ]
+        whole = _without_zz(strain, state, C)
         scale = C[_ZZ, _ZZ] * (np.abs(whole) + np.abs(state.plastic_strain)).sum(axis=0)
         response = self.law.respond(whole, state)
         open_ = np.flatnonzero(~(np.abs(response.stress[_ZZ]) <= _ROUNDING * scale))

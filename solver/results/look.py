@@ -57,7 +57,7 @@ class Look:
     @property
     def unloaded(self) -> Converged:
         """The state after unloading."""
-        return self.outcome.points["unloaded"]
+        return self.outcome.points[self.view.unloaded]
 
     @property
     def stages(self) -> list[tuple[Converged, float]]:

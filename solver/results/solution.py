@@ -104,6 +104,10 @@ def solve(
     """
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
+    for body in model.bodies:
+        if body.amplitude is not None:
+            allowed = "must be absent: solve raises a load factor; walk a Program by a Walker"
+            raise ModelError("amplitude", body.name, allowed)
     system = System(model, linear_solver)
     control = control or PathControl(load_step=load / 20)
     (outcome,) = Walker(system, control).walk([control.program(load)])

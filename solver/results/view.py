@@ -47,7 +47,7 @@ class View:
     profile_body : the body whose profiles are taken
     surfaces : body -> boundary that is its contact surface, in the order of the dimension
     stages : states whose contact is recorded, by the names of the program's stages
-    loaded : the one of them that is taken as the state under load
+    loaded, unloaded : those of them that are taken as the states under load and after release
     following : those of them in which ``s`` is zero where the load is, not at x = 0
     symmetric : whether the bodies are one half of a model symmetric about x = 0
     """
@@ -61,6 +61,7 @@ class View:
     surfaces: dict[str, str]
     stages: tuple[str, ...] = ("loaded", "unloaded")
     loaded: str = "loaded"
+    unloaded: str = "unloaded"
     following: tuple[str, ...] = ()
     symmetric: bool = False
 

@@ -25,11 +25,11 @@ from solver.results.contact import contact
 from solver.results.fields import maps, surfaces
 from solver.results.figures import cost, extremes
 from solver.results.free_surface import FreeSurface
-from solver.results.passes import Trace, passes, shakedown
 from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.results.view import View
+from solver.scenes.passes import Trace, passes, shakedown
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Scene
 

@@ -16,6 +16,7 @@ from solver.loading.walker import Settling, Walker
 from solver.model.model import Model
 from solver.results.audit import AUDIT, audit
 from solver.results.look import Look, Output, Values
+from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from solver.results.samples import Samples
 from solver.results.touch import touch_of
@@ -72,7 +73,7 @@ class Scene:
 
         Each is yielded as soon as it is known; a failed run gives a record too.
         """
-        kind = type(getattr(parameters, self.branch))
+        kind = type(getattr(self.parameters(), self.branch))
         runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
         system = System(self.model(runs[-1]))
         samples = Samples(system, self.view(runs[-1]))
@@ -129,13 +130,21 @@ class Scene:
 
 
 def _merged(look: Look, outputs: Sequence[Output]) -> Values:
-    return {quantity: value for output in outputs for quantity, value in output(look).items()}
+    values: dict[Quantity, Any] = {}
+    names: set[str] = set()
+    for output in outputs:
+        for quantity, value in output(look).items():
+            if quantity.name in names:
+                raise ValueError(f"two outputs of the scene give {quantity.name}")
+            names.add(quantity.name)
+            values[quantity] = value
+    return values
 
 
 def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:
     """Return the function to call after each increment: it tells the monitor the share done."""
     before = [0, *(shared(one, other) for one, other in pairwise(programs))]
-    expected = sum(len(p.targets) - first for p, first in zip(programs, before, strict=True))
+    expected = sum(p.count - first for p, first in zip(programs, before, strict=True))
     done = 0
 
     def report() -> None:

@@ -7,8 +7,8 @@ What is left out, so that mending it changes no run's id:
 - a text under a name of `WORDS`, given as an argument (``long_name="…"``) or as an item of a
   dict display (``{"long_name": "…"}``);
 - a text at the place in a call that `WORDS_AT` tells: ``described(0.3, "…")``;
-- a text given to an exception in a ``raise``, or to one of our own errors wherever it is made,
-  and the text of an ``assert``: a message says why there are no numbers, and makes none.
+- a text given to an exception of Python in a ``raise``, or to one of our own errors wherever it is
+  made, and the text of an ``assert``: a message says why there are no numbers, and makes none.
 
 A text here is a literal, an f-string, a part of ``a + b`` or ``a if … else b`` that is one, or a
 value of a dict display.
@@ -19,6 +19,7 @@ since that may be a name, a unit or a choice.
 from __future__ import annotations
 
 import ast
+import builtins
 import gc
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -39,6 +40,12 @@ _ERRORS = frozenset(
     for name, each in vars(module).items()
     if isinstance(each, type) and issubclass(each, Exception)
 )
+
+_RAISED = _ERRORS | {
+    name
+    for name, each in vars(builtins).items()
+    if isinstance(each, type) and issubclass(each, Exception)
+}
 
 _NO_MEANING = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
 """Fields of Python's grammar that repeat what its place tells, or that only comments fill."""
@@ -130,7 +137,7 @@ def _words_in(node: ast.AST) -> Iterator[ast.AST]:
             for key, value in zip(node.keys, node.values, strict=True):
                 if isinstance(key, ast.Constant) and key.value in WORDS:
                     yield from _texts(value)
-        case ast.Raise(exc=ast.Call() as made):
+        case ast.Raise(exc=ast.Call() as made) if _called(made) in _RAISED:
             yield from _arguments(made)
         case ast.Assert(msg=ast.AST() as message):
             yield from _texts(message)

@@ -60,7 +60,9 @@ def test_every_output_is_declared_once_where_its_module_is_read() -> None:
 
 def test_a_second_declaration_is_refused() -> None:
     before = QUANTITIES["residual_stress"]
-    with pytest.raises(ValueError, match="residual_stress is declared already: residual stress"):
+    with pytest.raises(
+        ValueError, match="residual_stress is declared already, as 'residual stress'"
+    ):
         declare("residual_stress", "stress that stays", "Pa")
     assert QUANTITIES["residual_stress"] is before
 

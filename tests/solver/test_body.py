@@ -247,3 +247,11 @@ def test_the_old_name_of_the_kinematics_works_with_a_warning():
     assert body.kinematics == "plane_stress"
     with pytest.warns(DeprecationWarning, match="Body.kinematics"):
         assert body.state == "plane_stress"
+    with pytest.raises(TypeError, match="both"), pytest.warns(DeprecationWarning):
+        Body(
+            name="square",
+            mesh=LEFT,
+            material=STEEL,
+            state="plane_stress",
+            kinematics="plane_strain",
+        )

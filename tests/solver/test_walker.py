@@ -15,6 +15,7 @@ from solver import (
     Model,
     ModelError,
     NotConverged,
+    Path,
     PathControl,
     Program,
     Stage,
@@ -27,8 +28,10 @@ from solver.fem.fields import Sampler
 from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
 from solver.loading.program import Lap, shared
+from solver.loading.walker import Settling
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
+from solver.results.audit import audit
 from solver.scenes.punch import PunchParameters, model
 
 COARSE = PunchParameters(smallest_element=0.05, growth=1.8, friction=0.3)
@@ -317,6 +320,108 @@ def test_multiples_of_a_step_end_at_the_target():
 def test_bad_amplitudes_are_refused(knots, message):
     with pytest.raises(ModelError, match=message):
         Amplitude(*map(np.array, knots))
+
+
+def test_a_pressure_with_an_amplitude_is_never_taken_for_its_time():
+    """300 MPa times the amplitude 2 at time 1 yields, though time 1 alone would not."""
+    (body,) = bar(yield_stress=400.0, hardening="isotropic", hardening_ratio=0.1).bodies
+    doubled = Amplitude(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 1.0]))
+    model = Model(bodies=(replace(body, amplitude=doubled),))
+    system = System(model)
+    (outcome,) = Walker(system, CONTROL).walk([CONTROL.program(1.0)])
+    strain = outcome.points["loaded"].state.plastic[0].accumulated
+    assert strain == pytest.approx(np.full_like(strain, 200.0 * (1 / 2e4 - 1 / 2e5)), rel=1e-7)
+    with pytest.raises(ModelError, match="amplitude = 'bar'"):
+        solve(model)
+
+
+def test_the_audit_knows_amplitudes():
+    (body,) = bar(yield_stress=400.0, hardening="isotropic", hardening_ratio=0.1).bodies
+    doubled = Amplitude(np.array([0.0, 1.0]), np.array([0.0, 2.0]))
+    system = System(Model(bodies=(replace(body, amplitude=doubled),)))
+    (outcome,) = Walker(system, CONTROL).walk([CONTROL.program(1.0)])
+    found = audit(system, outcome.points["loaded"], outcome.points["unloaded"], 0.0)
+    assert not found.violations
+
+
+def test_a_lap_may_begin_later_than_the_one_before_it_ended():
+    amplitude, laps = pulled(0.5, 0.6)
+    (body,) = bar(yield_stress=300.0).bodies
+    late = Amplitude(amplitude.time + np.repeat([0.0, 10.0], [3, 2]), amplitude.value)
+    later = tuple(replace(stage, target=stage.target + 10.0) for stage in laps[1].stages)
+    program = Program(laps=(laps[0], Lap(later, 12.0)))
+    system = System(Model(bodies=(replace(body, amplitude=late),)))
+    starts = []
+    (outcome,) = Walker(
+        system, CONTROL, trace=lambda points: starts.append(points["loaded"].start.time)
+    ).walk([program])
+    assert outcome.error is None
+    assert starts == pytest.approx([2 / 3, 12 + 2 / 3])
+
+
+@pytest.mark.parametrize(
+    ("start", "target", "times"),
+    [
+        (1.0, 0.75, [0.9, 0.8, 0.75]),
+        (0.0, -0.25, [-0.1, -0.2, -0.25]),
+        (-0.2, 0.1, [-0.1, 0.0, 0.1]),
+    ],
+)
+def test_multiples_of_a_step_go_down_as_well(start, target, times):
+    assert Stage(name="back", target=target, step=0.1).times(start) == pytest.approx(times)
+
+
+@pytest.mark.parametrize("fields", [{"steps": 0}, {"step": -1.0}, {"target": np.nan}])
+def test_bad_stages_are_refused_by_name(fields):
+    with pytest.raises(ModelError, match=f"loaded.{next(iter(fields))} = "):
+        Stage(**({"name": "loaded", "target": 1.0} | fields))
+
+
+@pytest.mark.parametrize(
+    "laps",
+    [
+        (),
+        (Lap(()),),
+        (Lap((Stage(name="loaded", target=1.0),)),),
+        (Lap((Stage(name="loaded", target=1.0), Stage(name="unloaded", target=0.5))),),
+    ],
+)
+def test_a_program_that_cannot_retrace_is_refused(laps):
+    with pytest.raises(ModelError, match=r"laps|retraces"):
+        Program(laps=laps, retraces=True)
+
+
+def test_programs_are_compared_lap_by_lap():
+    _, laps = pulled(1.0, 1.0, 1.0)
+    longer = replace(laps[1], stages=(replace(laps[1].stages[0], steps=6), laps[1].stages[1]))
+    one, other = Program(laps=laps), Program(laps=(laps[0], longer, laps[2]))
+    assert (one.count, other.count) == (15, 18)
+    assert [len(program.targets) for program in (one, other)] == [15, 18]
+    assert shared(one, other) == 5
+    assert shared(one, Program(laps=laps[:2])) == 10
+
+
+def test_settling_needs_increments_that_may_be_divided(system):
+    settling = Settling(measure=lambda trace: trace, tolerance=1e-12)
+    walker = Walker(system, CONTROL, trace=lambda points: np.zeros(1), settling=settling)
+    with pytest.raises(ModelError, match="settling"):
+        list(walker.walk([CONTROL.program(0.2)]))
+
+
+def test_a_refined_stage_has_as_many_times_more_increments_either_way():
+    by_steps = Stage(name="loaded", target=1.0, steps=4, refined=True)
+    by_step = Stage(name="loaded", target=1.0, step=0.25, refined=True)
+    for stage in (by_steps, by_step):
+        assert Program(laps=(Lap((stage,)),)).refined(3).count == 12
+
+
+def test_the_old_path_gives_what_the_walker_gives(system):
+    with pytest.warns(DeprecationWarning, match="Walker"):
+        path = Path(system, CONTROL)
+    (branch,) = path.branches([0.4])
+    outcome = outcome_at(system, 0.4)
+    pairs = zip(arrays(branch.unloaded), arrays(outcome.points["unloaded"]), strict=True)
+    assert all(np.array_equal(one, other) for one, other in pairs)
 
 
 # -- solvers and elements ----------------------------------------------------------------------

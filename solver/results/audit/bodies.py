@@ -77,7 +77,7 @@ class AuditedBody:
         """Return the resultant of the loads (2,) [N]."""
         time, travelling = self._converged.state.time, self.plain.body.travelling
         if travelling is None:
-            return self.plain.applied(time)
+            return self.plain.applied(self.plain.body.load_factor(time))
         share, _, ratio = travelling.now(time)
         whole = np.pi / 2 * travelling.half_width * travelling.peak * share
         return whole * self.plain.body.thickness * np.array([ratio, -1.0])

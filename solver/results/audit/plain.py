@@ -104,7 +104,7 @@ class PlainBody:
         nodes = self._nodes.ravel()
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in (x, y)], axis=1)
 
-    def applied(self, load: float) -> Array:
+    def applied(self, factor: float) -> Array:
         """Return the resultant (2,) of the pressures at a load factor [N].
 
         A pressure p on an edge from A to B pushes with p times the depth and the length of AB,
@@ -116,7 +116,7 @@ class PlainBody:
             start, end = self.part.X[:, edges[:, 0]], self.part.X[:, edges[:, 1]]
             along = end - start
             depth = np.broadcast_to(self._depth((start + end) / 2), along.shape[1:])
-            push = load * pressure * depth * np.array([-along[1], along[0]])
+            push = factor * pressure * depth * np.array([-along[1], along[0]])
             total += push.sum(axis=1)
         return total
 
