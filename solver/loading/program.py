@@ -54,9 +54,10 @@ class Stage:
     def times(self, start: float) -> list[float]:
         """Return the times at which its increments end."""
         if not self.step:
-            way = self.target - start
-            shares = [1 - k / self.steps for k in range(1, self.steps)]
-            return [*(self.target - way * share for share in shares), self.target]
+            way, steps = self.target - start, self.steps
+            if self.target == 0.0:  # shares of what there was
+                return [*(start * (1 - k / steps) for k in range(1, steps)), 0.0]
+            return [*(start + way * k / steps for k in range(1, steps)), self.target]
         way = 1 if self.target >= start else -1
         end = way * self.target
         times, now = [], way * start

@@ -6,8 +6,10 @@ Arrays have their components first and their points last, and the number of comp
 the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
 
 A new law must define `elasticity`, `flow_stress` and `respond`. All else has a default for
-associated flow on a von Mises surface, which a law may override. What is marked as an attribute
-here may be a property or a field of a dataclass there.
+associated flow on a von Mises surface and isotropic hardening that comes to an end. Override
+`back_stress` and `strength` with kinematic hardening, `hardens` where stress grows without end,
+`ultimate_shear_stress` without hardening, `surface` for another yield condition. What is
+marked as an attribute here may be a property or a field of a dataclass there.
 """
 
 from __future__ import annotations

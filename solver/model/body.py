@@ -36,7 +36,7 @@ class Body:
     material : its law, a `Material` or a law of your own (`solver.materials.Law`)
     kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
     element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
-    full_integration : integrate ``quad8`` with 3x3 points instead of 2x2
+    full_integration : integrate by the element's ``full_order``: ``quad8`` with 3x3 points, not 2x2
     thickness : of plane bodies [mm]
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
     pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]

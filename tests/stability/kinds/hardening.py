@@ -99,7 +99,7 @@ def _spread(rule: str, ratio: float, friction: float) -> Scene:
             Layer(material=material, width=6.0, cells=(7, 3)),
         ),
         pressure=LOAD * YIELD,
-        kinematics="plane_stress",
+        state="plane_stress",
         friction=friction,
         steps=10,
     ).scene()
