@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sqlite3
 import sys
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,9 +16,11 @@ from pydantic import ValidationError
 
 import solver
 from service import errors, routes
-from service.jobs import Jobs
+from service.examiner import Examiner
 from service.limits import BodyLimit
 from service.lock import DirectoryInUse, lock_directory
+from service.pool import Pool
+from service.recovery import open_queue
 from service.runner import Runner
 from service.settings import Settings
 from studies import Store, StoreBusy, StudyError
@@ -40,11 +42,16 @@ def create_app(settings: Settings) -> FastAPI:
         If another service works in the data directory.
     """
     lock = lock_directory(settings.data, settings.lock_seconds)
+    store = open_store(settings.data)
+    restore = partial(open_queue, settings.data / "jobs.sqlite", store, settings.max_queue)
+    jobs = restore()
+    runner = Runner(settings, jobs, Pool(settings, lock), lock, restore)
+    examiner = Examiner(settings)
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            async with app.state.runner.working():
+            async with examiner.working(), runner.working():
                 yield
         finally:
             os.close(lock)
@@ -57,9 +64,10 @@ def create_app(settings: Settings) -> FastAPI:
         responses=errors.ANSWERS,
     )
     app.state.settings = settings
-    app.state.store = open_store(settings.data)
-    app.state.jobs = Jobs(settings.data / "jobs.sqlite")
-    app.state.runner = Runner(settings, app.state.jobs, lock)
+    app.state.store = store
+    app.state.jobs = jobs
+    app.state.runner = runner
+    app.state.examiner = examiner
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
     errors.install(app)
     for router in routes.ROUTERS:
@@ -94,8 +102,6 @@ def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) 
         refuse(f"{name} = {first['input']!r}: {first['msg']}")
     except (DirectoryInUse, StudyError) as error:
         refuse(str(error))
-    except sqlite3.DatabaseError as error:
-        refuse(f"data = {str(data)!r}: its jobs.sqlite cannot be used ({error})")
     except OSError as error:
         refuse(f"data = {str(data)!r}: must be a directory to write in ({error.strerror})")
     uvicorn.run(

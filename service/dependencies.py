@@ -7,7 +7,9 @@ from typing import Annotated, Any
 from fastapi import Depends, Request
 
 from service.errors import NotFound
-from service.jobs import Job, Jobs
+from service.examiner import Examiner
+from service.job import Job
+from service.jobs import Jobs
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
@@ -32,6 +34,12 @@ def get_runner(request: Request) -> Runner:
     return runner
 
 
+def get_examiner(request: Request) -> Examiner:
+    """Return who looks at studies before they are accepted."""
+    examiner: Examiner = request.app.state.examiner
+    return examiner
+
+
 def get_job(study_id: ContentId, jobs: Annotated[Jobs, Depends(get_jobs)]) -> Job:
     """Return the study named in the path."""
     return jobs.get(study_id)
@@ -53,6 +61,7 @@ def get_settings(request: Request) -> Settings:
 
 TheJobs = Annotated[Jobs, Depends(get_jobs)]
 TheJob = Annotated[Job, Depends(get_job)]
+TheExaminer = Annotated[Examiner, Depends(get_examiner)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]
 TheStore = Annotated[Store, Depends(get_store)]
 TheRunner = Annotated[Runner, Depends(get_runner)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from typing import Any
@@ -14,6 +15,9 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from studies import StudyError
+from studies.errors import StoreFull
+
+log = logging.getLogger(__name__)
 
 LONGEST_VALUE = 200
 """Characters of an offending value that are shown back."""
@@ -27,11 +31,23 @@ class Conflict(RuntimeError):
     """The resource is in a state that does not allow this."""
 
 
+class QueueFull(RuntimeError):
+    """As many studies wait as may."""
+
+
+class QueueLost(RuntimeError):
+    """The file of the queue is gone or damaged; the service makes it anew from the studies."""
+
+
 STATUS: dict[type[Exception], HTTPStatus] = {
     StudyError: HTTPStatus.UNPROCESSABLE_ENTITY,
     RequestValidationError: HTTPStatus.UNPROCESSABLE_ENTITY,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
+    QueueFull: HTTPStatus.SERVICE_UNAVAILABLE,
+    QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
+    StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
+    OSError: HTTPStatus.SERVICE_UNAVAILABLE,
 }
 
 
@@ -139,9 +155,18 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
     return problem(request, status, detail, errors)
 
 
-def on_plain_error(request: Request, exc: NotFound | Conflict) -> Problem:
+def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
-    return problem(request, status_of(exc), str(exc))
+    status = status_of(exc)
+    later = {"retry-after": "10"} if status.is_server_error else None
+    return problem(request, status, str(exc), headers=later)
+
+
+def on_system_error(request: Request, exc: OSError) -> Problem:
+    """Answer what the system refused, without the path."""
+    log.error("%s", exc)
+    detail = f"the data directory cannot be used: {exc.strerror or 'see the log of the service'}"
+    return problem(request, status_of(exc), detail)
 
 
 def on_http_error(request: Request, exc: HTTPException) -> Problem:
@@ -164,8 +189,8 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {
     StudyError: on_field_error,
     RequestValidationError: on_validation_error,
-    NotFound: on_plain_error,
-    Conflict: on_plain_error,
+    **dict.fromkeys((NotFound, Conflict, QueueFull, QueueLost, StoreFull), on_plain_error),
+    OSError: on_system_error,
     HTTPException: on_http_error,
     Exception: on_unexpected,
 }

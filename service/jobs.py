@@ -2,108 +2,83 @@
 
 The row alone says what shall be done with a study. Routes write into it what users ask for
 (accept, dismiss, retry); the runner reads that, and writes what was done. A service that starts
-after a crash reads from it what is left to do.
+after a crash reads from it what is left to do. A row that cannot be read hides only itself.
 """
 
 from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from service.errors import Conflict, NotFound
+from service import schema
+from service.errors import Conflict, NotFound, QueueFull, QueueLost
+from service.job import COLUMNS, UNREADABLE, Job, State, job_of
+from studies.errors import StoreFull
 
-SCHEMA = """
-CREATE TABLE IF NOT EXISTS job (
-    id TEXT PRIMARY KEY,
-    study TEXT NOT NULL,
-    runs TEXT NOT NULL,
-    size INTEGER NOT NULL,
-    state TEXT NOT NULL,
-    message TEXT NOT NULL,
-    progress REAL NOT NULL,
-    again INTEGER NOT NULL,
-    submitted TEXT NOT NULL,
-    started TEXT,
-    finished TEXT,
-    turn INTEGER NOT NULL
-);
-CREATE INDEX IF NOT EXISTS job_turn ON job (turn);
-"""
-COLUMNS = "id, study, size, state, message, progress, again, submitted, started, finished"
 NEXT_TURN = "(SELECT COALESCE(MAX(turn), 0) + 1 FROM job)"
-
-
-class State(StrEnum):
-    """Where a study stands."""
-
-    ACCEPTED = "accepted"
-    RUNNING = "running"
-    SUCCESSFUL = "successful"
-    FAILED = "failed"
-    DISMISSED = "dismissed"
-
-    @property
-    def final(self) -> bool:
-        """Whether the work has ended; only a retry starts it again."""
-        return self not in (State.ACCEPTED, State.RUNNING)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One study in the queue.
-
-    Attributes
-    ----------
-    id : content id of the study
-    study : the study as ``Study.to_dict`` gave it
-    size : number of its runs
-    state, message : where it stands, and why when that needs a reason
-    progress : percentage of the work that is done
-    again : whether runs that failed are to be computed again; over once the work has begun
-    submitted, started, finished : ISO 8601, UTC
-    """
-
-    id: str
-    study: dict[str, Any]
-    size: int
-    state: State
-    message: str
-    progress: float
-    again: bool
-    submitted: str
-    started: str | None
-    finished: str | None
+SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
+    WHERE mine.job = ? AND theirs.job IN (SELECT value FROM json_each(?)) LIMIT 1"""
 
 
 class Jobs:
-    """The queue in the file ``path``; safe to use from many threads and processes."""
+    """The queue in the file ``path``; safe to use from many threads and processes.
 
-    def __init__(self, path: Path) -> None:
+    Every method raises `QueueLost` when the file is gone or damaged, and `StoreFull` when there is
+    no room to write.
+
+    Parameters
+    ----------
+    path : the file; made, or brought into today's form, when the queue is opened
+    longest : most studies that may wait; None for any number
+    """
+
+    def __init__(self, path: Path, longest: int | None = None) -> None:
         self.path = path
-        with self._transaction() as connection:
-            connection.executescript(SCHEMA)
+        self.longest = longest
+        with self._transaction("BEGIN IMMEDIATE", mode="rwc") as connection:
+            self.new = schema.prepare(connection)
 
-    def accept(self, job_id: str, study: dict[str, Any], runs: Sequence[str]) -> tuple[Job, bool]:
+    def accept(
+        self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
+    ) -> tuple[Job, bool]:
         """Return the job of this study, and whether it was not known before.
 
         ``runs`` are the ids of its runs in the order of its cases. They are kept, because an
         edited solver would give other ids, and the study would lose sight of what it computed.
+
+        Raises
+        ------
+        QueueFull
+            If as many studies wait as may.
         """
         with self._transaction() as connection:
-            cursor = connection.execute(
-                "INSERT INTO job"
-                " (id, study, runs, size, state, message, progress, again, submitted, turn)"
-                f" VALUES (?, ?, ?, ?, ?, '', 0, 0, ?, {NEXT_TURN}) ON CONFLICT (id) DO NOTHING",
-                (job_id, json.dumps(study), json.dumps(runs), len(runs), State.ACCEPTED, now()),
+            with suppress(NotFound):
+                return self._read(connection, job_id), False
+            (waiting,) = connection.execute(
+                "SELECT COUNT(*) FROM job WHERE state = ?", (State.ACCEPTED,)
+            ).fetchone()
+            if self.longest is not None and waiting >= self.longest:
+                raise QueueFull(f"{waiting} studies wait already, and no more may: post it later")
+            connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # a row unreadable
+            connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
+            connection.executemany(
+                "INSERT INTO run VALUES (?, ?, ?)",
+                ((job_id, position, run) for position, run in enumerate(runs)),
             )
-            return self._read(connection, job_id), cursor.rowcount == 1
+            connection.execute(
+                "INSERT INTO job SELECT ?, ?, ?, ?, COUNT(*), ?, '', 0, 0, '', ?, ?, NULL, NULL,"
+                f" {NEXT_TURN} FROM run WHERE job = ?",
+                (
+                    job_id, study["name"], study["scene"], json.dumps(study), State.ACCEPTED,
+                    priority, now(), job_id,
+                ),
+            )  # fmt: skip
+            return self._read(connection, job_id), True
 
     def get(self, job_id: str) -> Job:
         """Return one job.
@@ -116,14 +91,23 @@ class Jobs:
         with self._transaction("BEGIN") as connection:
             return self._read(connection, job_id)
 
-    def runs(self, job_id: str) -> list[str]:
-        """Return the ids of a job's runs in the order of its cases."""
+    def study(self, job_id: str) -> dict[str, Any]:
+        """Return the study of a job as ``Study.to_dict`` gave it."""
         with self._transaction("BEGIN") as connection:
-            row = connection.execute("SELECT runs FROM job WHERE id = ?", (job_id,)).fetchone()
+            row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
             if row is None:
                 raise unknown(job_id)
-            runs: list[str] = json.loads(row["runs"])
-            return runs
+            study: dict[str, Any] = json.loads(row["study"])
+            return study
+
+    def runs(self, job_id: str, limit: int = -1, offset: int = 0) -> list[str]:
+        """Return the ids of a job's runs in the order of its cases, or one page of them."""
+        with self._transaction("BEGIN") as connection:
+            rows = connection.execute(
+                "SELECT run FROM run WHERE job = ? AND position >= ? ORDER BY position LIMIT ?",
+                (job_id, offset, limit),
+            )
+            return [row["run"] for row in rows]
 
     def page(self, *, limit: int, offset: int, state: State | None = None) -> tuple[list[Job], int]:
         """Return jobs, the latest first, and how many there are altogether."""
@@ -134,36 +118,62 @@ class Jobs:
                 f"SELECT {COLUMNS} FROM job {where} ORDER BY turn DESC LIMIT ? OFFSET ?",
                 (*values, limit, offset),
             )
-            return [job_of(row) for row in rows], total
+            found = [job_of(row) for row in rows]
+            return [job for job in found if job is not None], total
 
-    def take(self) -> Job | None:
-        """Mark the job whose turn it is as running, and return it."""
+    def take(self, busy: Collection[str] = ()) -> Job | None:
+        """Mark the job whose turn it is as running, and return it.
+
+        It is not one of ``busy``, the jobs that are being computed, and shares no run with them:
+        what it shares with others is computed once.
+        """
+        others = json.dumps(list(busy))
         with self._transaction() as connection:
-            row = connection.execute(
-                "SELECT id FROM job WHERE state IN (?, ?) ORDER BY turn LIMIT 1",
-                (State.RUNNING, State.ACCEPTED),
-            ).fetchone()
-            if row is None:
-                return None
-            connection.execute(
-                "UPDATE job SET state = ?, message = '', started = ?, finished = NULL"
-                " WHERE id = ? AND state = ?",
-                (State.RUNNING, now(), row["id"], State.ACCEPTED),
-            )
-            return self._read(connection, row["id"])
+            waiting = connection.execute(
+                "SELECT id FROM job WHERE state IN (?, ?)"
+                " AND id NOT IN (SELECT value FROM json_each(?))"
+                " ORDER BY priority DESC, turn",
+                (State.RUNNING, State.ACCEPTED, others),
+            ).fetchall()
+            for row in waiting:
+                if connection.execute(SHARED, (row["id"], others)).fetchone():
+                    continue
+                connection.execute(
+                    "UPDATE job SET state = ?, message = '', started = ?, finished = NULL"
+                    " WHERE id = ? AND state = ?",
+                    (State.RUNNING, now(), row["id"], State.ACCEPTED),
+                )
+                try:
+                    return self._read(connection, row["id"])
+                except NotFound:
+                    connection.execute(
+                        "UPDATE job SET state = ?, message = ? WHERE id = ?",
+                        (State.FAILED, UNREADABLE, row["id"]),
+                    )
+            return None
 
-    def finish(self, job_id: str, state: State, message: str) -> None:
-        """Write the end of a running job; one dismissed meanwhile stays dismissed."""
+    def waiting(self) -> dict[str, str]:
+        """Return what the running jobs wait for, by id; nothing for those that go on."""
+        with self._transaction("BEGIN") as connection:
+            rows = connection.execute(
+                "SELECT id, message FROM job WHERE state = ? AND message != ''", (State.RUNNING,)
+            )
+            return {row["id"]: row["message"] for row in rows}
+
+    def finish(
+        self, job_id: str, state: State, message: str, standing: State = State.RUNNING
+    ) -> None:
+        """Write the end of a job that stands where told; one dismissed meanwhile stays so."""
         with self._transaction() as connection:
             connection.execute(
                 "UPDATE job SET state = ?, message = ?, finished = ?,"
                 " progress = CASE ? WHEN 'successful' THEN 100 ELSE progress END"
                 " WHERE id = ? AND state = ?",
-                (state, message, now(), state, job_id, State.RUNNING),
+                (state, message, now(), state, job_id, standing),
             )
 
     def note(self, job_id: str, progress: float, message: str = "") -> None:
-        """Write how far a running job is, and why it had to be started again, if it had."""
+        """Write how far a running job is, and what it waits for, if it does."""
         with self._transaction() as connection:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
@@ -180,6 +190,8 @@ class Jobs:
     def dismiss(self, job_id: str) -> Job:
         """Ask that the work on a job stops; asking twice is asking once.
 
+        A study that was successful before its retry is so again: its data set is still there.
+
         Raises
         ------
         NotFound
@@ -193,7 +205,9 @@ class Jobs:
                 raise Conflict(f"the study is {job.state} already: there is no work to stop")
             if job.state is not State.DISMISSED:
                 connection.execute(
-                    "UPDATE job SET state = ?, message = '', finished = ? WHERE id = ?",
+                    "UPDATE job SET state = IIF(stood = 'successful', stood, ?), message = '',"
+                    " progress = IIF(stood = 'successful', 100, progress), finished = ?"
+                    " WHERE id = ?",
                     (State.DISMISSED, now(), job_id),
                 )
             return self._read(connection, job_id)
@@ -213,41 +227,46 @@ class Jobs:
             if not job.state.final:
                 raise Conflict(f"the study is {job.state}: wait for its end or dismiss it first")
             connection.execute(
-                "UPDATE job SET state = ?, message = '', progress = 0, again = 1,"
+                "UPDATE job SET stood = state, state = ?, message = '', progress = 0, again = 1,"
                 f" started = NULL, finished = NULL, turn = {NEXT_TURN} WHERE id = ?",
                 (State.ACCEPTED, job_id),
             )
             return self._read(connection, job_id)
 
     @contextmanager
-    def _transaction(self, begin: str = "BEGIN IMMEDIATE") -> Iterator[sqlite3.Connection]:
-        connection = sqlite3.connect(self.path, timeout=30.0, isolation_level=None)
-        connection.row_factory = sqlite3.Row
+    def _transaction(
+        self, begin: str = "BEGIN IMMEDIATE", mode: str = "rw"
+    ) -> Iterator[sqlite3.Connection]:
         try:
-            connection.execute(begin)
-            with connection:
-                yield connection
-        finally:
-            connection.close()
+            # A file that is gone is not made anew behind the back of those who wrote in it.
+            address = f"{self.path.resolve().as_uri()}?mode={mode}"
+            connection = sqlite3.connect(address, uri=True, timeout=30.0, isolation_level=None)
+            connection.row_factory = sqlite3.Row
+            try:
+                connection.execute(begin)
+                with connection:
+                    yield connection
+            finally:
+                connection.close()
+        except sqlite3.DatabaseError as error:
+            raise self._told(error) from error
+
+    def _told(self, error: sqlite3.DatabaseError) -> Exception:
+        """Return what an error of SQLite means for the queue."""
+        match getattr(error, "sqlite_errorcode", None):
+            case sqlite3.SQLITE_FULL:
+                return StoreFull(f"no room is left for {self.path.name}")
+            case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_READONLY | sqlite3.SQLITE_IOERR:
+                return OSError(f"{self.path.name} cannot be used now: {error}")
+        return QueueLost(f"{self.path.name} is gone or damaged ({error})")
 
     @staticmethod
     def _read(connection: sqlite3.Connection, job_id: str) -> Job:
         row = connection.execute(f"SELECT {COLUMNS} FROM job WHERE id = ?", (job_id,)).fetchone()
-        if row is None:
+        job = job_of(row) if row else None
+        if job is None:
             raise unknown(job_id)
-        return job_of(row)
-
-
-def job_of(row: sqlite3.Row) -> Job:
-    """Return the job a row of the table stands for."""
-    return Job(
-        **dict(row)
-        | {
-            "study": json.loads(row["study"]),
-            "state": State(row["state"]),
-            "again": bool(row["again"]),
-        }
-    )
+        return job
 
 
 def unknown(job_id: str) -> NotFound:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
-from service.jobs import Job, Jobs
+from service.job import Job
+from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
 
-PENDING = ("pending", "")
-"""Status and message of a run that is not in the catalogue."""
+PENDING = "pending"
+"""Status of a run that is not in the catalogue."""
 
 
 def summary(job: Job) -> StudySummary:
@@ -20,24 +20,27 @@ def summary(job: Job) -> StudySummary:
 
 def detail(job: Job, jobs: Jobs, store: Store, window: Window) -> StudyDetail:
     """Return a study with the states of its runs, those in ``window`` one by one."""
+    study = jobs.study(job.id)
     ids = jobs.runs(job.id)
-    rows = store.catalogue.rows(ids)
-    outcomes = [(rows[i]["status"], rows[i]["message"]) if i in rows else PENDING for i in ids]
-    axes = {name: list(axis) for name, axis in job.study["sweep"].items()}  # of a table, its labels
-    page = range(window.offset, min(window.offset + window.limit, len(ids)))
+    counts = store.catalogue.counts(ids)
+    if pending := len(ids) - sum(counts.values()):
+        counts[PENDING] = pending
+    axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of a table, its labels
+    page = ids[window.offset : window.offset + window.limit]
+    rows = store.catalogue.rows(page)
     return StudyDetail(
         **_columns(job),
-        parameters=job.study["parameters"],
-        sweep=job.study["sweep"],
-        counts=Counter(status for status, _ in outcomes),
+        parameters=study["parameters"],
+        sweep=study["sweep"],
+        counts=counts,
         runs=[
             StudyRun(
-                id=ids[position],
-                status=outcomes[position][0],
-                message=outcomes[position][1],
+                id=run_id,
+                status=rows[run_id]["status"] if run_id in rows else PENDING,
+                message=rows[run_id]["message"] if run_id in rows else "",
                 at=point(axes, position),
             )
-            for position in page
+            for position, run_id in enumerate(page, window.offset)
         ],
     )
 
@@ -54,11 +57,12 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
 def _columns(job: Job) -> dict[str, Any]:
     return {
         "id": job.id,
-        "name": job.study["name"],
-        "scene": job.study["scene"],
+        "name": job.name,
+        "scene": job.scene,
         "status": job.state,
         "message": job.message,
         "progress": round(job.progress, 1),
+        "priority": job.priority,
         "size": job.size,
         "submitted": job.submitted,
         "started": job.started,

@@ -1,4 +1,4 @@
-"""Takes studies from the queue, one after the other, and has each computed by a child process."""
+"""Takes studies from the queue and has each computed by a child process, several at once."""
 
 from __future__ import annotations
 
@@ -6,18 +6,26 @@ import asyncio
 import contextlib
 import json
 import logging
-import sys
+import math
+import time
 from asyncio.subprocess import Process
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
-from service.jobs import Job, Jobs, State
+from service import processes
+from service.errors import QueueLost
+from service.job import Job, State, verdict
+from service.jobs import Jobs
+from service.pool import Pool, PoolAway
 from service.settings import Settings
 
 log = logging.getLogger(__name__)
 
-LONGEST_LINE = 1_000_000
-"""Bytes of one event a child may send."""
+SILENCE_SECONDS = 20.0
+"""Time after which a process that has said nothing is told of."""
+
+SILENT = f"its process has said nothing for {SILENCE_SECONDS:g} s since its start"
 
 
 @dataclass(slots=True)
@@ -27,6 +35,8 @@ class Attempt:
     Attributes
     ----------
     progress : percentage of the study that is done
+    heard : whether its process has said anything
+    waiting : what the study waits for; empty when it goes on
     begun : whether the first event came: something was computed
     runs : number of runs that got an outcome
     counts : runs by status when the study ended; None when it did not
@@ -36,6 +46,8 @@ class Attempt:
     """
 
     progress: float
+    heard: bool = False
+    waiting: str = ""
     begun: bool = False
     runs: int = 0
     counts: dict[str, int] | None = None
@@ -51,14 +63,19 @@ class Runner:
     Attributes
     ----------
     settings, jobs : how to compute, and what
+    pool : the workers, and the lock of the store
     lock : descriptor of the directory's lock, handed on to the children
+    restore : makes a queue anew that is gone or damaged
     """
 
     settings: Settings
     jobs: Jobs
+    pool: Pool
     lock: int
+    restore: Callable[[], Jobs]
     _stopping: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
+    _studies: dict[str, asyncio.Task[None]] = field(default_factory=dict)
 
     @property
     def alive(self) -> bool:
@@ -67,7 +84,7 @@ class Runner:
 
     @contextlib.asynccontextmanager
     async def working(self) -> AsyncIterator[None]:
-        """Work while the context is open; at its end a running study stops, to resume later."""
+        """Work while the context is open; at its end running studies stop, to resume later."""
         self._task = asyncio.create_task(self._work())
         try:
             yield
@@ -76,20 +93,45 @@ class Runner:
             await self._task
 
     async def _work(self) -> None:
+        idle = 0.0
         while not self._stopping.is_set():
+            pause = self.settings.poll_seconds
             try:
-                job = await asyncio.to_thread(self.jobs.take)
-                if job is None:
-                    await self._pause(self.settings.poll_seconds)
-                else:
-                    await self._compute(job)
+                if await self._next():
+                    continue
+                idle = 0.0 if self._studies else idle + pause
+                if idle >= self.settings.idle_seconds:
+                    await self.pool.close()
+            except QueueLost as error:
+                log.error("%s", error)
+                await asyncio.to_thread(self.restore)
             except Exception:
                 log.exception("the queue could not be read or written; trying again")
-                await self._pause(10 * self.settings.poll_seconds)
+                pause *= 10
+            await self._pause(pause)
+        await asyncio.gather(*self._studies.values(), return_exceptions=True)
+        await self.pool.close()
+
+    async def _next(self) -> bool:
+        """Begin the study whose turn it is; tell whether there was one, and room for it."""
+        if len(self._studies) >= self.settings.studies_at_once:
+            return False
+        job = await asyncio.to_thread(self.jobs.take, list(self._studies))
+        if job is None:
+            return False
+        task = asyncio.create_task(self._compute(job))
+        self._studies[job.id] = task
+        task.add_done_callback(partial(self._ended, job.id))
+        return True
+
+    def _ended(self, job_id: str, task: asyncio.Task[None]) -> None:
+        del self._studies[job_id]
+        if not task.cancelled() and (error := task.exception()):
+            log.error("%s: to be taken again: %s", job_id, error, exc_info=error)
 
     async def _compute(self, job: Job) -> None:
         """Start a study until it ends; give up after too many starts in a row without a new run."""
-        barren, progress = 0, job.progress
+        barren, progress, patient_since = 0, job.progress, time.monotonic()
         while True:
             attempt = await self._attempt(job, progress)
             if await self._unwanted(job):
@@ -102,7 +144,11 @@ class Runner:
             barren = 0 if attempt.runs or attempt.patient else barren + 1
             message = f"the study stopped: {attempt.reason}"
             log.error("%s: %s", job.id, message)
-            if attempt.hopeless or barren == self.settings.attempts:
+            if not attempt.patient:
+                patient_since = time.monotonic()
+            waited = time.monotonic() - patient_since
+            impatient = waited >= (self.settings.patience_seconds or math.inf)
+            if attempt.hopeless or impatient or barren == self.settings.attempts:
                 await asyncio.to_thread(self.jobs.finish, job.id, State.FAILED, message)
                 return
             await asyncio.to_thread(self.jobs.note, job.id, progress, message)
@@ -110,8 +156,14 @@ class Runner:
 
     async def _attempt(self, job: Job, progress: float) -> Attempt:
         """Start one child and follow its events; stop it when study or service shall stop."""
-        attempt, again = Attempt(progress), job.again
-        child = await self._start(job)
+        try:
+            child = await self._start(job)
+        except PoolAway as error:
+            return Attempt(progress, reason=str(error), patient=True)
+        except OSError as error:
+            return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
+        attempt, again, told = Attempt(progress), job.again, (progress, "")
+        started = time.monotonic()
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
@@ -119,11 +171,13 @@ class Runner:
                 if again and attempt.begun:
                     again = False
                     await asyncio.to_thread(self.jobs.begun, job.id)
-                if attempt.progress != progress:
-                    progress = attempt.progress
-                    await asyncio.to_thread(self.jobs.note, job.id, progress)
+                if not attempt.heard and time.monotonic() > started + SILENCE_SECONDS:
+                    attempt.waiting = SILENT
+                if told != (now := (attempt.progress, attempt.waiting)):
+                    told = now
+                    await asyncio.to_thread(self.jobs.note, job.id, *told)
         finally:
-            await self._end(child)
+            await processes.end(child, self.settings.grace_seconds)
             await asyncio.wait({events})
         if error := events.exception():
             log.error("%s: its process sent what cannot be read", job.id, exc_info=error)
@@ -135,39 +189,17 @@ class Runner:
         return attempt
 
     async def _start(self, job: Job) -> Process:
-        child = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "service.child",
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            limit=LONGEST_LINE,
-            pass_fds=(self.lock,),
-            start_new_session=True,  # an interrupt from a terminal is the service's to handle
-        )
         order = {
             "id": job.id,
-            "study": job.study,
+            "study": await asyncio.to_thread(self.jobs.study, job.id),
             "data": str(self.settings.data.resolve()),
-            "workers": self.settings.workers,
-            "scheduler": self.settings.scheduler,
+            "access": await self.pool.access(),
+            "limits": self.settings.limits(),
+            "priority": job.priority,
             "again": job.again,
             "grace": self.settings.grace_seconds,
         }
-        assert child.stdin is not None
-        child.stdin.write(json.dumps(order).encode() + b"\n")
-        return child
-
-    async def _end(self, child: Process) -> None:
-        """Ask the child to stop by closing its input, and kill it when it does not."""
-        assert child.stdin is not None
-        child.stdin.close()
-        try:
-            async with asyncio.timeout(self.settings.grace_seconds):
-                await child.wait()
-        except TimeoutError:
-            child.kill()
-            await child.wait()
+        return await processes.start("service.child", order, self.lock)
 
     async def _unwanted(self, job: Job) -> bool:
         if self._stopping.is_set():
@@ -185,10 +217,13 @@ async def follow(child: Process, attempt: Attempt) -> None:
     assert child.stdout is not None
     async for line in child.stdout:
         message = json.loads(line)
+        attempt.heard = True
         content = message["content"]
         match message["kind"]:
+            case "event" if content["kind"] == "waiting":
+                attempt.waiting = content["message"]
             case "event":
-                attempt.begun = True
+                attempt.begun, attempt.waiting = True, ""
                 attempt.progress = 100 * content["progress"]
                 attempt.runs += content["kind"] == "run"
             case "outcome":
@@ -197,12 +232,3 @@ async def follow(child: Process, attempt: Attempt) -> None:
                 attempt.reason = content["reason"]
                 attempt.hopeless = kind == "refused"
                 attempt.patient = kind == "wait"
-
-
-def verdict(counts: Mapping[str, int]) -> tuple[State, str]:
-    """Return the final state of a study whose runs ended as counted, and the reason."""
-    others = {status: count for status, count in counts.items() if count and status != "ok"}
-    if not others:
-        return State.SUCCESSFUL, ""
-    listed = ", ".join(f"{count} {status}" for status, count in others.items())
-    return State.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.jobs import State
+from service.job import State
 from studies.definition.sweep import Axes
 
 ContentId = Annotated[
@@ -65,9 +65,12 @@ class StudySummary(BaseModel):
     name: str
     scene: str
     status: State
-    message: str = Field(description="why it failed; while it runs, why it had to be started again")
+    message: str = Field(
+        description="why it failed; while it runs, what it waits for or why it was started again"
+    )
     progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
     size: int = Field(description="number of runs")
+    priority: int = Field(description="the greater is computed first")
     submitted: str
     started: str | None
     finished: str | None
@@ -129,6 +132,8 @@ class SceneSummary(BaseModel):
 class Health(BaseModel):
     """Whether studies can be accepted and computed."""
 
-    status: Literal["ready", "failing"]
+    status: Literal["ready", "waiting", "failing"]
     data_writable: bool
+    queue_readable: bool
     executor_alive: bool
+    waiting: dict[str, str] = Field(description="running studies that wait, and what for")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -26,6 +27,25 @@ class Settings(BaseSettings):
     attempts: int = Field(
         default=5, ge=1, description="starts of a study that bring no new run before it fails"
     )
+    studies_at_once: int = Field(
+        default=4, ge=1, description="studies computed at the same time, on shared workers"
+    )
+    max_queue: int = Field(default=1000, ge=1, description="most studies that may wait")
+    idle_seconds: float = Field(
+        default=10.0, ge=0, description="time without a study after which the workers are ended"
+    )
+    patience_seconds: float | None = Field(
+        default=None, gt=0, description="time without a worker after which a study ends; none: wait"
+    )
+    stall_seconds: float | None = Field(
+        default=900.0, gt=0, description="longest time without progress of a loading path"
+    )
+    path_seconds: float | None = Field(
+        default=None, gt=0, description="longest time that a loading path may take"
+    )
+    worker_memory: str | None = Field(
+        default=None, description="memory of a worker process of our own, such as 4GiB"
+    )
     poll_seconds: float = Field(
         default=0.5, gt=0, description="how often the queue and the event streams look for news"
     )
@@ -35,3 +55,18 @@ class Settings(BaseSettings):
     lock_seconds: float = Field(
         default=20.0, ge=0, description="time to wait for another service to leave the directory"
     )
+
+    def limits(self) -> dict[str, Any]:
+        """Return the arguments of `studies.execution.limits.Limits`."""
+        return {
+            "stall_seconds": self.stall_seconds,
+            "path_seconds": self.path_seconds,
+            "memory": self.worker_memory,
+            "patience": self.patience_seconds,
+        }
+
+    def outside_access(self) -> dict[str, Any] | None:
+        """Return how the outside scheduler is reached; None when the workers are our own."""
+        if self.scheduler is None:
+            return None
+        return {"address": self.scheduler, "ca": None, "cert": None, "key": None}

@@ -32,3 +32,7 @@ class StoreBusy(RuntimeError):
 
 class GridLost(ConnectionError):
     """The scheduler could not be reached or forgot its tasks; running again computes the rest."""
+
+
+class StoreFull(RuntimeError):
+    """No room is left on the device of the directory; running again computes the rest."""

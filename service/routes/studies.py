@@ -13,12 +13,12 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 
 from service import overview
-from service.dependencies import TheJob, TheJobs, TheRunner, TheSettings, TheStore
+from service.dependencies import TheExaminer, TheJob, TheJobs, TheRunner, TheSettings, TheStore
 from service.errors import NotFound
 from service.files import NETCDF, netcdf
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
 from service.strict import StrictRoute
-from studies import Study
+from studies import Study, StudyError
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
 
@@ -29,20 +29,36 @@ EXAMPLE = {
     "sweep": {"load_ratio": [0.3, 0.5714], "friction": [0.0, 0.3]},
 }
 
+PRIORITIES = range(-100, 101)
+
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
+SUBMISSION["properties"]["priority"] = {
+    "type": "integer",
+    "minimum": PRIORITIES[0],
+    "maximum": PRIORITIES[-1],
+    "default": 0,
+    "description": "of two studies that wait, the one with the greater number comes first; "
+    "no part of what the study is",
+}
 
 
 @router.post("", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}})
-def submit(
+async def submit(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
     jobs: TheJobs,
+    store: TheStore,
+    examiner: TheExaminer,
     request: Request,
     response: Response,
 ) -> StudySummary:
     """Accept a study; 200 when it is known already, whatever became of it."""
-    study = Study.from_dict(content)
-    runs = [case.id for case in study.cases()]
-    job, new = jobs.accept(study.id, study.to_dict(), runs)
+    priority = content.pop("priority", 0)
+    if type(priority) is not int or priority not in PRIORITIES:
+        raise StudyError("priority", priority, "must be an integer >= -100 and <= 100")
+    found = await examiner.examine(content)
+    study = found.study
+    job, new = await asyncio.to_thread(jobs.accept, study.id, study.to_dict(), found.runs, priority)
+    await asyncio.to_thread(store.save_study, study)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
@@ -95,10 +111,10 @@ async def events(
 @router.head("/{study_id}/dataset.nc", include_in_schema=False)
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
 def dataset(job: TheJob, store: TheStore) -> FileResponse:
-    """Return the combined data set of a study that has come to an end."""
+    """Return the combined data set of a study, as its last end left it."""
     path = store.dataset_path(job.id)
-    if not job.state.final or not path.is_file():
+    if not path.is_file():
         raise NotFound(
             f"no data set yet: it is written when the work ends, and the study is {job.state}"
         )
-    return netcdf(path, f"{job.study['name']}.nc")
+    return netcdf(path, f"{job.name}.nc")

@@ -87,6 +87,17 @@ class Catalogue:
             found = _select(connection, "WHERE id IN (SELECT value FROM json_each(?))", [wanted])
         return {row["id"]: row for row in found}
 
+    def counts(self, run_ids: Iterable[str]) -> dict[str, int]:
+        """Return how many of `run_ids` are known, by status."""
+        wanted = json.dumps(list(run_ids))
+        with self._reading() as connection:
+            found = connection.execute(
+                "SELECT status, count(*) FROM runs"
+                " WHERE id IN (SELECT value FROM json_each(?)) GROUP BY status",
+                [wanted],
+            )
+            return dict(found.fetchall())
+
     def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Insert or replace rows in one transaction."""
         marks = ", ".join("?" for _ in _COLUMNS)

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import json
 import os
+import sqlite3
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from service.errors import Conflict, NotFound
-from service.jobs import Jobs, State
+from service.errors import Conflict, NotFound, QueueFull, QueueLost
+from service.job import State
+from service.jobs import Jobs
 from service.lock import DirectoryInUse, lock_directory
+from studies import StudyError
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
+
+FIRST_FORM = """
+CREATE TABLE job (
+    id TEXT PRIMARY KEY, study TEXT NOT NULL, runs TEXT NOT NULL, size INTEGER NOT NULL,
+    state TEXT NOT NULL, message TEXT NOT NULL, progress REAL NOT NULL, again INTEGER NOT NULL,
+    submitted TEXT NOT NULL, started TEXT, finished TEXT, turn INTEGER NOT NULL
+);
+CREATE INDEX job_turn ON job (turn);
+"""
+"""Tables of the queue as the first versions of the service made them."""
 
 
 @pytest.fixture
@@ -21,9 +36,9 @@ def jobs(tmp_path: Path) -> Jobs:
     return Jobs(tmp_path / "jobs.sqlite")
 
 
-def taken(jobs: Jobs) -> str | None:
+def taken(jobs: Jobs, *busy: str) -> str | None:
     """Return the id of the job whose turn it is."""
-    job = jobs.take()
+    job = jobs.take(busy)
     return job.id if job else None
 
 
@@ -36,6 +51,115 @@ def test_first_come_first_served(jobs: Jobs) -> None:
         served.append(name)
         jobs.finish(name, State.SUCCESSFUL, "")
     assert served == order
+
+
+def test_the_greater_priority_comes_first(jobs: Jobs) -> None:
+    for name, priority in (("a", 0), ("b", -1), ("c", 5), ("d", 5)):
+        jobs.accept(name, STUDY, [name], priority)
+    served = [taken(jobs)]
+    while served[-1] is not None:
+        served.append(taken(jobs, *served))
+    assert served == ["c", "d", "a", "b", None]
+
+
+def test_studies_that_share_a_run_are_computed_one_after_the_other(jobs: Jobs) -> None:
+    for name, runs in (("a", ["x", "y"]), ("b", ["y", "z"]), ("c", ["w"])):
+        jobs.accept(name, STUDY, runs)
+    assert taken(jobs) == "a"
+    assert taken(jobs, "a") == "c"
+    assert taken(jobs, "a", "c") is None
+    jobs.finish("a", State.SUCCESSFUL, "")
+    assert taken(jobs, "c") == "b"
+
+
+def test_no_more_studies_wait_than_may(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path / "jobs.sqlite", longest=2)
+    for name in "ab":
+        jobs.accept(name, STUDY, ["run"])
+    with pytest.raises(QueueFull, match="2 studies wait already"):
+        jobs.accept("c", STUDY, ["run"])
+    assert jobs.accept("a", STUDY, ["run"])[1] is False
+    jobs.take()
+    assert jobs.accept("c", STUDY, ["run"])[1] is True
+
+
+def spoil(jobs: Jobs, job_id: str, **values: object) -> None:
+    """Write nonsense into the row of a job."""
+    with closing(sqlite3.connect(jobs.path)) as connection, connection:
+        for column, value in values.items():
+            connection.execute(f"UPDATE job SET {column} = ? WHERE id = ?", (value, job_id))
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [{"size": "many"}, {"progress": b"\xff"}, {"name": b"\xff"}, {"state": "odd"}],
+)
+def test_a_bad_row_hides_only_itself(jobs: Jobs, nonsense: dict[str, object]) -> None:
+    for name in "abc":
+        jobs.accept(name, STUDY, [name])
+    spoil(jobs, "a", **nonsense)
+    assert [job.id for job in jobs.page(limit=9, offset=0)[0]] == ["c", "b"]
+    assert taken(jobs) == "b"
+    assert taken(jobs, "b") == "c"
+    with pytest.raises(NotFound):
+        jobs.get("a")
+    assert jobs.accept("a", STUDY, ["a"])[1] is True
+    assert taken(jobs, "b", "c") == "a"
+
+
+def test_a_queue_that_is_gone_is_not_made_anew_behind_the_back_of_its_users(jobs: Jobs) -> None:
+    jobs.accept("a", STUDY, ["run"])
+    jobs.path.unlink()
+    with pytest.raises(QueueLost, match=r"jobs\.sqlite is gone or damaged"):
+        jobs.get("a")
+    assert not jobs.path.exists()
+
+
+def test_a_damaged_page_is_told(jobs: Jobs) -> None:
+    for number in range(200):
+        jobs.accept(f"{number}", STUDY, [f"{number}-{run}" for run in range(20)])
+    content = bytearray(jobs.path.read_bytes())
+    content[4096:] = b"\xff" * (len(content) - 4096)
+    jobs.path.write_bytes(content)
+    with pytest.raises(QueueLost):
+        jobs.page(limit=1000, offset=0)
+
+
+def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> None:
+    path = tmp_path / "jobs.sqlite"
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.executescript(FIRST_FORM)
+        row = ("a", json.dumps(STUDY), '["x", "y"]', 2, "failed", "m", 50.0, 0, "t", None, "u", 3)
+        connection.execute(f"INSERT INTO job VALUES ({', '.join('?' * 12)})", row)
+    jobs = Jobs(path)
+    job = jobs.get("a")
+    assert (job.name, job.scene, job.size, job.state) == ("a", "fake", 2, State.FAILED)
+    assert (jobs.runs("a"), jobs.study("a"), jobs.new) == (["x", "y"], STUDY, False)
+    assert Jobs(path).get("a") == job
+
+
+def test_a_queue_of_a_later_form_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "jobs.sqlite"
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("PRAGMA user_version = 99")
+    with pytest.raises(StudyError, match="a later version of the service has made it"):
+        Jobs(path)
+
+
+def test_a_dismissed_retry_of_a_successful_study_leaves_it_successful(jobs: Jobs) -> None:
+    jobs.accept("a", STUDY, ["run"])
+    for end, left in (
+        (State.SUCCESSFUL, State.SUCCESSFUL),
+        (State.FAILED, State.DISMISSED),
+    ):
+        jobs.take()
+        jobs.finish("a", end, "")
+        jobs.retry("a")
+        assert jobs.dismiss("a").state is left
+        jobs.retry("a")
+        assert taken(jobs) == "a"
+        assert jobs.dismiss("a").state is (left if left is State.SUCCESSFUL else State.DISMISSED)
+        jobs.retry("a")
 
 
 def test_a_running_job_is_taken_again_by_the_next_service(jobs: Jobs) -> None:
@@ -74,7 +198,7 @@ def test_what_the_state_does_not_allow_is_refused(jobs: Jobs) -> None:
     jobs.finish("a", State.SUCCESSFUL, "")
     with pytest.raises(Conflict, match="successful"):
         jobs.dismiss("a")
-    for act in (jobs.get, jobs.runs, jobs.dismiss, jobs.retry):
+    for act in (jobs.get, jobs.study, jobs.dismiss, jobs.retry):
         with pytest.raises(NotFound, match="unknown"):
             act("unknown")
 

@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 
-from service.jobs import Job, Jobs, State
+from service.job import Job, State
+from service.jobs import Jobs
+from service.pool import Pool
 from service.runner import Runner
 from service.settings import Settings
 
@@ -40,15 +42,18 @@ class Scripted(Runner):
         )
 
 
-def carried_out(data: Path, *script: list[Any], again: bool = False) -> tuple[Job, list[bool]]:
+def carried_out(
+    data: Path, *script: list[Any], again: bool = False, **limits: Any
+) -> tuple[Job, list[bool]]:
     """Return what became of a study, and with which wish to repeat each child was started."""
     jobs = Jobs(data / "jobs.sqlite")
-    jobs.accept("a", {"name": "a"}, ["b", "c"])
+    jobs.accept("a", {"name": "a", "scene": "fake"}, ["b", "c"])
     if again:
         jobs.dismiss("a")
         jobs.retry("a")
-    settings = Settings(data=data, attempts=2, poll_seconds=0.01)
-    runner = Scripted(settings, jobs, lock=0, script=list(script))
+    settings = Settings(data=data, attempts=2, poll_seconds=0.01, **limits)
+    pool = Pool(settings, lock=0)
+    runner = Scripted(settings, jobs, pool, 0, lambda: jobs, script=list(script))
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -81,3 +86,9 @@ def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line:
     job, orders = carried_out(tmp_path, [RUN, line])
     assert len(orders) == 2
     assert job.state is State.FAILED and "sent what cannot be read" in job.message
+
+
+def test_a_study_that_waits_too_long_for_workers_is_given_up(tmp_path: Path) -> None:
+    job, orders = carried_out(tmp_path, [AWAY], patience_seconds=0.2)
+    assert len(orders) >= 2
+    assert job.state is State.FAILED and "the store is busy" in job.message

@@ -1,0 +1,84 @@
+"""One study in the queue: where it stands, and what is wanted of it."""
+
+from __future__ import annotations
+
+import logging
+import sqlite3
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+log = logging.getLogger(__name__)
+
+COLUMNS = (
+    "id, name, scene, size, state, message, progress, again, priority, submitted, started, finished"
+)
+UNREADABLE = "its row in the queue cannot be read: post the study again"
+
+
+class State(StrEnum):
+    """Where a study stands."""
+
+    ACCEPTED = "accepted"
+    RUNNING = "running"
+    SUCCESSFUL = "successful"
+    FAILED = "failed"
+    DISMISSED = "dismissed"
+
+    @property
+    def final(self) -> bool:
+        """Whether the work has ended; only a retry starts it again."""
+        return self not in (State.ACCEPTED, State.RUNNING)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One study in the queue.
+
+    Attributes
+    ----------
+    id : content id of the study
+    name, scene : of the study
+    size : number of its runs
+    state, message : where it stands, and why when that needs a reason
+    progress : percentage of the work that is done
+    again : whether runs that failed are to be computed again; over once the work has begun
+    priority : of two studies, the one with the greater priority is computed first
+    submitted, started, finished : ISO 8601, UTC
+    """
+
+    id: str
+    name: str
+    scene: str
+    size: int
+    state: State
+    message: str
+    progress: float
+    again: bool
+    priority: int
+    submitted: str
+    started: str | None
+    finished: str | None
+
+
+def job_of(row: sqlite3.Row) -> Job | None:
+    """Return the job a row of the table stands for; None when the row makes no sense."""
+    found = dict(row)
+    try:
+        found |= {key: int(found[key]) for key in ("size", "priority")}
+        found |= {"state": State(found["state"]), "progress": float(found["progress"])}
+        if not all(isinstance(found[key], str) for key in ("name", "scene", "message")):
+            raise TypeError
+    except (ValueError, TypeError):
+        log.error("%s: %s", row["id"], UNREADABLE)
+        return None
+    return Job(**found | {"again": bool(found["again"])})
+
+
+def verdict(counts: Mapping[str, int]) -> tuple[State, str]:
+    """Return the final state of a study whose runs ended as counted, and the reason."""
+    others = {status: count for status, count in counts.items() if count and status != "ok"}
+    if not others:
+        return State.SUCCESSFUL, ""
+    listed = ", ".join(f"{count} {status}" for status, count in others.items())
+    return State.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"

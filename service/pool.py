@@ -1,0 +1,111 @@
+"""The process that owns store and workers while studies are computed: ``python -m service.pool``.
+
+Studies share its workers, and the lock of the store that it holds. It is started with the first
+study, and ends when there has been none for some time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from asyncio.subprocess import Process
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from service import processes
+from service.settings import Settings
+from studies.errors import StoreBusy, StoreFull, StudyError
+
+START_SECONDS = 60.0
+"""Time within which the workers must have started."""
+
+
+class PoolAway(RuntimeError):
+    """There is no pool, and why; waiting may help."""
+
+
+@dataclass(slots=True)
+class Pool:
+    """The service's side of the process.
+
+    Attributes
+    ----------
+    settings : how many workers, or which scheduler
+    lock : descriptor of the directory's lock, handed on to the process
+    """
+
+    settings: Settings
+    lock: int
+    _process: Process | None = None
+    _access: dict[str, Any] = field(default_factory=dict)
+    _one: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    async def access(self) -> dict[str, Any]:
+        """Return how the workers are reached, after starting the process if there is none.
+
+        Raises
+        ------
+        PoolAway
+            If it cannot be started.
+        """
+        async with self._one:
+            if self._process is None or self._process.returncode is not None:
+                self._access = await self._start()
+            return self._access
+
+    async def close(self) -> None:
+        """End the process, if there is one."""
+        async with self._one:
+            if self._process is not None:
+                await processes.end(self._process, self.settings.grace_seconds)
+                self._process = None
+
+    async def _start(self) -> dict[str, Any]:
+        order = {
+            "data": str(self.settings.data.resolve()),
+            "workers": self.settings.workers,
+            "memory": self.settings.worker_memory,
+            "access": self.settings.outside_access(),
+            "grace": self.settings.grace_seconds,
+        }
+        try:
+            self._process = await processes.start("service.pool", order, self.lock)
+        except OSError as error:
+            raise PoolAway(f"the workers cannot be started: {error.strerror}") from error
+        said: dict[str, Any] = {}
+        with contextlib.suppress(TimeoutError, ValueError):
+            async with asyncio.timeout(START_SECONDS):
+                assert self._process.stdout is not None
+                said = json.loads(await self._process.stdout.readline())
+        if said.get("kind") == "access":
+            return said["content"]
+        await processes.end(self._process, self.settings.grace_seconds)
+        reason = said.get("content", {}).get("reason", "see the log of the service")
+        raise PoolAway(f"the workers have not started: {reason}")
+
+
+def main() -> None:
+    """Hold the store, and the workers if they are to be our own, until the service says stop."""
+    from studies.execution.cluster import own_workers
+
+    from studies import Store
+
+    outlet = processes.claim_stdout()
+    order = processes.read_order()
+    stop = processes.watch_stdin(order["grace"])
+    try:
+        with contextlib.ExitStack() as held:
+            held.enter_context(Store(order["data"]).writing())
+            access = order["access"]
+            if access is None:
+                own = own_workers(order["workers"], order["memory"])
+                access = asdict(held.enter_context(own))
+            outlet.send("access", access)
+            stop.wait()
+    except (StoreBusy, StoreFull, StudyError, RuntimeError) as error:
+        outlet.send("away", {"reason": str(error)})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""Processes of the service's own, and how the two sides talk.
+
+A process gets its order as the first line of its standard input; the end of that input means
+"stop", whether the service asked for it or died. It sends lines of JSON on its standard output.
+It inherits the lock of the data directory and holds it until it ends: a service that starts after
+a crash waits for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import sys
+import threading
+import time
+from asyncio.subprocess import PIPE, Process
+from collections.abc import Mapping
+from typing import Any, TextIO
+
+LONGEST_LINE = 1_000_000
+"""Bytes of one message a process may send."""
+
+STDIN = 0
+
+
+async def start(module: str, order: Mapping[str, Any], lock: int) -> Process:
+    """Start ``python -m module`` and send it its order.
+
+    Raises
+    ------
+    OSError
+        If the system cannot start a process.
+    """
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        module,
+        stdin=PIPE,
+        stdout=PIPE,
+        limit=LONGEST_LINE,
+        pass_fds=(lock,),
+        start_new_session=True,  # an interrupt from a terminal is the service's to handle
+    )
+    assert process.stdin is not None
+    process.stdin.write(json.dumps(order).encode() + b"\n")
+    return process
+
+
+async def end(process: Process, grace: float) -> None:
+    """Ask a process to stop by closing its input, and kill it when it does not."""
+    assert process.stdin is not None
+    process.stdin.close()
+    try:
+        async with asyncio.timeout(grace):
+            await process.wait()
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+
+
+class Outlet:
+    """Sends messages to the service, one JSON text a line."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def send(self, kind: str, content: Mapping[str, Any]) -> None:
+        """Write one message; when the service no longer reads, the work goes on."""
+        with contextlib.suppress(BrokenPipeError):
+            self.stream.write(json.dumps({"kind": kind, "content": content}) + "\n")
+            self.stream.flush()
+
+
+def claim_stdout() -> Outlet:
+    """Keep the standard output for messages: what libraries print goes to the error output."""
+    stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    return Outlet(stream)
+
+
+def read_order() -> dict[str, Any]:
+    """Return the order, the first line of the standard input."""
+    text = b""
+    while not text.endswith(b"\n"):
+        piece = os.read(STDIN, 65536)
+        if not piece:
+            raise SystemExit("the service ended before it sent the order")
+        text += piece
+    order: dict[str, Any] = json.loads(text)
+    return order
+
+
+def watch_stdin(grace: float) -> threading.Event:
+    """Return an event that is set when the other end of the standard input closes.
+
+    A process that has not ended ``grace`` seconds later ends itself: a service that died cannot
+    kill it, and the next one waits for its lock.
+    """
+    stop = threading.Event()
+
+    def watch() -> None:
+        # Not through sys.stdin: at exit the interpreter would wait for its buffer's lock.
+        os.read(STDIN, 1)
+        stop.set()
+        time.sleep(grace)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="stop-watch", daemon=True).start()
+    return stop

@@ -1,0 +1,53 @@
+"""The queue made anew from what the directory holds, when its file is gone or damaged."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+
+from service.errors import QueueLost
+from service.job import State, verdict
+from service.jobs import Jobs
+from studies import Store, Study, StudyError, open_netcdf
+from studies.definition.vocabulary import STATUSES
+
+log = logging.getLogger(__name__)
+
+
+def open_queue(path: Path, store: Store, longest: int | None) -> Jobs:
+    """Return the queue; one that is missing or damaged is made from the studies of the store.
+
+    A damaged file is kept under another name. A study with a data set has ended, as the data set
+    tells; one without is accepted, and computed.
+    """
+    try:
+        jobs = Jobs(path, longest)
+    except QueueLost as error:
+        damaged = path.with_name(f"{path.name}.damaged")
+        log.error("%s: kept as %s, and made anew from the studies", error, damaged.name)
+        path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
+        path.replace(damaged)
+        jobs = Jobs(path, longest)
+    if jobs.new:
+        for file in sorted(store.directory.glob("studies/*/study.json")):
+            _find(file, jobs, store)
+    return jobs
+
+
+def _find(file: Path, jobs: Jobs, store: Store) -> None:
+    """Put a study of the directory into the queue, if this version of the solver knows it."""
+    try:
+        study = Study.from_dict(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:  # StudyError is a ValueError
+        log.warning("studies/%s: not found again: %s", file.parent.name, error)
+        return
+    if study.id != file.parent.name:
+        return
+    jobs.accept(study.id, study.to_dict(), (case.id for case in study.cases()))
+    with suppress(StudyError), open_netcdf(store.dataset_path(study.id)) as dataset:
+        codes = dataset["status"].to_numpy().ravel().tolist()
+        counts = Counter(STATUSES[code] for code in codes)
+        jobs.finish(study.id, *verdict(counts), standing=State.ACCEPTED)

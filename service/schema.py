@@ -1,0 +1,71 @@
+"""Tables of the queue, and how a queue of an earlier form is brought into today's."""
+
+from __future__ import annotations
+
+import sqlite3
+
+from studies.errors import StudyError
+
+VERSION = 1
+
+TABLES = (
+    """CREATE TABLE job (
+        id TEXT PRIMARY KEY,
+        name TEXT NOT NULL,
+        scene TEXT NOT NULL,
+        study TEXT NOT NULL,
+        size INTEGER NOT NULL,
+        state TEXT NOT NULL,
+        message TEXT NOT NULL,
+        progress REAL NOT NULL,
+        again INTEGER NOT NULL,
+        stood TEXT NOT NULL,
+        priority INTEGER NOT NULL,
+        submitted TEXT NOT NULL,
+        started TEXT,
+        finished TEXT,
+        turn INTEGER NOT NULL
+    )""",
+    "CREATE INDEX job_by_turn ON job (turn)",
+    "CREATE INDEX job_by_state ON job (state, priority, turn)",
+    """CREATE TABLE run (
+        job TEXT NOT NULL, position INTEGER NOT NULL, run TEXT NOT NULL,
+        PRIMARY KEY (job, position)
+    ) WITHOUT ROWID""",
+    "CREATE INDEX run_by_id ON run (run)",
+    f"PRAGMA user_version = {VERSION}",
+)
+
+FIRST_FORM = (
+    """INSERT INTO job SELECT id, json_extract(study, '$.name'), json_extract(study, '$.scene'),
+        study, size, state, message, progress, again, '', 0, submitted, started, finished, turn
+        FROM first""",
+    """INSERT INTO run SELECT first.id, each.key, each.value
+        FROM first, json_each(first.runs) AS each""",
+    "DROP TABLE first",
+)
+"""Copies the rows of the first form, in which a row held all its runs as one text."""
+
+
+def prepare(connection: sqlite3.Connection) -> bool:
+    """Make the tables, or bring them into today's form; return whether the queue is new.
+
+    Raises
+    ------
+    sqlite3.DatabaseError
+        If the file is damaged, or none of ours.
+    StudyError
+        If a later version of the service has made it.
+    """
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    known = {row[0] for row in connection.execute("SELECT name FROM sqlite_master")}
+    if version == VERSION and {"job", "run"} <= known:
+        return False
+    if version > VERSION:
+        allowed = f"must be of form {VERSION}: a later version of the service has made it"
+        raise StudyError("jobs.sqlite", f"form {version}", allowed)
+    if "job" in known:
+        connection.execute("ALTER TABLE job RENAME TO first")
+    for statement in TABLES + (FIRST_FORM if "job" in known else ()):
+        connection.execute(statement)
+    return "job" not in known

@@ -1,0 +1,116 @@
+"""Several studies at once, and a queue that is lost."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from tests.service.servers import Server, fake_study, free_port, wait_until
+
+
+def large_study(name: str, paths: int = 60, seconds: float = 0.5, **more: Any) -> dict[str, Any]:
+    """Return a study of many paths, each of one run."""
+    study = fake_study(name, seconds=seconds)
+    study["sweep"] = {"friction": [round(i / 100, 2) for i in range(paths)]}
+    return study | more
+
+
+def seconds_for(server: Server, study: dict[str, Any]) -> float:
+    """Return how long a study takes from its submission to its end."""
+    started = time.monotonic()
+    assert server.finished(server.post(study))["status"] == "successful"
+    return time.monotonic() - started
+
+
+def test_a_small_study_does_not_wait_for_the_end_of_a_large_one(mortal: Server) -> None:
+    mortal.start()
+    large = mortal.post(large_study("large"))
+    wait_until(lambda: mortal.study(large)["progress"] > 0)
+    small = fake_study("small")
+    small["sweep"] = {"load_ratio": [0.75]}
+    assert seconds_for(mortal, small) < 15.0
+    assert mortal.study(large)["status"] == "running"
+    assert mortal.study(large)["progress"] < 90.0
+    mortal.client.delete(f"/studies/{large}")
+
+
+def test_what_two_studies_share_is_computed_once(mortal: Server) -> None:
+    mortal.start()
+    names = [mortal.post(large_study(name, paths=6)) for name in ("one", "two")]
+    for study_id in names:
+        assert mortal.finished(study_id)["counts"] == {"ok": 6}
+    assert len(mortal.computed()) == 6
+
+
+def test_the_greater_priority_goes_first(mortal: Server) -> None:
+    mortal.settings = {"RESIDUA_STUDIES_AT_ONCE": "1"}
+    mortal.start()
+    first = mortal.post(large_study("first", paths=3))
+    wait_until(lambda: mortal.study(first)["status"] == "running")
+    ids = {}
+    for friction, priority in ((0.91, 0), (0.92, 7)):
+        study = fake_study(f"priority-{priority}", seconds=0.1)
+        study["sweep"] = {"friction": [friction]}
+        ids[priority] = mortal.post(study | {"priority": priority})
+        assert mortal.study(ids[priority])["priority"] == priority
+    for study_id in ids.values():
+        mortal.finished(study_id)
+    assert ["0.92" in line for line in mortal.computed()[-2:]] == [True, False]
+    refused = mortal.client.post("/studies", json=study | {"priority": 1000})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "priority"
+
+
+def test_the_death_of_the_workers_process_is_made_good(mortal: Server) -> None:
+    mortal.start()
+    study_id = mortal.post(large_study("orphaned", paths=12, seconds=0.3))
+    wait_until(lambda: len(mortal.computed()) >= 2)
+    assert mortal.process is not None
+    for child in psutil.Process(mortal.process.pid).children():
+        if any("service.pool" in word for word in child.cmdline()):
+            child.kill()
+    assert mortal.finished(study_id)["counts"] == {"ok": 12}
+
+
+@pytest.mark.parametrize("damage", ["deleted", "overwritten", "directory"])
+def test_a_lost_queue_is_made_anew_from_the_studies(mortal: Server, damage: str) -> None:
+    mortal.start()
+    done, failed = mortal.post(fake_study("done")), mortal.post(fake_study("f", behaviour="limit"))
+    ends = {study_id: mortal.finished(study_id) for study_id in (done, failed)}
+    running = mortal.post(large_study("running", paths=30, seconds=0.2))
+    wait_until(lambda: mortal.study(running)["progress"] > 0)
+    queue = mortal.data / "jobs.sqlite"
+    queue.unlink()
+    if damage == "overwritten":
+        queue.write_text("no queue" * 1000)
+    if damage == "directory":
+        queue.mkdir()
+    seen = [mortal.client.get("/health")]
+    wait_until(lambda: seen.append(mortal.client.get("/health")) or seen[-1].status_code == 200)
+    if seen[0].status_code != 200:
+        assert seen[0].json()["queue_readable"] is False
+    for study_id, end in ends.items():
+        found = mortal.study(study_id)
+        for part in ("status", "message", "counts", "runs", "sweep"):
+            assert found[part] == end[part]
+    assert mortal.finished(running)["counts"] == {"ok": 30}
+    assert len(mortal.computed()) <= 4 + 4 + 30 + 2
+
+
+def test_studies_that_nobody_computes_say_so(mortal: Server, tmp_path: Path) -> None:
+    """A scheduler that nobody answers for, then patience."""
+    mortal.settings = {
+        "RESIDUA_SCHEDULER": f"tcp://127.0.0.1:{free_port()}",
+        "RESIDUA_PATIENCE_SECONDS": "12",
+    }
+    mortal.start()
+    study_id = mortal.post(fake_study("alone"))
+    waiting = wait_until(lambda: mortal.client.get("/health").json()["waiting"], 30.0)
+    assert "no scheduler answers" in waiting[study_id]
+    assert mortal.client.get("/health").json()["status"] == "waiting"
+    end = mortal.finished(study_id)
+    assert end["status"] == "failed" and "no scheduler answers" in end["message"]
