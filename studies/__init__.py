@@ -15,12 +15,16 @@ if TYPE_CHECKING:
     from studies.definition.cases import Case, LoadingPath
     from studies.definition.parameters import scene_schema
     from studies.definition.study import Study
+    from studies.execution.cluster import Access, own_workers
+    from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
     from studies.views.reading import open_netcdf, open_study
 
 _HOMES = {
+    "Access": "execution.cluster",
     "Case": "definition.cases",
+    "Limits": "execution.limits",
     "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
@@ -28,6 +32,7 @@ _HOMES = {
     "StudyOutcome": "execution.run",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
+    "own_workers": "execution.cluster",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
 }
@@ -36,8 +41,10 @@ _RENAMED = {"Path": "LoadingPath"}
 """Old public names that still work, and their new ones."""
 
 __all__ = [
+    "Access",
     "Case",
     "GridLost",
+    "Limits",
     "LoadingPath",
     "Store",
     "StoreBusy",
@@ -47,6 +54,7 @@ __all__ = [
     "StudyOutcome",
     "open_netcdf",
     "open_study",
+    "own_workers",
     "run_study",
     "scene_schema",
 ]

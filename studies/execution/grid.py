@@ -1,24 +1,20 @@
-"""Work spread over processes or machines; the only module that knows dask."""
+"""Work spread over the workers of a scheduler."""
 
 from __future__ import annotations
 
-import logging
 import queue
-import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Self
 
-import dask
-from distributed import Client, Event, Future, KilledWorker, LocalCluster, get_worker
+from distributed import Event, Future, KilledWorker, get_worker
 from distributed.client import FutureCancelledError
-from distributed.comm.addressing import get_address_host_port
 
 from studies.errors import GridLost
+from studies.execution.cluster import Access, connect
 
 Report = Callable[[dict[str, Any]], None]
 """Sends a small message from a task to the caller."""
@@ -32,22 +28,6 @@ _WORKER_DIED = (
     "the worker process died each time it computed this loading path; if memory ran out, "
     "use fewer workers"
 )
-
-_CONNECT = 10.0
-"""Seconds within which a scheduler must answer."""
-
-_CONFIGURATION = {
-    # A task whose worker died is tried once more; a second death is the task's own doing.
-    "distributed.scheduler.allowed-failures": 1,
-    # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
-    "distributed.scheduler.worker-saturation": 1.0,
-    # Arrays of some megabytes come and go in every iteration: dask's threshold of 64 kB would hand
-    # each back to the system, and a quarter of the time would go into clearing pages.
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
-    # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
-    "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,58 +47,21 @@ class Finished:
 
 
 class Grid:
-    """Workers of our own (one thread a process), or those of a running scheduler.
+    """The workers of a scheduler.
 
     Parameters
     ----------
-    workers : number of worker processes of our own
-    scheduler : address of a running scheduler; its workers are used instead
+    access : of the scheduler
     """
 
-    def __init__(self, workers: int, scheduler: str | None = None) -> None:
-        self._workers = workers
-        self._scheduler = scheduler
-        self._open = ExitStack()
+    def __init__(self, access: Access) -> None:
+        self._client = connect(access)
 
     def __enter__(self) -> Self:
-        with ExitStack() as opening:
-            address = self._scheduler or self._own_workers(opening)
-            try:
-                if self._scheduler:
-                    get_address_host_port(self._scheduler)  # a refused client closes badly
-                self._client = opening.enter_context(
-                    Client(address, set_as_default=False, timeout=_CONNECT)
-                )
-            except (OSError, ValueError) as error:
-                raise GridLost(f"no scheduler answers at {address}: {error}") from error
-            self._open = opening.pop_all()
         return self
 
-    def _own_workers(self, opening: ExitStack) -> LocalCluster:
-        scratch = opening.enter_context(
-            tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True)
-        )
-        opening.enter_context(dask.config.set(_CONFIGURATION))
-        try:
-            return opening.enter_context(
-                LocalCluster(
-                    n_workers=self._workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
-                    local_directory=scratch,
-                    silence_logs=logging.CRITICAL,
-                )
-            )
-        except RuntimeError as error:
-            raise RuntimeError(
-                "worker processes did not start; they import the calling script anew, so it must "
-                "do its work under: if __name__ == '__main__':"
-            ) from error
-
     def __exit__(self, *reason: object) -> None:
-        self._open.close()
+        self._client.close()
 
     def run(
         self, function: Function, tasks: Sequence[Any], should_stop: StopCheck

@@ -6,6 +6,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,15 @@ from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
+from studies.execution.cluster import Access, connect, own_workers
+from studies.execution.limits import Limits
 from studies.execution.task import PathTask, walk
 from studies.storage import dataset as layout
 from studies.storage.combine import combine
 from studies.storage.store import Store
+
+DEFAULT = Limits()
+"""The limits of a study that sets none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,16 +33,17 @@ class StudyEvent:
 
     Attributes
     ----------
-    kind : ``"path"`` (a loading path has advanced) or ``"run"`` (a run has its outcome)
+    kind : ``"path"`` (a loading path has advanced), ``"run"`` (a run has its outcome) or
+        ``"waiting"`` (no worker takes the work; `message` says why, and is empty when it goes on)
     progress : fraction of the whole study that is done, 0 to 1
-    path : id of the path
+    path : id of the path; empty while waiting
     fraction : fraction of this path that is done, 0 to 1
-    run, status, message : id and outcome of the run
+    run, status, message : id and outcome of the run, or what the study waits for
     """
 
     kind: str
     progress: float
-    path: str
+    path: str = ""
     fraction: float = 0.0
     run: str = ""
     status: str = ""
@@ -77,8 +84,10 @@ def run_study(
     store: Store,
     *,
     workers: int | None = None,
-    scheduler: str | None = None,
+    scheduler: Access | str | None = None,
     resume: bool = False,
+    limits: Limits = DEFAULT,
+    priority: int = 0,
     on_event: Callable[[StudyEvent], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> StudyOutcome:
@@ -89,10 +98,12 @@ def run_study(
     study : what to compute
     store : where runs are kept, whichever study asked for them first
     workers : worker processes on this machine; by default one a core
-    scheduler : address of a running dask scheduler, to be used instead; its workers must see
-        the store under the same path
+    scheduler : a running dask scheduler, to be used instead; its workers must see the store
+        under the same path
     resume : compute only the runs that have no outcome; by default failed runs are computed again
         too
+    limits : on time and memory
+    priority : of studies that share a scheduler, the one with the higher number goes first
     on_event : called, in this thread, with everything that happens
     should_stop : asked several times a second; once it is true the work stops, and finished
         runs stay
@@ -102,9 +113,10 @@ def run_study(
     StoreBusy
         when another process computes into the same store
     StudyError
-        when the store cannot be written to
+        when the store cannot be written to, or the certificates cannot be used
     GridLost
-        when the scheduler is gone; the same call computes the rest
+        when the scheduler is gone, or no worker took the work for too long; the same call
+        computes the rest
     """
     started = time.monotonic()
     asked = False
@@ -114,8 +126,9 @@ def run_study(
         asked = asked or (should_stop is not None and should_stop())
         return asked
 
-    if scheduler and not store.directory.exists():
-        _answering(scheduler)
+    access = Access(scheduler) if isinstance(scheduler, str) else scheduler
+    if access and not store.directory.exists():
+        _answering(access)
     with store.writing():
         store.save_study(study)
         cases = list(study.cases())
@@ -123,9 +136,9 @@ def run_study(
         done = {key for key, row in known.items() if resume or row["status"] == OK}
         wanted = {case.id for case in cases} - done
         store.discard(wanted)
-        work = _Work(study, store, wanted, on_event or (lambda event: None))
+        work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
-            work.compute(workers or os.cpu_count() or 1, scheduler, stop)
+            work.compute(workers or os.cpu_count() or 1, access, stop)
         dataset = store.dataset_path(study.id)
         combine(study, store, cases)
         rows = store.catalogue.rows(case.id for case in cases)
@@ -145,11 +158,9 @@ def run_study(
     )
 
 
-def _answering(scheduler: str) -> None:
+def _answering(access: Access) -> None:
     """Refuse a scheduler that does not answer, before a directory is made for its results."""
-    from studies.execution.grid import Grid  # dask takes a second to import
-
-    with Grid(0, scheduler):
+    with connect(access):
         pass
 
 
@@ -160,11 +171,13 @@ class _Work:
     study: Study
     store: Store
     wanted: set[str]
+    limits: Limits
+    priority: int
     emit: Callable[[StudyEvent], None]
     computed: set[str] = field(default_factory=set)
     _fractions: dict[str, tuple[int, float]] = field(default_factory=dict)
 
-    def compute(self, workers: int, scheduler: str | None, stop: Callable[[], bool]) -> None:
+    def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run one task for each path that lacks runs."""
         from studies.execution.grid import Finished, Grid  # dask takes a second to import
 
@@ -175,7 +188,11 @@ class _Work:
             if path.cases
         ]
         self._fractions = {task.path.id: (len(task.path.cases), 0.0) for task in tasks}
-        with Grid(min(workers, len(tasks)), scheduler) as grid:
+        with ExitStack() as opening:
+            access = access or opening.enter_context(
+                own_workers(min(workers, len(tasks)), self.limits.memory)
+            )
+            grid = opening.enter_context(Grid(access))
             for item in grid.run(walk, tasks, stop):
                 if not isinstance(item, Finished):
                     self._hear(item.content)

@@ -30,9 +30,9 @@ def test_no_module_imports_against_the_direction(package: str) -> None:
     assert not {m: sorted(names) for m, names in breaches.items() if names}
 
 
-def test_one_module_of_studies_imports_dask() -> None:
-    users = [m for m, names in imports("studies").items() if names & {"dask", "distributed"}]
-    assert len(users) == 1, users
+def test_two_modules_of_studies_import_dask() -> None:
+    users = {m for m, names in imports("studies").items() if names & {"dask", "distributed"}}
+    assert users == {"studies/execution/cluster.py", "studies/execution/grid.py"}
 
 
 def test_what_draws_is_in_its_folders() -> None:

@@ -59,7 +59,7 @@ def test_a_running_scheduler_computes_the_study(
 def test_a_lost_scheduler_is_told_apart_from_failed_runs(
     cluster: tuple[str, subprocess.Popen[bytes]], store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._CONNECT", 3.0)
+    monkeypatch.setattr("studies.execution.cluster._CONNECT", 3.0)
     address, scheduler = cluster
     study = fake_study(sweep={"friction": [0.0, 0.1, 0.2]}, seconds=1.0)
 
@@ -80,7 +80,7 @@ def test_a_lost_scheduler_is_told_apart_from_failed_runs(
 def test_no_scheduler_at_the_address_is_one_clear_error_and_leaves_nothing(
     store: Store, monkeypatch: pytest.MonkeyPatch, address: str
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._CONNECT", 1.0)
+    monkeypatch.setattr("studies.execution.cluster._CONNECT", 1.0)
     with pytest.raises(GridLost, match=f"no scheduler answers at {address}: "):
         run_study(fake_study(), store, scheduler=address)
     assert not store.directory.exists()

@@ -1,0 +1,164 @@
+"""Where the workers are: a cluster of our own, or a scheduler that others have started."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+from studies.errors import GridLost, StudyError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_CONNECT = 10.0
+"""Seconds within which a scheduler must answer."""
+
+CONFIGURATION: Mapping[str, Any] = {
+    # A task whose worker died is tried once more; a second death is the task's own doing.
+    "distributed.scheduler.allowed-failures": 1,
+    # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
+    "distributed.scheduler.worker-saturation": 1.0,
+    # Arrays of some megabytes come and go in every iteration: dask's threshold of 64 kB would hand
+    # each back to the system, and a quarter of the time would go into clearing pages.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
+    # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
+    "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
+}
+"""How the scheduler and the workers of our own behave."""
+
+_CLOSED: Mapping[str, Any] = {
+    # dask asks for no password on its pages, and they tell what is computed.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """What it takes to reach a scheduler.
+
+    Attributes
+    ----------
+    address : of the scheduler, such as ``"tls://10.0.0.5:8786"``
+    ca, cert, key : certificate of the authority that scheduler and workers trust, our own
+        certificate, and its private key; each a PEM text or the name of a file. The key may
+        be left out when the file of the certificate holds it
+
+    Raises
+    ------
+    StudyError
+        when the address asks for certificates and there are none
+    """
+
+    address: str
+    ca: str | None = None
+    cert: str | None = None
+    key: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.address.startswith("tls://") and not (self.ca and self.cert):
+            allowed = (
+                "needs certificates: name the file of the authority (--tls-ca) and those of "
+                "your own certificate and key (--tls-cert, --tls-key)"
+            )
+            raise StudyError("scheduler", self.address, allowed)
+
+    def to_dict(self) -> dict[str, str | None]:
+        """Return the content, to be sent to another process through a pipe."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, str | None]) -> Self:
+        """Return what `to_dict` has written."""
+        return cls(**content)  # type: ignore[arg-type]
+
+
+@contextmanager
+def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
+    """Start worker processes of one thread each on this machine; they end with the context.
+
+    Scheduler and workers listen on the loopback device only. They talk to nobody who lacks the
+    credentials, which are made anew each time and are kept in memory.
+
+    Parameters
+    ----------
+    workers : number of processes
+    memory : most memory of each, such as ``"2GB"``; by default its share of the machine's
+
+    Yields
+    ------
+    Access
+        for any process of this machine to which it is given
+    """
+    import dask  # takes a second to import
+    from distributed import LocalCluster, Security
+
+    security = Security.temporary()
+    with (
+        tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True) as scratch,
+        dask.config.set({**CONFIGURATION, **_CLOSED}),
+    ):
+        try:
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls://",
+                security=security,
+                memory_limit=memory or "auto",
+                dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
+                local_directory=scratch,
+                silence_logs=logging.CRITICAL,
+            )
+        except RuntimeError as error:
+            raise RuntimeError(
+                "worker processes did not start; they import the calling script anew, so it must "
+                "do its work under: if __name__ == '__main__':"
+            ) from error
+        with cluster:
+            yield Access(
+                cluster.scheduler_address,
+                security.tls_ca_file,
+                security.tls_client_cert,
+                security.tls_client_key,
+            )
+
+
+def connect(access: Access) -> Client:
+    """Return a client of a scheduler.
+
+    Raises
+    ------
+    StudyError
+        when the certificates cannot be used
+    GridLost
+        when no scheduler answers
+    """
+    from distributed import Client, Security
+    from distributed.comm.addressing import get_address_host_port
+
+    security = None
+    if access.ca and access.cert:
+        security = Security(
+            require_encryption=True,
+            tls_ca_file=access.ca,
+            tls_client_cert=access.cert,
+            tls_client_key=access.key,
+        )
+        try:
+            security.get_connection_args("client")
+        except (OSError, ValueError) as error:
+            names = [each for each in (access.ca, access.cert, access.key) if each]
+            files = ", ".join("(in memory)" if "\n" in each else each for each in names)
+            raise StudyError("certificates", files, f"cannot be used: {error}") from None
+    try:
+        get_address_host_port(access.address)  # a refused client closes badly
+        return Client(access.address, security=security, set_as_default=False, timeout=_CONNECT)
+    except (OSError, ValueError) as error:
+        raise GridLost(f"no scheduler answers at {access.address}: {error}") from error
