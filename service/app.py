@@ -15,12 +15,14 @@ from fastapi import FastAPI
 from pydantic import ValidationError
 
 import solver
-from service import errors, routes
+from service import errors, logs, routes
 from service.examiner import Examiner
 from service.limits import BodyLimit
 from service.lock import DirectoryInUse, lock_directory
+from service.metrics import Metrics
 from service.pool import Pool
 from service.recovery import open_queue
+from service.retention import Keeper
 from service.runner import Runner
 from service.settings import Settings
 from studies import Store, StoreBusy, StudyError
@@ -47,11 +49,13 @@ def create_app(settings: Settings) -> FastAPI:
     jobs = restore()
     runner = Runner(settings, jobs, Pool(settings, lock), lock, restore)
     examiner = Examiner(settings)
+    keeper = Keeper(jobs, store, runner.computes, settings.keep_days, settings.keep_bytes)
+    metrics = Metrics(jobs, store, runner)
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            async with examiner.working(), runner.working():
+            async with examiner.working(), runner.working(), keeper.working():
                 yield
         finally:
             os.close(lock)
@@ -68,7 +72,11 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.jobs = jobs
     app.state.runner = runner
     app.state.examiner = examiner
+    app.state.keeper = keeper
+    app.state.metrics = metrics
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    # Added last, it is the outermost: what the others refuse is measured and logged too.
+    app.add_middleware(logs.Observed, observe=metrics.observe)
     errors.install(app)
     for router in routes.ROUTERS:
         app.include_router(router)
@@ -95,7 +103,9 @@ def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) 
     """
     given: dict[str, Any] = {} if scheduler is None else {"scheduler": scheduler}
     try:
-        app = create_app(Settings(data=Path(data), **given))
+        settings = Settings(data=Path(data), **given)
+        logs.configure(settings.log_format)
+        app = create_app(settings)
     except ValidationError as error:
         first = error.errors()[0]
         name = f"RESIDUA_{first['loc'][0]}".upper()
@@ -110,6 +120,8 @@ def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) 
         port=port,
         timeout_graceful_shutdown=OPEN_STREAMS_SECONDS,
         server_header=False,
+        log_config=None,
+        access_log=False,
     )
 
 

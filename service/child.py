@@ -6,17 +6,19 @@ other studies alive. The workers and the lock of the store are those of `service
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from service.processes import Outlet, claim_stdout, read_order, watch_stdin
+from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
+from studies.errors import StoreFull
 from studies.execution.cluster import Access
 from studies.execution.limits import Limits
 
-from service.processes import Outlet, claim_stdout, read_order, watch_stdin
-from studies import GridLost, Store, Study, StudyError, run_study
-from studies.errors import StoreFull
+log = logging.getLogger("service.child")
 
 OUTDATED = "the solver has changed since the study was accepted: post it again"
 
@@ -34,10 +36,17 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         limits=Limits(**order["limits"]),
         priority=order["priority"],
         resume=not order["again"],
-        on_event=lambda event: outlet.send("event", asdict(event)),
+        on_event=lambda event: tell(event, outlet),
         should_stop=stop.is_set,
     )
     outlet.send("outcome", outcome.counts)
+
+
+def tell(event: StudyEvent, outlet: Outlet) -> None:
+    """Send an event, and write in the log how a run ended."""
+    outlet.send("event", asdict(event))
+    if event.run:
+        log.info("run: %s %s", event.status, event.message, extra={"run": event.run})
 
 
 def main() -> None:

@@ -10,6 +10,8 @@ from service.errors import NotFound
 from service.examiner import Examiner
 from service.job import Job
 from service.jobs import Jobs
+from service.metrics import Metrics
+from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
@@ -59,10 +61,21 @@ def get_settings(request: Request) -> Settings:
     return settings
 
 
+def held(name: str) -> Any:
+    """Return a dependency on what the application holds under a name."""
+
+    async def get(request: Request) -> Any:
+        return getattr(request.app.state, name)
+
+    return Depends(get)
+
+
 TheJobs = Annotated[Jobs, Depends(get_jobs)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheExaminer = Annotated[Examiner, Depends(get_examiner)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]
 TheStore = Annotated[Store, Depends(get_store)]
 TheRunner = Annotated[Runner, Depends(get_runner)]
+TheKeeper = Annotated[Keeper, held("keeper")]
+TheMetrics = Annotated[Metrics, held("metrics")]
 TheSettings = Annotated[Settings, Depends(get_settings)]

@@ -14,6 +14,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.logs import REQUEST
 from studies import StudyError
 from studies.errors import StoreFull
 
@@ -158,7 +159,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
     status = status_of(exc)
-    later = {"retry-after": "10"} if status.is_server_error else None
+    later = {"retry-after": "10"} if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
     return problem(request, status, str(exc), headers=later)
 
 
@@ -183,7 +184,8 @@ def on_http_error(request: Request, exc: HTTPException) -> Problem:
 
 def on_unexpected(request: Request, exc: Exception) -> Problem:
     """Answer a defect without showing its inside; the server writes the traceback to its log."""
-    return problem(request, HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log")
+    status, known = HTTPStatus.INTERNAL_SERVER_ERROR, {"x-request-id": REQUEST.get()}
+    return problem(request, status, "the service failed; see its log", headers=known)
 
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {

@@ -40,7 +40,7 @@ class Jobs:
     def __init__(self, path: Path, longest: int | None = None) -> None:
         self.path = path
         self.longest = longest
-        with self._transaction("BEGIN IMMEDIATE", mode="rwc") as connection:
+        with self.transaction("BEGIN IMMEDIATE", mode="rwc") as connection:
             self.new = schema.prepare(connection)
 
     def accept(
@@ -56,7 +56,7 @@ class Jobs:
         QueueFull
             If as many studies wait as may.
         """
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             with suppress(NotFound):
                 return self._read(connection, job_id), False
             (waiting,) = connection.execute(
@@ -88,12 +88,12 @@ class Jobs:
         NotFound
             If no study with this id was accepted.
         """
-        with self._transaction("BEGIN") as connection:
+        with self.transaction("BEGIN") as connection:
             return self._read(connection, job_id)
 
     def study(self, job_id: str) -> dict[str, Any]:
         """Return the study of a job as ``Study.to_dict`` gave it."""
-        with self._transaction("BEGIN") as connection:
+        with self.transaction("BEGIN") as connection:
             row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
             if row is None:
                 raise unknown(job_id)
@@ -102,7 +102,7 @@ class Jobs:
 
     def runs(self, job_id: str, limit: int = -1, offset: int = 0) -> list[str]:
         """Return the ids of a job's runs in the order of its cases, or one page of them."""
-        with self._transaction("BEGIN") as connection:
+        with self.transaction("BEGIN") as connection:
             rows = connection.execute(
                 "SELECT run FROM run WHERE job = ? AND position >= ? ORDER BY position LIMIT ?",
                 (job_id, offset, limit),
@@ -112,7 +112,7 @@ class Jobs:
     def page(self, *, limit: int, offset: int, state: State | None = None) -> tuple[list[Job], int]:
         """Return jobs, the latest first, and how many there are altogether."""
         where, values = ("WHERE state = ?", (state,)) if state else ("", ())
-        with self._transaction("BEGIN") as connection:
+        with self.transaction("BEGIN") as connection:
             (total,) = connection.execute(f"SELECT COUNT(*) FROM job {where}", values).fetchone()
             rows = connection.execute(
                 f"SELECT {COLUMNS} FROM job {where} ORDER BY turn DESC LIMIT ? OFFSET ?",
@@ -121,6 +121,12 @@ class Jobs:
             found = [job_of(row) for row in rows]
             return [job for job in found if job is not None], total
 
+    def states(self) -> dict[str, int]:
+        """Return the number of jobs by state; a state that no job has is missing."""
+        with self.transaction("BEGIN") as connection:
+            counted = connection.execute("SELECT state, COUNT(*) FROM job GROUP BY state")
+            return dict(counted.fetchall())
+
     def take(self, busy: Collection[str] = ()) -> Job | None:
         """Mark the job whose turn it is as running, and return it.
 
@@ -128,7 +134,7 @@ class Jobs:
         what it shares with others is computed once.
         """
         others = json.dumps(list(busy))
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             waiting = connection.execute(
                 "SELECT id FROM job WHERE state IN (?, ?)"
                 " AND id NOT IN (SELECT value FROM json_each(?))"
@@ -154,7 +160,7 @@ class Jobs:
 
     def waiting(self) -> dict[str, str]:
         """Return what the running jobs wait for, by id; nothing for those that go on."""
-        with self._transaction("BEGIN") as connection:
+        with self.transaction("BEGIN") as connection:
             rows = connection.execute(
                 "SELECT id, message FROM job WHERE state = ? AND message != ''", (State.RUNNING,)
             )
@@ -164,7 +170,7 @@ class Jobs:
         self, job_id: str, state: State, message: str, standing: State = State.RUNNING
     ) -> None:
         """Write the end of a job that stands where told; one dismissed meanwhile stays so."""
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET state = ?, message = ?, finished = ?,"
                 " progress = CASE ? WHEN 'successful' THEN 100 ELSE progress END"
@@ -174,7 +180,7 @@ class Jobs:
 
     def note(self, job_id: str, progress: float, message: str = "") -> None:
         """Write how far a running job is, and what it waits for, if it does."""
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
                 (message, progress, job_id, State.RUNNING),
@@ -182,7 +188,7 @@ class Jobs:
 
     def begun(self, job_id: str) -> None:
         """Write that a running job has begun: runs that fail now are not tried again."""
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET again = 0 WHERE id = ? AND state = ?", (job_id, State.RUNNING)
             )
@@ -199,7 +205,7 @@ class Jobs:
         Conflict
             If it has come to its end already.
         """
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             job = self._read(connection, job_id)
             if job.state in (State.SUCCESSFUL, State.FAILED):
                 raise Conflict(f"the study is {job.state} already: there is no work to stop")
@@ -222,7 +228,7 @@ class Jobs:
         Conflict
             If it is still waiting or running.
         """
-        with self._transaction() as connection:
+        with self.transaction() as connection:
             job = self._read(connection, job_id)
             if not job.state.final:
                 raise Conflict(f"the study is {job.state}: wait for its end or dismiss it first")
@@ -234,9 +240,10 @@ class Jobs:
             return self._read(connection, job_id)
 
     @contextmanager
-    def _transaction(
+    def transaction(
         self, begin: str = "BEGIN IMMEDIATE", mode: str = "rw"
     ) -> Iterator[sqlite3.Connection]:
+        """Give a connection whose changes come at once or never; nobody else writes meanwhile."""
         try:
             # A file that is gone is not made anew behind the back of those who wrote in it.
             address = f"{self.path.resolve().as_uri()}?mode={mode}"

@@ -19,6 +19,8 @@ from asyncio.subprocess import PIPE, Process
 from collections.abc import Mapping
 from typing import Any, TextIO
 
+from service import logs
+
 LONGEST_LINE = 1_000_000
 """Bytes of one message a process may send."""
 
@@ -81,7 +83,7 @@ def claim_stdout() -> Outlet:
 
 
 def read_order() -> dict[str, Any]:
-    """Return the order, the first line of the standard input."""
+    """Return the order, the first line of the standard input; from then on the log is ready."""
     text = b""
     while not text.endswith(b"\n"):
         piece = os.read(STDIN, 65536)
@@ -89,6 +91,7 @@ def read_order() -> dict[str, Any]:
             raise SystemExit("the service ended before it sent the order")
         text += piece
     order: dict[str, Any] = json.loads(text)
+    logs.configure(os.environ.get("RESIDUA_LOG_FORMAT", "plain"), study=order.get("id", ""))
     return order
 
 

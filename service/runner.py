@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from service import processes
-from service.errors import QueueLost
+from service.errors import NotFound, QueueLost
 from service.job import Job, State, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
@@ -82,6 +82,10 @@ class Runner:
         """Whether studies are being taken from the queue."""
         return self._task is not None and not self._task.done() and not self._stopping.is_set()
 
+    def computes(self, job_id: str) -> bool:
+        """Tell whether a process may still work on a study, although it was asked to stop."""
+        return job_id in self._studies
+
     @contextlib.asynccontextmanager
     async def working(self) -> AsyncIterator[None]:
         """Work while the context is open; at its end running studies stop, to resume later."""
@@ -127,11 +131,13 @@ class Runner:
     def _ended(self, job_id: str, task: asyncio.Task[None]) -> None:
         del self._studies[job_id]
         if not task.cancelled() and (error := task.exception()):
-            log.error("%s: to be taken again: %s", job_id, error, exc_info=error)
+            log.error("to be taken again", exc_info=error, extra={"study": job_id})
 
     async def _compute(self, job: Job) -> None:
         """Start a study until it ends; give up after too many starts in a row without a new run."""
         barren, progress, patient_since = 0, job.progress, time.monotonic()
+        if await self._unwanted(job):  # such as deleted, just before `computes` knew it
+            return
         while True:
             attempt = await self._attempt(job, progress)
             if await self._unwanted(job):
@@ -143,7 +149,7 @@ class Runner:
             job = replace(job, again=job.again and not attempt.begun)
             barren = 0 if attempt.runs or attempt.patient else barren + 1
             message = f"the study stopped: {attempt.reason}"
-            log.error("%s: %s", job.id, message)
+            log.error(message, extra={"study": job.id})
             if not attempt.patient:
                 patient_since = time.monotonic()
             waited = time.monotonic() - patient_since
@@ -179,12 +185,13 @@ class Runner:
         finally:
             await processes.end(child, self.settings.grace_seconds)
             await asyncio.wait({events})
-        if error := events.exception():
-            log.error("%s: its process sent what cannot be read", job.id, exc_info=error)
+        if fault := events.exception():
+            about = {"study": job.id}
+            log.error("its process sent what cannot be read", exc_info=fault, extra=about)
             return Attempt(
                 attempt.progress,
                 begun=attempt.begun,
-                reason=f"its process sent what cannot be read: {type(error).__name__}: {error}",
+                reason=f"its process sent what cannot be read: {type(fault).__name__}: {fault}",
             )
         return attempt
 
@@ -204,7 +211,10 @@ class Runner:
     async def _unwanted(self, job: Job) -> bool:
         if self._stopping.is_set():
             return True
-        return (await asyncio.to_thread(self.jobs.get, job.id)).state is not State.RUNNING
+        try:
+            return (await asyncio.to_thread(self.jobs.get, job.id)).state is not State.RUNNING
+        except NotFound:  # deleted
+            return True
 
     async def _pause(self, seconds: float) -> None:
         with contextlib.suppress(TimeoutError):

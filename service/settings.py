@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -55,6 +55,13 @@ class Settings(BaseSettings):
     lock_seconds: float = Field(
         default=20.0, ge=0, description="time to wait for another service to leave the directory"
     )
+    keep_days: float | None = Field(
+        default=None, gt=0, description="days after its end at which a study is deleted"
+    )
+    keep_bytes: int | None = Field(
+        default=None, ge=0, description="size of the data above which the oldest are deleted"
+    )
+    log_format: Literal["plain", "json"] = Field(default="plain", description="form of the log")
 
     def limits(self) -> dict[str, Any]:
         """Return the arguments of `studies.execution.limits.Limits`."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 
 from service import maps
-from service.dependencies import TheRun, TheStore
+from service.dependencies import TheKeeper, TheRun, TheStore
 from service.files import NETCDF, netcdf
 from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
@@ -37,6 +38,12 @@ def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
 def get_run(run: TheRun) -> Run:
     """Return the outcome and the figures of a run."""
     return Run(**run)
+
+
+@router.delete("/{run_id}", status_code=HTTPStatus.NO_CONTENT)
+def delete_run(run: TheRun, keeper: TheKeeper) -> None:
+    """Delete a run that no study waits for or computes; data sets that hold it stay."""
+    keeper.delete_run(run["id"])
 
 
 @router.get("/{run_id}/map.png", responses={200: {"content": {"image/png": {}}}})

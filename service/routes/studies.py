@@ -13,7 +13,15 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 
 from service import overview
-from service.dependencies import TheExaminer, TheJob, TheJobs, TheRunner, TheSettings, TheStore
+from service.dependencies import (
+    TheExaminer,
+    TheJob,
+    TheJobs,
+    TheKeeper,
+    TheRunner,
+    TheSettings,
+    TheStore,
+)
 from service.errors import NotFound
 from service.files import NETCDF, netcdf
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
@@ -80,10 +88,20 @@ def get_study(
     return overview.detail(job, jobs, store, window)
 
 
-@router.delete("/{study_id}")
-def dismiss(study_id: ContentId, jobs: TheJobs) -> StudySummary:
-    """Stop the work on a study; the runs it has finished are kept."""
-    return overview.summary(jobs.dismiss(study_id))
+@router.delete(
+    "/{study_id}", response_model=StudySummary, responses={204: {"description": "Purged"}}
+)
+def dismiss(
+    study_id: ContentId, jobs: TheJobs, keeper: TheKeeper, purge: bool = False
+) -> StudySummary | Response:
+    """Stop the work on a study; the runs it has finished are kept.
+
+    With `purge`, delete a study that has ended, its data set, and its runs that no other needs.
+    """
+    if not purge:
+        return overview.summary(jobs.dismiss(study_id))
+    keeper.purge(study_id)
+    return Response(status_code=HTTPStatus.NO_CONTENT)
 
 
 @router.post("/{study_id}/retry", status_code=HTTPStatus.ACCEPTED)
@@ -99,7 +117,10 @@ async def events(
     """Send where a study stands at every change, until its end."""
     shown = None
     while runner.alive:
-        now = overview.summary(await asyncio.to_thread(jobs.get, job.id))
+        try:
+            now = overview.summary(await asyncio.to_thread(jobs.get, job.id))
+        except NotFound:  # deleted
+            return
         if now != shown:
             yield ServerSentEvent(event="study", data=now.model_dump(mode="json"))
             shown = now

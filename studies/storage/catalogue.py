@@ -87,14 +87,15 @@ class Catalogue:
             found = _select(connection, "WHERE id IN (SELECT value FROM json_each(?))", [wanted])
         return {row["id"]: row for row in found}
 
-    def counts(self, run_ids: Iterable[str]) -> dict[str, int]:
-        """Return how many of `run_ids` are known, by status."""
-        wanted = json.dumps(list(run_ids))
+    def counts(self, run_ids: Iterable[str] | None = None) -> dict[str, int]:
+        """Return how many runs, or how many of `run_ids`, are known, by status."""
+        where, values = "", []
+        if run_ids is not None:
+            where, values = "WHERE id IN (SELECT value FROM json_each(?))", [list(run_ids)]
         with self._reading() as connection:
             found = connection.execute(
-                "SELECT status, count(*) FROM runs"
-                " WHERE id IN (SELECT value FROM json_each(?)) GROUP BY status",
-                [wanted],
+                f"SELECT status, count(*) FROM runs {where} GROUP BY status",
+                [json.dumps(each) for each in values],
             )
             return dict(found.fetchall())
 

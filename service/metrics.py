@@ -1,0 +1,74 @@
+"""Figures for Prometheus."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from http import HTTPMethod
+from typing import Any
+
+from prometheus_client import CollectorRegistry, Histogram, ProcessCollector, generate_latest
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from service.errors import QueueLost
+from service.job import State
+from service.jobs import Jobs
+from service.runner import Runner
+from service.search import OUTCOMES
+from studies import Store
+
+METHODS = frozenset(HTTPMethod)
+OTHER = "other"
+"""Label of every method and path that no route has: clients cannot make labels without end."""
+
+
+class Metrics(Collector):
+    """The figures of one service, read from its queue and its catalogue when they are asked for."""
+
+    def __init__(self, jobs: Jobs, store: Store, runner: Runner) -> None:
+        self.jobs = jobs
+        self.store = store
+        self.runner = runner
+        self.registry = CollectorRegistry()
+        self.seconds = Histogram(
+            "residua_request_seconds",
+            "Time from a request to the end of its answer",
+            ("method", "route", "status"),
+            registry=self.registry,
+        )
+        ProcessCollector(registry=self.registry)
+        self.registry.register(self)
+
+    def observe(self, scope: Mapping[str, Any], status: int, seconds: float) -> None:
+        """Count a request that has been answered."""
+        method = scope["method"] if scope["method"] in METHODS else OTHER
+        route = getattr(scope.get("route"), "path", OTHER)
+        self.seconds.labels(method, route, status).observe(seconds)
+
+    def text(self) -> bytes:
+        """Return all figures in Prometheus' text format."""
+        return generate_latest(self.registry)
+
+    def collect(self) -> Iterable[Metric]:
+        """Yield the figures that others keep; those that cannot be read are left out."""
+        with suppress(QueueLost, sqlite3.Error, OSError):
+            yield gauge("residua_studies", "Studies in the queue", State, self.jobs.states())
+        with suppress(QueueLost, sqlite3.Error, OSError):
+            counts = self.store.catalogue.counts()
+            yield gauge("residua_runs", "Runs in the catalogue", OUTCOMES, counts)
+        with suppress(OSError):
+            free = shutil.disk_usage(self.store.directory).free
+            yield GaugeMetricFamily("residua_data_free_bytes", "Room for data", float(free))
+        alive = float(self.runner.alive)
+        yield GaugeMetricFamily("residua_runner_up", "Whether studies are being taken", alive)
+
+
+def gauge(name: str, meaning: str, kinds: Iterable[str], counts: Mapping[str, int]) -> Metric:
+    """Return a figure for each status; those that nothing has are 0."""
+    family = GaugeMetricFamily(name, meaning, labels=("status",))
+    for kind in kinds:
+        family.add_metric([kind], counts.get(kind, 0))
+    return family

@@ -1,0 +1,181 @@
+"""What is deleted: runs, studies, and studies beyond the age or the size the operator keeps.
+
+A check and what it allows are one transaction of the queue: no study that needs the files is
+accepted or begun between them. A study is ``dismissed`` before it loses a file, and its row goes
+last. After a crash in the middle the row says what is true: a study without a result. To delete it
+again, or to retry it, ends what was begun.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import shutil
+import sqlite3
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from service.errors import Conflict, NotFound
+from service.jobs import Jobs
+from studies import Store, Study
+
+log = logging.getLogger(__name__)
+
+INTERVAL = 300.0
+"""Seconds between two looks at what has become too old or too large."""
+
+DELETED = "deleted in part: delete it again to end that, or retry it"
+"""Message of a study that is being deleted; true also when a crash left it so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Keeper:
+    """Deletes what nobody needs.
+
+    Attributes
+    ----------
+    jobs, store : what there is
+    computes : whether a process may still work on the study of this id
+    days, size : age [days] and bytes beyond which studies that have ended are deleted, the oldest
+        first; None for no limit
+    """
+
+    jobs: Jobs
+    store: Store
+    computes: Callable[[str], bool]
+    days: float | None = None
+    size: int | None = None
+
+    def delete_run(self, run_id: str) -> None:
+        """Delete a run; a study that waits or runs and needs it is a `Conflict`."""
+        with self.jobs.transaction() as queue:
+            users = queue.execute(
+                "SELECT id, state FROM job WHERE id IN (SELECT job FROM run WHERE run = ?)",
+                (run_id,),
+            )
+            for user in users:
+                if user["state"] in ("accepted", "running") or self.computes(user["id"]):
+                    needed = f"the study {user['id']} needs this run"
+                    raise Conflict(f"{needed}: dismiss it first, or wait for its end")
+            self.store.discard([run_id])
+
+    def purge(self, study_id: str) -> int:
+        """Delete a study, its data set and its runs that no other study needs.
+
+        Returns
+        -------
+        Bytes that are free now.
+
+        Raises
+        ------
+        NotFound
+            If the study is unknown.
+        Conflict
+            If it waits or runs, or its process has not ended yet.
+        """
+        with self._ended(study_id) as queue:
+            queue.execute(
+                "UPDATE job SET state = 'dismissed', message = ? WHERE id = ?", (DELETED, study_id)
+            )
+        elsewhere = self._needed_elsewhere()
+        directory = self.store.study_directory(study_id)
+        with self._ended(study_id) as queue:
+            own = queue.execute(
+                "SELECT run FROM run AS mine WHERE job = ? AND NOT EXISTS"
+                " (SELECT 1 FROM run WHERE run = mine.run AND job <> mine.job)",
+                (study_id,),
+            )
+            unneeded = {row["run"] for row in own} - elsewhere
+            freed = size(directory) + sum(size(self.store.run_path(run)) for run in unneeded)
+            self.store.discard(unneeded)
+            with suppress(FileNotFoundError):
+                shutil.rmtree(directory)
+            queue.execute("DELETE FROM run WHERE job = ?", (study_id,))
+            queue.execute("DELETE FROM job WHERE id = ?", (study_id,))
+        return freed
+
+    def sweep(self) -> None:
+        """Purge the studies of the queue that are too old, and the oldest while all is too large.
+
+        What only the command line has computed stays.
+        """
+        if self.days is None and self.size is None:
+            return
+        with self.jobs.transaction("BEGIN") as queue:
+            ended = queue.execute(
+                "SELECT id, finished FROM job WHERE state NOT IN ('accepted', 'running')"
+                " AND finished IS NOT NULL ORDER BY finished, turn"
+            ).fetchall()
+        oldest = datetime.now(UTC) - timedelta(days=self.days) if self.days else None
+        excess = size(self.store.directory) - self.size if self.size is not None else 0
+        for job in ended:
+            old = oldest is not None and datetime.fromisoformat(job["finished"]) < oldest
+            if not (old or excess > 0):
+                return
+            with suppress(Conflict, NotFound):
+                excess -= self.purge(job["id"])
+                reason = f"older than {self.days} days" if old else f"above {self.size} bytes"
+                log.info("deleted a study: %s", reason, extra={"study": job["id"]})
+
+    @asynccontextmanager
+    async def working(self) -> AsyncIterator[None]:
+        """Sweep now and then, in a thread, while the context is open."""
+        stop = asyncio.Event()
+
+        async def work() -> None:
+            while not stop.is_set():
+                try:
+                    await asyncio.to_thread(self.sweep)
+                except Exception:
+                    log.exception("what is too old or too large could not be deleted")
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(stop.wait(), INTERVAL)
+
+        task = asyncio.create_task(work())
+        try:
+            yield
+        finally:
+            stop.set()
+            await task
+
+    @contextmanager
+    def _ended(self, study_id: str) -> Iterator[sqlite3.Connection]:
+        """Give a transaction in which a study has ended, and cannot begin again."""
+        with self.jobs.transaction() as queue:
+            row = queue.execute("SELECT state FROM job WHERE id = ?", (study_id,)).fetchone()
+            if row is None:
+                raise NotFound(f"no study has the id {study_id}")
+            if row["state"] in ("accepted", "running"):
+                raise Conflict(f"the study is {row['state']}: dismiss it first, then delete it")
+            if self.computes(study_id):
+                raise Conflict("the work on the study is being stopped: delete it a little later")
+            yield queue
+
+    def _needed_elsewhere(self) -> set[str]:
+        """Return the runs of studies that the queue does not know: those of the command line.
+
+        One that cannot be read, or has another id today, cannot be computed again: it needs no run.
+        """
+        with self.jobs.transaction("BEGIN") as queue:
+            known = {row["id"] for row in queue.execute("SELECT id FROM job")}
+        needed: set[str] = set()
+        for path in (self.store.directory / "studies").glob("*/study.json"):
+            with suppress(ValueError, OSError):
+                if path.parent.name not in known:
+                    study = Study.from_dict(json.loads(path.read_text(encoding="utf-8")))
+                    if study.id == path.parent.name:
+                        needed.update(case.id for case in study.cases())
+        return needed
+
+
+def size(path: Path) -> int:
+    """Return the bytes of a file, or of all files below a directory; 0 when there is none."""
+    total = 0
+    for each in (path, *path.rglob("*")):
+        with suppress(FileNotFoundError):
+            total += each.stat().st_size if each.is_file() else 0
+    return total

@@ -1,0 +1,17 @@
+"""Figures for those who watch the service."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+from fastapi.responses import PlainTextResponse
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from service.dependencies import TheMetrics
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/metrics", response_class=PlainTextResponse)
+def metrics(figures: TheMetrics) -> Response:
+    """Return figures in the text format of Prometheus."""
+    return Response(figures.text(), media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,233 @@
+"""What is deleted, what others need, and what a crash in the middle leaves behind."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.errors import Conflict, NotFound
+from service.job import State
+from service.jobs import Jobs
+from service.retention import Keeper
+from service.settings import Settings
+from solver.scenes import SCENES
+from studies import Store, Study
+from studies.storage.dataset import broken_dataset
+
+
+class PowerCut(BaseException):
+    """The process ends here."""
+
+
+class Place:
+    """A data directory with a queue whose studies have been computed."""
+
+    def __init__(self, directory: Path) -> None:
+        self.store = Store(directory)
+        self.jobs = Jobs(directory / "jobs.sqlite")
+        self.stopping: set[str] = set()
+
+    def keeper(self, days: float | None = None, size: int | None = None) -> Keeper:
+        return Keeper(self.jobs, self.store, self.stopping.__contains__, days, size)
+
+    def computed(self, name: str, frictions: Sequence[float], known: bool = True) -> Study:
+        """Return a study that has been computed, by the queue or by the command line."""
+        content = {"name": name, "scene": "punch", "sweep": {"friction": list(frictions)}}
+        study = Study.from_dict(content)
+        for case in study.cases():
+            run = broken_dataset(SCENES["punch"], case, "reason")
+            self.store.catalogue.put([self.store.write_run(run)])
+        (self.store.save_study(study) / "dataset.nc").write_bytes(b"the runs combined")
+        if known:
+            self.jobs.accept(study.id, study.to_dict(), ids(study))
+            taken = self.jobs.take()
+            assert taken is not None and taken.id == study.id
+            self.jobs.finish(study.id, State.SUCCESSFUL, "")
+        return study
+
+    def runs(self) -> set[str]:
+        """Return the runs that are there, in the catalogue and as files."""
+        files = {path.stem for path in (self.store.directory / "runs").iterdir()}
+        assert files == self.store.catalogue.ids()
+        return files
+
+    def there(self, study: Study) -> bool:
+        """Whether a study or a part of it is still there."""
+        with self.jobs.transaction("BEGIN") as queue:
+            rows = queue.execute("SELECT 1 FROM run WHERE job = ?", (study.id,)).fetchall()
+        known = study.id in {job.id for job in self.jobs.page(limit=100, offset=0)[0]}
+        return known or bool(rows) or self.store.study_directory(study.id).exists()
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    """A data directory without studies."""
+    return Place(tmp_path)
+
+
+def ids(study: Study) -> list[str]:
+    """Return the ids of a study's runs in the order of its cases."""
+    return [case.id for case in study.cases()]
+
+
+def test_a_purged_study_takes_only_the_runs_no_other_study_needs(place: Place) -> None:
+    shared = place.computed("shared", [0.1, 0.2, 0.3, 0.4])
+    other = place.computed("other", [0.2])
+    by_hand = place.computed("by-hand", [0.3], known=False)
+    unreadable = place.store.directory / "studies" / "unreadable" / "study.json"
+    unreadable.parent.mkdir()
+    unreadable.write_text("[]")
+    freed = place.keeper().purge(shared.id)
+    assert freed > 0 and not place.there(shared)
+    assert place.runs() == {*ids(other), *ids(by_hand)}
+    assert place.store.dataset_path(other.id).is_file()
+    assert place.store.dataset_path(by_hand.id).is_file()
+    with pytest.raises(NotFound):
+        place.keeper().purge(shared.id)
+
+
+@pytest.mark.parametrize("end", ["accepted", "running", "stopping"])
+def test_what_is_at_work_is_not_deleted(place: Place, end: str) -> None:
+    study = place.computed("busy", [0.1])
+    place.jobs.retry(study.id)
+    if end != "accepted":
+        place.jobs.take()
+    if end == "stopping":
+        place.jobs.dismiss(study.id)
+        place.stopping.add(study.id)
+    with pytest.raises(Conflict):
+        place.keeper().purge(study.id)
+    with pytest.raises(Conflict, match=study.id):
+        place.keeper().delete_run(ids(study)[0])
+    place.keeper(days=1e-9, size=0).sweep()
+    assert place.runs() == {*ids(study)}
+    assert place.store.dataset_path(study.id).is_file()
+
+
+def test_a_study_whose_run_was_deleted_keeps_its_data_set(place: Place) -> None:
+    study = place.computed("kept", [0.1, 0.2])
+    first, second = ids(study)
+    place.keeper().delete_run(first)
+    assert place.runs() == {second}
+    assert place.store.dataset_path(study.id).is_file()
+    assert place.jobs.get(study.id).state is State.SUCCESSFUL
+
+
+@pytest.mark.parametrize("point", ["before the runs", "after the runs", "after the directory"])
+def test_a_crash_in_the_middle_leaves_a_study_that_can_be_deleted_again(
+    place: Place, monkeypatch: pytest.MonkeyPatch, point: str
+) -> None:
+    study = place.computed("half", [0.1, 0.2, 0.3])
+    owner, name = (
+        ("service.retention.shutil", "rmtree")
+        if point == "after the directory"
+        else ("studies.Store", "discard")
+    )
+    with monkeypatch.context() as patch:
+        act: Callable[..., object] = getattr(shutil if "shutil" in owner else Store, name)
+
+        def interrupted(*arguments: Any) -> None:
+            if not point.startswith("before"):
+                act(*arguments)
+            raise PowerCut
+
+        patch.setattr(f"{owner}.{name}", interrupted)
+        with pytest.raises(PowerCut):
+            place.keeper().purge(study.id)
+    job = place.jobs.get(study.id)
+    assert job.state is State.DISMISSED and "delete it again" in job.message
+    assert (len(place.runs()) == 0) is point.startswith("after")
+    place.keeper().purge(study.id)
+    assert not place.there(study) and not place.runs()
+
+
+def test_a_study_retried_in_the_middle_of_its_deletion_stays(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = place.computed("wanted", [0.1, 0.2])
+    monkeypatch.setattr(
+        Keeper, "_needed_elsewhere", lambda *_: place.jobs.retry(study.id) and set()
+    )
+    with pytest.raises(Conflict, match="accepted"):
+        place.keeper().purge(study.id)
+    assert place.jobs.get(study.id).state is State.ACCEPTED
+    assert place.runs() == {*ids(study)}
+
+
+def aged(place: Place, study: Study, days: int) -> None:
+    """Make a study older than it is."""
+    with place.jobs.transaction() as queue:
+        queue.execute(
+            "UPDATE job SET finished = strftime('%Y-%m-%dT%H:%M:%S+00:00', 'now', ?) WHERE id = ?",
+            (f"-{days} days", study.id),
+        )
+
+
+def test_studies_beyond_the_age_are_deleted(place: Place) -> None:
+    old, young = place.computed("old", [0.1]), place.computed("young", [0.2])
+    by_hand = place.computed("by-hand", [0.3], known=False)
+    aged(place, old, 8)
+    aged(place, young, 6)
+    place.keeper(days=7).sweep()
+    assert not place.there(old)
+    assert place.runs() == {*ids(young), *ids(by_hand)}
+
+
+def test_the_oldest_go_until_the_data_fit(place: Place) -> None:
+    found = [place.computed(f"study-{i}", [i / 10]) for i in range(3)]
+    for study, days in zip(found, (1, 3, 2), strict=True):
+        aged(place, study, days)
+    everything = sum(p.stat().st_size for p in place.store.directory.rglob("*") if p.is_file())
+    place.keeper(size=everything).sweep()
+    assert all(place.there(study) for study in found)
+    place.keeper(size=everything - 1).sweep()
+    assert [place.there(study) for study in found] == [True, False, True]
+
+
+def test_a_sweep_that_fails_is_told_and_tried_again(
+    place: Place, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("service.retention.INTERVAL", 0.01)
+    place.computed("old", [0.1])
+    outcomes = iter([OSError("no"), None])
+
+    def moody(directory: Path) -> None:
+        if error := next(outcomes):
+            raise error
+
+    monkeypatch.setattr("service.retention.shutil.rmtree", moody)
+
+    async def work() -> None:
+        async with asyncio.timeout(30.0), place.keeper(size=0).working():
+            while place.jobs.page(limit=1, offset=0)[1]:
+                await asyncio.sleep(0.01)
+
+    asyncio.run(work())
+    assert "could not be deleted" in caplog.text
+    assert not place.runs()
+
+
+def test_deletion_over_http(place: Place) -> None:
+    study = place.computed("remote", [0.1, 0.2])
+    app = create_app(Settings(data=place.store.directory))
+    client = TestClient(app)  # without its context: the runner does not work
+    run, url = f"/runs/{ids(study)[0]}", f"/studies/{study.id}"
+    client.post(f"{url}/retry")
+    assert client.delete(run).status_code == 409
+    refused = client.delete(url, params={"purge": True})
+    assert refused.status_code == 409 and "dismiss it first" in refused.json()["detail"]
+    assert client.delete(url).status_code == 200
+    assert (client.delete(run).status_code, client.get(run).status_code) == (204, 404)
+    assert client.delete(run).status_code == 404
+    assert client.get(url).json()["counts"] == {"pending": 1, "error": 1}
+    answers = [client.delete(url, params={"purge": True}) for _ in range(2)]
+    assert [answer.status_code for answer in answers] == [204, 404]
+    assert answers[0].content == b"" and client.get(url).status_code == 404
+    assert not place.runs() and not place.there(study)
