@@ -9,7 +9,7 @@ from contextlib import suppress
 from http import HTTPMethod
 from typing import Any
 
-from prometheus_client import CollectorRegistry, Histogram, ProcessCollector, generate_latest
+from prometheus_client import CollectorRegistry, Histogram, ProcessCollector
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
@@ -20,7 +20,6 @@ from service.runner import Runner
 from service.search import OUTCOMES
 from studies import Store
 
-METHODS = frozenset(HTTPMethod)
 OTHER = "other"
 """Label of every method and path that no route has: clients cannot make labels without end."""
 
@@ -44,31 +43,29 @@ class Metrics(Collector):
 
     def observe(self, scope: Mapping[str, Any], status: int, seconds: float) -> None:
         """Count a request that has been answered."""
-        method = scope["method"] if scope["method"] in METHODS else OTHER
+        method = scope["method"] if scope["method"] in HTTPMethod.__members__ else OTHER
         route = getattr(scope.get("route"), "path", OTHER)
         self.seconds.labels(method, route, status).observe(seconds)
 
-    def text(self) -> bytes:
-        """Return all figures in Prometheus' text format."""
-        return generate_latest(self.registry)
-
     def collect(self) -> Iterable[Metric]:
         """Yield the figures that others keep; those that cannot be read are left out."""
-        with suppress(QueueLost, sqlite3.Error, OSError):
-            yield gauge("residua_studies", "Studies in the queue", State, self.jobs.states())
-        with suppress(QueueLost, sqlite3.Error, OSError):
-            counts = self.store.catalogue.counts()
-            yield gauge("residua_runs", "Runs in the catalogue", OUTCOMES, counts)
+        for name, meaning, kinds, count in (
+            ("residua_studies", "Studies by status", State, self.jobs.states),
+            (
+                "residua_runs",
+                "Runs by status",
+                OUTCOMES,
+                self.store.catalogue.counts,
+            ),
+        ):
+            family = GaugeMetricFamily(name, meaning, labels=("status",))
+            with suppress(QueueLost, sqlite3.Error, OSError):
+                counts = count()
+                for kind in kinds:
+                    family.add_metric([kind], counts.get(kind, 0))
+                yield family
         with suppress(OSError):
             free = shutil.disk_usage(self.store.directory).free
             yield GaugeMetricFamily("residua_data_free_bytes", "Room for data", float(free))
         alive = float(self.runner.alive)
         yield GaugeMetricFamily("residua_runner_up", "Whether studies are being taken", alive)
-
-
-def gauge(name: str, meaning: str, kinds: Iterable[str], counts: Mapping[str, int]) -> Metric:
-    """Return a figure for each status; those that nothing has are 0."""
-    family = GaugeMetricFamily(name, meaning, labels=("status",))
-    for kind in kinds:
-        family.add_metric([kind], counts.get(kind, 0))
-    return family

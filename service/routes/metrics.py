@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 from fastapi.responses import PlainTextResponse
-from prometheus_client import CONTENT_TYPE_LATEST
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from service.dependencies import TheMetrics
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["metrics"])
 
 
 @router.get("/metrics", response_class=PlainTextResponse)
 def metrics(figures: TheMetrics) -> Response:
     """Return figures in the text format of Prometheus."""
-    return Response(figures.text(), media_type=CONTENT_TYPE_LATEST)
+    return Response(generate_latest(figures.registry), media_type=CONTENT_TYPE_LATEST)

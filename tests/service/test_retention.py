@@ -15,11 +15,13 @@ from service.app import create_app
 from service.errors import Conflict, NotFound
 from service.job import State
 from service.jobs import Jobs
+from service.pool import Pool
 from service.retention import Keeper
 from service.settings import Settings
 from solver.scenes import SCENES
 from studies import Store, Study
 from studies.storage.dataset import broken_dataset
+from tests.service.test_runner import Scripted
 
 
 class PowerCut(BaseException):
@@ -159,6 +161,19 @@ def test_a_study_retried_in_the_middle_of_its_deletion_stays(
         place.keeper().purge(study.id)
     assert place.jobs.get(study.id).state is State.ACCEPTED
     assert place.runs() == {*ids(study)}
+
+
+def test_a_study_deleted_as_its_turn_comes_is_not_begun(place: Place) -> None:
+    study = place.computed("gone", [0.1])
+    place.jobs.retry(study.id)
+    job = place.jobs.take()
+    assert job is not None
+    place.jobs.dismiss(study.id)
+    place.keeper().purge(study.id)
+    settings = Settings(data=place.store.directory)
+    runner = Scripted(settings, place.jobs, Pool(settings, 0), 0, lambda: place.jobs, script=[[]])
+    asyncio.run(runner._compute(job))
+    assert not runner.orders and not place.there(study)
 
 
 def aged(place: Place, study: Study, days: int) -> None:
