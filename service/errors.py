@@ -158,7 +158,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
     status = status_of(exc)
-    later = {"retry-after": "10"} if status.is_server_error else None
+    later = {"retry-after": "10"} if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
     return problem(request, status, str(exc), headers=later)
 
 
