@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -31,6 +31,8 @@ _LOOK = 1.0
 """Seconds between two looks at what the workers do."""
 _QUIET = 10.0
 """Seconds without a worker that takes the work until this is told."""
+_BEGIN = 60.0
+"""Seconds that a worker may take to load what it needs for its first task."""
 _GRACE = 5.0
 """Seconds that running tasks are given to stop; a frozen worker never does."""
 _SPARE = 2
@@ -171,7 +173,8 @@ class _HandedOut:
         self._room = _SPARE
         self._reason = ""
         self._unfit: set[str] = set()
-        self._taken = time.monotonic()
+        self._known: dict[str, float] = {}
+        self._worked = self._quiet = time.monotonic()
         self._replacing: list[threading.Thread] = []
 
     def carry_out(
@@ -256,13 +259,11 @@ class _HandedOut:
 
     def _refused(self, worker: str, reason: str) -> Iterator[Waiting]:
         """Tell that a worker refused, once for each, and once when nothing goes on."""
-        if worker not in self._unfit or not (self._reason or self._computing()):
+        idle = not any(ticket.computing for ticket in self._tickets.values())
+        if worker not in self._unfit or (idle and not self._reason):
             self._unfit.add(worker)
             self._reason = reason
             yield Waiting(reason)
-
-    def _computing(self) -> bool:
-        return any(ticket.computing for ticket in self._tickets.values())
 
     def _look(self) -> Iterator[Waiting | Finished]:
         """See which workers there are and what they do, and act on what has lasted too long."""
@@ -280,15 +281,33 @@ class _HandedOut:
                 _drop(ticket)
                 self._replace(ticket.worker)
                 yield Finished(ticket.task, RuntimeError(passed))
-        others = {key for keys in (at_workers or {}).values() for key in keys} - set(self._tickets)
-        if others or not self._tickets or self._computing():
-            self._taken = time.monotonic()
-        lasted = time.monotonic() - self._taken
+        now = time.monotonic()
+        if self._taken(at_workers or {}, now):
+            self._quiet = now
+        lasted = now - self._quiet
         if lasted > _QUIET and not self._reason:
             self._reason = reason
             yield Waiting(reason)
         if self._limits.patience is not None and lasted > self._limits.patience:
             raise GridLost(f"{self._reason or reason} (waited {lasted:.0f} s)")
+
+    def _taken(self, at_workers: Mapping[str, Iterable[str]], now: float) -> bool:
+        """Tell whether a worker computes, for us or for others, or is about to begin."""
+        self._known = {worker: self._known.get(worker, now) for worker in at_workers}
+        queued = {key for key, ticket in self._tickets.items() if not ticket.worker}
+        others = any(key not in self._tickets for keys in at_workers.values() for key in keys)
+        if others or not self._tickets or any(t.computing for t in self._tickets.values()):
+            self._worked = now
+            return True
+        # A worker that has just come may be killed again; one that stays is loading the program.
+        return (
+            now - self._worked < _BEGIN
+            and not self._unfit
+            and any(
+                now - self._known[worker] > _QUIET / 2 and not queued.isdisjoint(keys)
+                for worker, keys in at_workers.items()
+            )
+        )
 
     def _processing(self) -> dict[str, Any] | None:
         """Return the keys at each worker; nothing when the scheduler does not answer."""
