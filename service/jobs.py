@@ -41,7 +41,7 @@ class Jobs:
         self.path = path
         self.longest = longest
         with self.transaction("BEGIN IMMEDIATE", mode="rwc") as connection:
-            self.new = schema.prepare(connection)
+            schema.prepare(connection)
 
     def accept(
         self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
@@ -157,6 +157,14 @@ class Jobs:
                         (State.FAILED, UNREADABLE, row["id"]),
                     )
             return None
+
+    def resume(self, busy: Collection[str]) -> None:
+        """Mark the jobs that are being computed as running, in a queue made anew."""
+        with self.transaction() as connection:
+            connection.executemany(
+                "UPDATE job SET state = ?, started = ? WHERE id = ? AND state = ?",
+                [(State.RUNNING, now(), job_id, State.ACCEPTED) for job_id in busy],
+            )
 
     def waiting(self) -> dict[str, str]:
         """Return what the running jobs wait for, by id; nothing for those that go on."""

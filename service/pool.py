@@ -9,8 +9,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 from asyncio.subprocess import Process
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from service import processes
@@ -87,9 +88,8 @@ class Pool:
 
 def main() -> None:
     """Hold the store, and the workers if they are to be our own, until the service says stop."""
-    from studies.execution.cluster import own_workers
-
     from studies import Store
+    from studies.execution.cluster import own_workers
 
     outlet = processes.claim_stdout()
     order = processes.read_order()
@@ -99,8 +99,8 @@ def main() -> None:
             held.enter_context(Store(order["data"]).writing())
             access = order["access"]
             if access is None:
-                own = own_workers(order["workers"], order["memory"])
-                access = asdict(held.enter_context(own))
+                own = own_workers(order["workers"] or os.cpu_count() or 1, order["memory"])
+                access = held.enter_context(own).to_dict()
             outlet.send("access", access)
             stop.wait()
     except (StoreBusy, StoreFull, StudyError, RuntimeError) as error:

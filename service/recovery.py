@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import shutil
 from collections import Counter
 from contextlib import suppress
 from pathlib import Path
@@ -24,17 +25,22 @@ def open_queue(path: Path, store: Store, longest: int | None) -> Jobs:
     tells; one without is accepted, and computed.
     """
     try:
-        jobs = Jobs(path, longest)
+        if path.exists():
+            return Jobs(path, longest)
     except QueueLost as error:
         damaged = path.with_name(f"{path.name}.damaged")
         log.error("%s: kept as %s, and made anew from the studies", error, damaged.name)
         path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
+        if damaged.is_dir():
+            shutil.rmtree(damaged)
         path.replace(damaged)
-        jobs = Jobs(path, longest)
-    if jobs.new:
-        for file in sorted(store.directory.glob("studies/*/study.json")):
-            _find(file, jobs, store)
-    return jobs
+    part = path.with_name(f"{path.name}.part")
+    part.unlink(missing_ok=True)
+    jobs = Jobs(part)
+    for file in sorted(store.directory.glob("studies/*/study.json")):
+        _find(file, jobs, store)
+    part.replace(path)  # at once: until then the queue is lost, not empty
+    return Jobs(path, longest)
 
 
 def _find(file: Path, jobs: Jobs, store: Store) -> None:

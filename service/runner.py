@@ -12,6 +12,7 @@ from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 from service import processes
 from service.errors import NotFound, QueueLost
@@ -19,6 +20,7 @@ from service.job import Job, State, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
 from service.settings import Settings
+from studies.errors import StoreFull
 
 log = logging.getLogger(__name__)
 
@@ -109,6 +111,7 @@ class Runner:
             except QueueLost as error:
                 log.error("%s", error)
                 await asyncio.to_thread(self.restore)
+                await asyncio.to_thread(self.jobs.resume, list(self._studies))
             except Exception:
                 log.exception("the queue could not be read or written; trying again")
                 pause *= 10
@@ -157,7 +160,7 @@ class Runner:
             if attempt.hopeless or impatient or barren == self.settings.attempts:
                 await asyncio.to_thread(self.jobs.finish, job.id, State.FAILED, message)
                 return
-            await asyncio.to_thread(self.jobs.note, job.id, progress, message)
+            await self._write(self.jobs.note, job.id, progress, message)
             await self._pause(self.settings.poll_seconds * (10 if attempt.patient else 2**barren))
 
     async def _attempt(self, job: Job, progress: float) -> Attempt:
@@ -176,22 +179,22 @@ class Runner:
                 await asyncio.wait({events}, timeout=self.settings.poll_seconds)
                 if again and attempt.begun:
                     again = False
-                    await asyncio.to_thread(self.jobs.begun, job.id)
+                    await self._write(self.jobs.begun, job.id)
                 if not attempt.heard and time.monotonic() > started + SILENCE_SECONDS:
                     attempt.waiting = SILENT
                 if told != (now := (attempt.progress, attempt.waiting)):
                     told = now
-                    await asyncio.to_thread(self.jobs.note, job.id, *told)
+                    await self._write(self.jobs.note, job.id, *told)
         finally:
             await processes.end(child, self.settings.grace_seconds)
             await asyncio.wait({events})
-        if fault := events.exception():
+        if unread := events.exception():
             about = {"study": job.id}
-            log.error("its process sent what cannot be read", exc_info=fault, extra=about)
+            log.error("its process sent what cannot be read", exc_info=unread, extra=about)
             return Attempt(
                 attempt.progress,
                 begun=attempt.begun,
-                reason=f"its process sent what cannot be read: {type(fault).__name__}: {fault}",
+                reason=f"its process sent what cannot be read: {type(unread).__name__}: {unread}",
             )
         return attempt
 
@@ -213,8 +216,17 @@ class Runner:
             return True
         try:
             return (await asyncio.to_thread(self.jobs.get, job.id)).state is not State.RUNNING
-        except NotFound:  # deleted
+        except QueueLost:  # the work goes on, and is found again in the queue made anew
+            return False
+        except NotFound:
             return True
+
+    async def _write(self, write: Callable[..., None], *what: Any) -> None:
+        """Write how a study goes; the work does not end because that cannot be written now."""
+        try:
+            await asyncio.to_thread(write, *what)
+        except (QueueLost, StoreFull, OSError) as error:
+            log.error("%s", error)
 
     async def _pause(self, seconds: float) -> None:
         with contextlib.suppress(TimeoutError):

@@ -47,8 +47,8 @@ FIRST_FORM = (
 """Copies the rows of the first form, in which a row held all its runs as one text."""
 
 
-def prepare(connection: sqlite3.Connection) -> bool:
-    """Make the tables, or bring them into today's form; return whether the queue is new.
+def prepare(connection: sqlite3.Connection) -> None:
+    """Make the tables, or bring them into today's form.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def prepare(connection: sqlite3.Connection) -> bool:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     known = {row[0] for row in connection.execute("SELECT name FROM sqlite_master")}
     if version == VERSION and {"job", "run"} <= known:
-        return False
+        return
     if version > VERSION:
         allowed = f"must be of form {VERSION}: a later version of the service has made it"
         raise StudyError("jobs.sqlite", f"form {version}", allowed)
@@ -68,4 +68,3 @@ def prepare(connection: sqlite3.Connection) -> bool:
         connection.execute("ALTER TABLE job RENAME TO first")
     for statement in TABLES + (FIRST_FORM if "job" in known else ()):
         connection.execute(statement)
-    return "job" not in known

@@ -11,6 +11,7 @@ from typing import Any
 from studies.command import commands
 from studies.command.commands import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import GridLost, StoreBusy, StudyError
+from studies.execution.limits import Limits
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,6 +63,18 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
     one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one a core)")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
+        one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
+    one.add_argument(
+        "--stall-seconds", type=float, metavar="S", default=Limits().stall_seconds,
+        help="give a path up after so long without progress (default: %(default)g)",
+    )  # fmt: skip
+    one.add_argument("--path-seconds", type=float, metavar="S", help="give a path up after so long")
+    one.add_argument("--memory", metavar="SIZE", help="most memory of a process, such as 2GB")
+    one.add_argument(
+        "--patience", type=float, metavar="S",
+        help="end after so long without a worker that takes the work (default: wait)",
+    )  # fmt: skip
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
 
     one = add("scenes", commands.scenes)

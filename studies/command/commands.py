@@ -22,20 +22,30 @@ SHOWN = 100
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from studies.command.progress import Progress
+    from studies.execution.cluster import Access
+    from studies.execution.limits import Limits
     from studies.execution.run import run_study
     from studies.storage.store import Store
     from studies.views.reading import open_study
     from studies.views.tables import messages, runs_table
 
     study = Study.from_toml(options.study)
+    limits = Limits(
+        stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
+        memory=options.memory, patience=options.patience,
+    )  # fmt: skip
+    access = options.scheduler and Access(
+        options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
+    )
     progress = Progress(study)
     with _interruption() as interrupted:
         outcome = run_study(
             study,
             Store(options.out),
             workers=options.workers,
-            scheduler=options.scheduler,
+            scheduler=access,
             resume=options.resume,
+            limits=limits,
             on_event=progress,
             should_stop=lambda: bool(interrupted),
         )

@@ -35,11 +35,16 @@ class Progress:
         self._drawn = 0.0
         self._seen = 0
         self._failed = 0
+        self._waits: set[str] = set()
 
     def __call__(self, event: StudyEvent) -> None:
         """Take in an event."""
         if self._begun is None:
             self._begun = event.progress
+        if event.kind == "waiting" and event.message and event.message not in self._waits:
+            self._waits.add(event.message)
+            left = "\n" if self._bar and self._drawn else ""
+            print(f"{left}waiting: {event.message}", file=self._stream, flush=True)
         if event.kind == "run":
             self._seen += 1
             self._failed += event.status != OK

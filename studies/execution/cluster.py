@@ -6,7 +6,7 @@ import logging
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError
@@ -58,7 +58,7 @@ class Access:
     address: str
     ca: str | None = None
     cert: str | None = None
-    key: str | None = None
+    key: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.address.startswith("tls://") and not (self.ca and self.cert):
@@ -111,10 +111,11 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
                 host="127.0.0.1",
                 protocol="tls://",
                 security=security,
-                memory_limit=memory or "auto",
                 dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
+                scheduler_kwargs={"dashboard": False},
                 local_directory=scratch,
                 silence_logs=logging.CRITICAL,
+                **({"memory_limit": memory} if memory else {}),
             )
         except RuntimeError as error:
             raise RuntimeError(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
+from studies.execution.proof import Proof, proof_of
 from studies.execution.task import PathTask, walk
 from studies.storage import dataset as layout
 from studies.storage.combine import combine
@@ -175,31 +177,36 @@ class _Work:
     priority: int
     emit: Callable[[StudyEvent], None]
     computed: set[str] = field(default_factory=set)
-    _fractions: dict[str, tuple[int, float]] = field(default_factory=dict)
+    _walked: int = 0
+    _walking: dict[str, tuple[int, float]] = field(default_factory=dict)
 
     def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run one task for each path that lacks runs."""
-        from studies.execution.grid import Finished, Grid  # dask takes a second to import
+        from studies.execution.grid import Finished, Grid, Waiting  # dask takes a second to import
 
-        scene = SCENES[self.study.scene]
-        tasks = [
-            PathTask(scene, path, self.store.directory.resolve(), solver_hash())
-            for path in map(self._rest, self.study.paths())
-            if path.cases
-        ]
-        self._fractions = {task.path.id: (len(task.path.cases), 0.0) for task in tasks}
         with ExitStack() as opening:
-            access = access or opening.enter_context(
-                own_workers(min(workers, len(tasks)), self.limits.memory)
-            )
+            tasks = self._tasks(opening.enter_context(proof_of(self.store, self.study.id)))
+            if access is None:
+                first = list(islice(tasks, workers))
+                access = opening.enter_context(own_workers(len(first), self.limits.memory))
+                tasks = chain(first, tasks)
             grid = opening.enter_context(Grid(access))
-            for item in grid.run(walk, tasks, stop):
-                if not isinstance(item, Finished):
-                    self._hear(item.content)
-                elif item.error is None:
-                    self._keep(tasks[item.position].path.id, item.result)
+            for item in grid.run(walk, tasks, stop, self.limits, self.priority):
+                if isinstance(item, Finished):
+                    self._close(item.task, item.error)
+                elif isinstance(item, Waiting):
+                    self.emit(
+                        StudyEvent(kind="waiting", progress=self._progress(), message=item.reason)
+                    )
                 else:
-                    self._give_up(tasks[item.position], item.error)
+                    self._hear(item.content)
+
+    def _tasks(self, proof: Proof) -> Iterator[PathTask]:
+        scene, directory = SCENES[self.study.scene], self.store.directory.resolve()
+        for path in map(self._rest, self.study.paths()):
+            if path.cases:
+                self._walking[path.id] = (len(path.cases), 0.0)
+                yield PathTask(scene, path, directory, solver_hash(), proof)
 
     def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)
@@ -210,9 +217,10 @@ class _Work:
         if "row" in content:
             self._keep(path, [content["row"]])
             return
-        cases, before = self._fractions[path]
+        cases, before = self._walking.get(path, (0, 1.0))  # a late word of a path that is done
         fraction = max(before, content["fraction"])
-        self._fractions[path] = (cases, fraction)
+        if cases:
+            self._walking[path] = (cases, fraction)
         self.emit(
             StudyEvent(
                 kind="path", progress=self._progress(), path=path, fraction=fraction,
@@ -232,14 +240,21 @@ class _Work:
                 )
             )  # fmt: skip
 
-    def _give_up(self, task: PathTask, error: Exception) -> None:
-        """Record the runs of a path whose task did not survive."""
-        left = [case for case in task.path.cases if case.id not in self.computed]
-        broken = (layout.broken_dataset(task.scene, case, str(error)) for case in left)
-        self._keep(task.path.id, [self.store.write_run(dataset) for dataset in broken])
+    def _close(self, task: PathTask, error: Exception | None) -> None:
+        """Record the runs of a path that were not heard of; as broken when it did not end well."""
+        self._walked += self._walking.pop(task.path.id)[0]
+        for case in task.path.cases:
+            if case.id in self.computed:
+                continue
+            if self.store.run_path(case.id).exists():
+                self._keep(task.path.id, [self.store.read_row(case.id)])
+            elif error is not None:
+                broken = layout.broken_dataset(task.scene, case, str(error))
+                self._keep(task.path.id, [self.store.write_run(broken)])
 
     def _progress(self) -> float:
         """Return the fraction of the study that is done, runs found finished included."""
         total = self.study.size
-        walked = sum(cases * fraction for cases, fraction in self._fractions.values())
-        return (total - len(self.wanted) + max(walked, len(self.computed))) / total
+        walked = sum(cases * fraction for cases, fraction in self._walking.values())
+        done = max(self._walked + walked, len(self.computed))
+        return (total - len(self.wanted) + done) / total

@@ -11,6 +11,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
+from studies.execution.proof import Proof
 from studies.storage import dataset as layout
 from studies.storage.store import Store
 
@@ -27,12 +28,14 @@ class PathTask:
     directory : of the store
     source : `solver_hash` of the process that started the study; a worker whose own differs
         refuses the task
+    proof : that the worker sees the directory; None where this is known
     """
 
     scene: Scene
     path: LoadingPath
     directory: Path
     source: str
+    proof: Proof | None = None
 
 
 class StopAsked(Exception):
@@ -41,23 +44,23 @@ class StopAsked(Exception):
 
 def walk(
     task: PathTask, report: Callable[[dict[str, Any]], None], should_stop: Callable[[], bool]
-) -> list[dict[str, Any]]:
-    """Compute the runs of a loading path, and return their catalogue rows.
+) -> None:
+    """Compute the runs of a loading path, and report their catalogue rows.
 
     A run whose file exists is not computed again: where a worker died, the next one continues.
     When the scene raises an error, the runs that have no record yet are written as broken, with
     the error as their message. A record that cannot be written breaks its own run only.
     """
+    if task.proof is not None:
+        task.proof.check(should_stop)
     if task.source != solver_hash():
         raise RuntimeError(
             "the worker has another version of the solver than the process that started the study: "
             "install the same one for both and restart the worker"
         )
     store = Store(task.directory)
-    rows: list[dict[str, Any]] = []
 
     def keep(row: dict[str, Any]) -> None:
-        rows.append(row)
         report({"path": task.path.id, "row": row})
 
     def monitor(fraction: float) -> None:
@@ -81,12 +84,11 @@ def walk(
                 del owed[value]
                 keep(row)
     except StopAsked:
-        return rows
+        return
     except Exception as error:
         reason = _reason(error)
     for case in owed.values():
         keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
-    return rows
 
 
 def _written(store: Store, scene: Scene, case: Case, record: Record) -> dict[str, Any]:

@@ -134,7 +134,7 @@ def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> Non
     jobs = Jobs(path)
     job = jobs.get("a")
     assert (job.name, job.scene, job.size, job.state) == ("a", "fake", 2, State.FAILED)
-    assert (jobs.runs("a"), jobs.study("a"), jobs.new) == (["x", "y"], STUDY, False)
+    assert (jobs.runs("a"), jobs.study("a")) == (["x", "y"], STUDY)
     assert Jobs(path).get("a") == job
 
 

@@ -105,7 +105,7 @@ def test_studies_that_nobody_computes_say_so(mortal: Server, tmp_path: Path) -> 
     """A scheduler that nobody answers for, then patience."""
     mortal.settings = {
         "RESIDUA_SCHEDULER": f"tcp://127.0.0.1:{free_port()}",
-        "RESIDUA_PATIENCE_SECONDS": "12",
+        "RESIDUA_PATIENCE_SECONDS": "20",
     }
     mortal.start()
     study_id = mortal.post(fake_study("alone"))

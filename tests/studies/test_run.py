@@ -59,7 +59,7 @@ def test_one_path_in_trouble_does_not_take_the_others_with_it(troubled: Troubled
     assert {message for _, status, message in outcome.failed if status == "error"} == {
         "ZeroDivisionError: the stiffness is gone",
         "the worker process died each time it computed this loading path; if memory ran out, "
-        "use fewer workers",
+        "use fewer workers or allow each more memory",
     }
     assert store.catalogue.runs(scene="fake")[1] == study.size
 

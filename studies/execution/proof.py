@@ -1,0 +1,73 @@
+"""A worker proves that it sees the directory of the study before it computes anything."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from studies.storage.store import Store, appearing
+
+_PATIENCE = 2.0
+"""Seconds a worker looks for the token. While it looks, other workers get the paths."""
+_POLL = 0.2
+"""Seconds between two looks."""
+
+
+class Unfit(Exception):
+    """A worker cannot do the task; another one can, or the same one later."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What only a worker that sees the directory can read.
+
+    Attributes
+    ----------
+    path : file of the token
+    token : its content, another one each time the study is carried out
+    directory : of the store, as the user has named it
+    """
+
+    path: Path
+    token: str
+    directory: str
+
+    def check(self, should_stop: Callable[[], bool]) -> None:
+        """Look for the token, for a short while.
+
+        Raises
+        ------
+        Unfit
+            when it is not there
+        """
+        deadline = time.monotonic() + _PATIENCE
+        while not self._seen():
+            if should_stop() or time.monotonic() > deadline:
+                raise Unfit(
+                    f"does not see the directory {self.directory}; mount it there under the same "
+                    "path"
+                )
+            time.sleep(_POLL)
+
+    def _seen(self) -> bool:
+        try:
+            return self.path.read_text(encoding="ascii") == self.token
+        except (OSError, ValueError):
+            return False
+
+
+@contextmanager
+def proof_of(store: Store, study_id: str) -> Iterator[Proof]:
+    """Lay a token into the directory of a study while its paths are computed."""
+    path = store.study_directory(study_id).resolve() / "token"
+    proof = Proof(path, uuid.uuid4().hex, str(store.directory))
+    with appearing(path) as part:
+        part.write_text(proof.token, encoding="ascii")
+    try:
+        yield proof
+    finally:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,258 @@
+"""Workers that are shared, frozen, refused, or not there."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from studies import Access, GridLost, Limits, StudyError, own_workers
+from studies.execution.cluster import connect
+from studies.execution.grid import Finished, Grid, Message, Waiting
+from tests.studies.chores import chatter, freeze, nap, need
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[Access]:
+    with own_workers(2) as access:
+        yield access
+
+
+@pytest.fixture
+def nobody() -> Iterator[Access]:
+    """A scheduler without workers."""
+    with own_workers(0) as access:
+        yield access
+
+
+def never() -> bool:
+    return False
+
+
+def listening() -> list[Any]:
+    """Ports that this process and its workers listen on."""
+    family = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    return [
+        each.laddr
+        for process in family
+        for each in process.net_connections("tcp")
+        if each.status == psutil.CONN_LISTEN
+    ]
+
+
+def test_who_lacks_the_credentials_is_refused_at_once(two: Access) -> None:
+    with own_workers(0) as other:
+        stranger = Access(two.address, other.ca, other.cert, other.key)
+        for access in (Access(two.address.replace("tls:", "tcp:")), stranger):
+            began = time.monotonic()
+            with pytest.raises(GridLost):
+                connect(access)
+            assert time.monotonic() - began < 5.0
+    with connect(Access.from_dict(two.to_dict())) as friend:
+        assert len(friend.nthreads()) == 2
+
+
+def test_all_ports_are_on_the_loopback_and_show_no_pages(two: Access) -> None:
+    ports = listening()
+    assert len(ports) >= 7
+    assert {each.ip for each in ports} == {"127.0.0.1"}
+    pages = ("", "info/main/workers.html", "json/identity.json", "metrics", "health", "status")
+    for port in {each.port for each in ports}:
+        for page in pages:
+            with pytest.raises((urllib.error.URLError, OSError)):
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
+
+
+def test_credentials_are_in_no_argument_environment_or_file(two: Access, tmp_path: Path) -> None:
+    assert two.key
+    secret = two.key.splitlines()[5]
+    assert secret not in repr(two)
+    for process in psutil.Process().children(recursive=True):
+        assert secret not in " ".join(process.cmdline())
+        assert secret not in " ".join(process.environ().values())
+        names = [Path(each.path) for each in process.open_files()]
+        assert not [name for name in names if secret.encode() in name.read_bytes()]
+
+
+def test_certificates_that_are_missing_or_bad_are_told(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="needs certificates"):
+        Access("tls://127.0.0.1:1")
+    (tmp_path / "bad.pem").write_text("no certificate")
+    bad = str(tmp_path / "bad.pem")
+    with pytest.raises(StudyError, match=r"certificates = .*bad.pem.*cannot be used"):
+        connect(Access("tls://127.0.0.1:1", bad, bad, bad))
+
+
+def test_one_task_is_served_beside_a_thousand_of_another(two: Access) -> None:
+    drawn, done = itertools.count(), itertools.count()
+    leave = threading.Event()
+    begun = threading.Event()
+
+    def many() -> None:
+        tasks = (0.1 for _ in range(1000) if next(drawn) >= 0)
+        with Grid(two) as grid:
+            for item in grid.run(nap, tasks, leave.is_set):
+                if isinstance(item, Finished) and next(done) == 4:
+                    begun.set()
+
+    crowd = threading.Thread(target=many)
+    crowd.start()
+    try:
+        assert begun.wait(60)
+        with Grid(two) as grid:
+            before = next(done)
+            assert [type(each) for each in grid.run(nap, [0.0], never)] == [Message, Finished]
+            assert next(done) - before < 20
+        assert next(drawn) <= next(done) + 10, "tasks are built when their turn comes"
+    finally:
+        leave.set()
+        crowd.join(30)
+    assert not crowd.is_alive()
+
+
+def test_the_higher_priority_goes_first(two: Access) -> None:
+    leave = threading.Event()
+    order: list[str] = []
+
+    def study(name: str, priority: int) -> None:
+        with Grid(two) as grid:
+            for item in grid.run(nap, [0.3] * 8, leave.is_set, priority=priority):
+                if isinstance(item, Finished):
+                    order.append(name)
+
+    first = threading.Thread(target=study, args=("low", 0))
+    first.start()
+    while not order:
+        time.sleep(0.01)
+    study("high", 5)
+    leave.set()
+    first.join(30)
+    last_high = max(i for i, name in enumerate(order) if name == "high")
+    assert order[:last_high].count("low") <= 4, "those that were running, and no more"
+
+
+def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> None:
+    frozen: list[int] = []
+    ends: dict[Any, Finished] = {}
+    tasks = [("freeze", 0.0), *(("nap", 0.1 + i / 100) for i in range(12))]
+    with Grid(two) as grid:
+        began = time.monotonic()
+        for item in grid.run(freeze, tasks, never, Limits(stall_seconds=2.0)):
+            if isinstance(item, Message) and not frozen:
+                frozen.append(item.content["pid"])
+            elif isinstance(item, Finished):
+                ends[item.task] = item
+        took = time.monotonic() - began
+        assert set(ends) == set(tasks)
+        failed = {task: str(end.error) for task, end in ends.items() if end.error}
+        assert failed == {
+            ("freeze", 0.0): "the loading path made no progress for 2 s (limit stall_seconds); "
+            "its worker was replaced"
+        }
+        assert took < 30.0
+        pids = {
+            item.content["pid"]
+            for item in grid.run(nap, [1.0] * 6, never)
+            if isinstance(item, Message)
+        }
+        assert frozen[0] not in pids
+    assert not psutil.pid_exists(frozen[0])
+
+
+def test_a_path_that_takes_too_long_is_ended_though_it_reports(two: Access) -> None:
+    with Grid(two) as grid:
+        limits = Limits(stall_seconds=5.0, path_seconds=1.0)
+        *_, end = grid.run(chatter, [0.0], never, limits)
+    assert isinstance(end, Finished)
+    assert "took longer than 1 s (limit path_seconds)" in str(end.error)
+
+
+def test_time_in_the_queue_does_not_count(two: Access) -> None:
+    with Grid(two) as grid:
+        limits = Limits(stall_seconds=1.5, path_seconds=1.5)
+        ends = [e for e in grid.run(nap, [0.7] * 10, never, limits) if isinstance(e, Finished)]
+    assert [end.error for end in ends] == [None] * 10
+
+
+def test_stopping_does_not_wait_for_a_frozen_worker(two: Access) -> None:
+    asked: list[float] = []
+
+    def stop() -> bool:
+        return bool(asked)
+
+    with Grid(two) as grid:
+        for item in grid.run(freeze, [("freeze", 0.0), ("nap", 60.0)], stop):
+            if isinstance(item, Message) and "seconds" not in item.content:
+                time.sleep(0.5)
+                asked.append(time.monotonic())
+                pid = item.content["pid"]
+        assert time.monotonic() - asked[0] < 8.0
+    os.kill(pid, 9)
+
+
+def test_no_worker_is_told_and_ends_by_a_setting(
+    nobody: Access, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.execution.grid._QUIET", 1.0)
+    began = time.monotonic()
+    told = []
+    with Grid(nobody) as grid, pytest.raises(GridLost, match="no worker is connected"):
+        for item in grid.run(nap, [0.0], never, Limits(patience=4.0)):
+            told.append((item, time.monotonic() - began))
+    (item, after) = told[0]
+    assert len(told) == 1
+    assert isinstance(item, Waiting)
+    assert item.reason.startswith("no worker is connected to the scheduler: start one")
+    assert after < 4.0
+
+
+def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("studies.execution.grid._QUIET", 4.0)
+    spared = threading.Event()
+
+    def killer() -> None:
+        while not spared.wait(0.3):
+            for child in psutil.Process().children():
+                if "spawn_main" in " ".join(child.cmdline()) and child.pid not in others:
+                    child.kill()
+
+    others = {child.pid for child in psutil.Process().children()}
+    with own_workers(1) as access, Grid(access) as grid:
+        thread = threading.Thread(target=killer)
+        thread.start()
+        items = []
+        for item in grid.run(nap, [0.5, 0.5], never, Limits(patience=60.0)):
+            items.append(item)
+            if isinstance(item, Waiting) and item.reason:
+                spared.set()
+        thread.join()
+    waits = [item.reason for item in items if isinstance(item, Waiting)]
+    assert len(waits) == 2
+    assert waits[1] == ""
+    assert [item.error for item in items if isinstance(item, Finished)] == [None, None]
+
+
+def test_a_worker_that_is_not_fit_is_told_and_its_task_is_kept(two: Access, tmp_path: Path) -> None:
+    file = tmp_path / "needed"
+    items = []
+    with Grid(two) as grid:
+        for item in grid.run(need, [str(file)], never):
+            items.append(item)
+            if isinstance(item, Waiting) and item.reason:
+                assert item.reason.startswith("the worker tls://127.0.0.1:")
+                assert item.reason.endswith(" lacks the file")
+                file.touch()
+    assert [type(item) for item in items][-3:] == [Waiting, Message, Finished]
+    assert items[-1].error is None
+    assert items[-3].reason == ""
