@@ -18,51 +18,12 @@ from service.settings import Settings
 from studies import Store
 
 
-def get_jobs(request: Request) -> Jobs:
-    """Return the queue."""
-    jobs: Jobs = request.app.state.jobs
-    return jobs
-
-
-def get_store(request: Request) -> Store:
-    """Return the store of runs and studies."""
-    store: Store = request.app.state.store
-    return store
-
-
-def get_runner(request: Request) -> Runner:
-    """Return the consumer of the queue."""
-    runner: Runner = request.app.state.runner
-    return runner
-
-
-def get_examiner(request: Request) -> Examiner:
-    """Return who looks at studies before they are accepted."""
-    examiner: Examiner = request.app.state.examiner
-    return examiner
-
-
-def get_job(study_id: ContentId, jobs: Annotated[Jobs, Depends(get_jobs)]) -> Job:
-    """Return the study named in the path."""
-    return jobs.get(study_id)
-
-
-def get_run(run_id: ContentId, store: Annotated[Store, Depends(get_store)]) -> dict[str, Any]:
-    """Return the catalogue's row of the run named in the path."""
-    row = store.catalogue.run(run_id)
-    if row is None or not store.run_path(run_id).is_file():
-        raise NotFound(f"no run has the id {run_id}")
-    return row
-
-
-def get_settings(request: Request) -> Settings:
-    """Return the settings of this service."""
-    settings: Settings = request.app.state.settings
-    return settings
-
-
 def held(name: str) -> Any:
-    """Return a dependency on what the application holds under a name."""
+    """Return a dependency on what the application holds under a name.
+
+    It is a coroutine: the framework runs functions in a thread of its pool, where they wait for
+    all that is slow.
+    """
 
     async def get(request: Request) -> Any:
         return getattr(request.app.state, name)
@@ -70,12 +31,27 @@ def held(name: str) -> Any:
     return Depends(get)
 
 
-TheJobs = Annotated[Jobs, Depends(get_jobs)]
-TheJob = Annotated[Job, Depends(get_job)]
-TheExaminer = Annotated[Examiner, Depends(get_examiner)]
-TheRun = Annotated[dict[str, Any], Depends(get_run)]
-TheStore = Annotated[Store, Depends(get_store)]
-TheRunner = Annotated[Runner, Depends(get_runner)]
+TheExaminer = Annotated[Examiner, held("examiner")]
+TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
 TheMetrics = Annotated[Metrics, held("metrics")]
-TheSettings = Annotated[Settings, Depends(get_settings)]
+TheRunner = Annotated[Runner, held("runner")]
+TheSettings = Annotated[Settings, held("settings")]
+TheStore = Annotated[Store, held("store")]
+
+
+def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
+    """Return the study named in the path."""
+    return jobs.get(study_id)
+
+
+def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
+    """Return the catalogue's row of the run named in the path."""
+    row = store.catalogue.run(run_id)
+    if row is None or not store.run_path(run_id).is_file():
+        raise NotFound(f"no run has the id {run_id}")
+    return row
+
+
+TheJob = Annotated[Job, Depends(get_job)]
+TheRun = Annotated[dict[str, Any], Depends(get_run)]
