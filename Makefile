@@ -5,10 +5,10 @@ STAMP := .venv/installed
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test serve lint bench clean
+.PHONY: help setup run test serve lint bench stress-service clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(STAMP) ## make the environment .venv, or bring it up to date
 
@@ -28,6 +28,9 @@ lint: setup ## check style and types
 
 bench: setup ## draw CPU time against error
 	$(BIN)/python -m tests.benchmarks
+
+stress-service: setup ## put the service under stress, and see what it stands (15 minutes)
+	$(BIN)/python -m tests.stress
 
 clean: ## remove the environment and caches; results in out/ stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

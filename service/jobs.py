@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -127,19 +128,19 @@ class Jobs:
             counted = connection.execute("SELECT state, COUNT(*) FROM job GROUP BY state")
             return dict(counted.fetchall())
 
-    def take(self, busy: Collection[str] = ()) -> Job | None:
+    def take(self, busy: Collection[str] = (), largest: int = sys.maxsize) -> Job | None:
         """Mark the job whose turn it is as running, and return it.
 
-        It is not one of ``busy``, the jobs that are being computed, and shares no run with them:
-        what it shares with others is computed once.
+        It has at most ``largest`` runs. It is not one of ``busy``, the jobs that are being
+        computed, and shares no run with them: what it shares with others is computed once.
         """
         others = json.dumps(list(busy))
         with self.transaction() as connection:
             waiting = connection.execute(
-                "SELECT id FROM job WHERE state IN (?, ?)"
+                "SELECT id FROM job WHERE state IN (?, ?) AND size <= ?"
                 " AND id NOT IN (SELECT value FROM json_each(?))"
                 " ORDER BY priority DESC, turn",
-                (State.RUNNING, State.ACCEPTED, others),
+                (State.RUNNING, State.ACCEPTED, largest, others),
             ).fetchall()
             for row in waiting:
                 if connection.execute(SHARED, (row["id"], others)).fetchone():

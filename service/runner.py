@@ -7,6 +7,7 @@ import contextlib
 import json
 import logging
 import math
+import sys
 import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
@@ -26,6 +27,9 @@ log = logging.getLogger(__name__)
 
 SILENCE_SECONDS = 20.0
 """Time after which a process that has said nothing is told of."""
+
+SMALL = 100
+"""Most runs of a study for which a place is kept."""
 
 SILENT = f"its process has said nothing for {SILENCE_SECONDS:g} s since its start"
 
@@ -120,10 +124,16 @@ class Runner:
         await self.pool.close()
 
     async def _next(self) -> bool:
-        """Begin the study whose turn it is; tell whether there was one, and room for it."""
-        if len(self._studies) >= self.settings.studies_at_once:
+        """Begin the study whose turn it is; tell whether there was one, and room for it.
+
+        The last place is kept for a small one. This costs no time, since all share the workers.
+        """
+        places = self.settings.studies_at_once
+        free = places - len(self._studies)
+        if free <= 0:
             return False
-        job = await asyncio.to_thread(self.jobs.take, list(self._studies))
+        largest = sys.maxsize if free > 1 or places == 1 else SMALL
+        job = await asyncio.to_thread(self.jobs.take, list(self._studies), largest)
         if job is None:
             return False
         task = asyncio.create_task(self._compute(job))

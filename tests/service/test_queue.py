@@ -62,6 +62,14 @@ def test_the_greater_priority_comes_first(jobs: Jobs) -> None:
     assert served == ["c", "d", "a", "b", None]
 
 
+def test_a_place_may_be_kept_for_a_small_study(jobs: Jobs) -> None:
+    jobs.accept("large", STUDY, [f"{number}" for number in range(5)])
+    jobs.accept("small", STUDY, ["run"])
+    assert jobs.take(largest=4).id == "small"
+    assert jobs.take(["small"], largest=4) is None
+    assert jobs.take(["small"]).id == "large"
+
+
 def test_studies_that_share_a_run_are_computed_one_after_the_other(jobs: Jobs) -> None:
     for name, runs in (("a", ["x", "y"]), ("b", ["y", "z"]), ("c", ["w"])):
         jobs.accept(name, STUDY, runs)

@@ -1,0 +1,99 @@
+"""Processes that die and disks that are full: nothing lost, nothing untrue."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import time
+
+import psutil
+
+from studies import open_netcdf
+from tests.service.servers import Server, fake_study, wait_until
+from tests.stress.measure import Figure, process_of
+
+KILLS = 12
+
+
+def deaths(server: Server) -> list[Figure]:
+    """Service, child, pool and workers killed in turn while a study is computed."""
+    study = fake_study("killed", seconds=0.3)
+    study["sweep"] = {"friction": [i / 200 for i in range(150)]}
+    study_id = server.post(study)
+    wait_until(lambda: server.study(study_id)["counts"].get("ok", 0) >= 2)
+    for number in range(KILLS):
+        family = process_of(server).children(recursive=True)
+        match number % 4:
+            case 0:
+                server.kill()
+                server.start()
+            case 1 | 2 as kind:
+                name = ("service.child", "service.pool")[kind - 1]
+                _kill([each for each in family if name in _command(each)])
+            case 3:
+                _kill([each for each in family if "spawn_main" in _command(each)][-1:])
+        time.sleep(2.0)
+    end = server.finished(study_id, 300.0)
+    runs = list((server.data / "runs").glob("*.nc"))
+    with open_netcdf(server.data / "studies" / study_id / "dataset.nc") as dataset:
+        whole = bool(dataset["max_plastic_strain"].notnull().all())
+    return [
+        Figure("kills", KILLS),
+        Figure("runs missing from the study", 150 - end["counts"].get("ok", 0), most=0),
+        Figure("runs without a file", 150 - len(runs), most=0),
+        Figure("data set with gaps", not whole, most=0),
+        Figure("computed more than once", len(server.computed()) - 150, most=3 * KILLS),
+    ]
+
+
+def _command(process: psutil.Process) -> str:
+    with contextlib.suppress(psutil.Error):
+        return " ".join(process.cmdline())
+    return ""
+
+
+def _kill(processes: list[psutil.Process]) -> None:
+    for process in processes:
+        with contextlib.suppress(psutil.Error):
+            process.kill()
+
+
+def full_disk(server: Server) -> list[Figure]:
+    """A small disk that fills up in the middle of a study, and is given room again."""
+    server.stop()
+    server.data.mkdir(exist_ok=True)
+    mount = ["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", str(server.data)]
+    if subprocess.run(mount, check=False, capture_output=True).returncode:
+        return [Figure("not allowed to mount a small disk here: seen by the tests only", 1)]
+    try:
+        server.start()
+        study = fake_study("full", seconds=0.1)
+        study["sweep"] = {"friction": [i / 200 for i in range(60)]}
+        study_id = server.post(study)
+        wait_until(lambda: server.study(study_id)["counts"].get("ok", 0) >= 5)
+        ballast = server.data / "ballast"
+        with contextlib.suppress(OSError), ballast.open("wb", buffering=0) as file:
+            while True:
+                file.write(bytes(4096))
+        health = wait_until(lambda: not_ready(server), 60.0)
+        told = wait_until(lambda: server.study(study_id)["message"], 60.0)
+        refused = server.client.post("/studies", json=fake_study("refused")).status_code
+        ballast.unlink()
+        end = server.finished(study_id, 120.0)
+    finally:
+        server.close()
+        subprocess.run(["umount", "-l", str(server.data)], check=False)
+    log = (server.home / "service.log").read_text()
+    return [
+        Figure("health while the disk is full", health),
+        Figure(f"the study does not say why it waits ({told})", "room" not in told, most=0),
+        Figure("status of a study posted meanwhile is not 507", refused != 507, most=0),
+        Figure("runs not ok at the end", 60 - end["counts"].get("ok", 0), most=0),
+        Figure("tracebacks in the log", log.count("Traceback"), most=0),
+    ]
+
+
+def not_ready(server: Server) -> int:
+    """Return the status of the health when it is not 200."""
+    status = server.client.get("/health").status_code
+    return status if status != 200 else 0

@@ -1,0 +1,60 @@
+"""What a scenario measures, and how it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import psutil
+
+from tests.service.servers import Server
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One measured number.
+
+    Attributes
+    ----------
+    what, unit : what was measured
+    value : the number
+    most : the largest that is allowed; None for a number that is only told
+    """
+
+    what: str
+    value: float
+    unit: str = ""
+    most: float | None = None
+
+    @property
+    def good(self) -> bool:
+        """Whether the number is allowed; NaN is not."""
+        return self.most is None or self.value <= self.most
+
+    def __str__(self) -> str:
+        bound = "" if self.most is None else f"   (at most {self.most:g})"
+        mark = "ok  " if self.good else "FAIL"
+        return f"  {mark} {self.what}: {self.value:.3g} {self.unit}{bound}"
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """Return the value that ``share`` of all values do not exceed; NaN for none."""
+    ordered = sorted(values)
+    return ordered[min(int(share * len(ordered)), len(ordered) - 1)] if ordered else float("nan")
+
+
+def process_of(server: Server) -> psutil.Process:
+    """Return the service's own process."""
+    assert server.process is not None
+    return psutil.Process(server.process.pid)
+
+
+def cpu_seconds(process: psutil.Process) -> float:
+    """Return the CPU time a process has taken, without its children's."""
+    times = process.cpu_times()
+    return times.user + times.system
+
+
+def megabytes(process: psutil.Process) -> float:
+    """Return the memory of a process that no other one shares [MB]."""
+    return process.memory_full_info().uss / 1e6
