@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from studies import Store, Study, open_netcdf, run_study
+from studies import Limits, Store, Study, open_netcdf, run_study
 from tests.studies.conftest import fake_study
 
 ROOT = Path(__file__).parents[2]
@@ -98,6 +98,27 @@ def test_a_killed_worker_costs_only_the_path_it_was_on(
     assert killed
     assert outcome.counts == {"ok": RUNS}
     assert RUNS <= len(list(marks.iterdir())) <= RUNS + 1
+
+
+def test_a_frozen_worker_costs_only_the_path_it_was_on(
+    slow: tuple[Study, Store, Path],
+) -> None:
+    study, store, marks = slow
+    frozen: list[int] = []
+
+    def freeze_one_worker(event: object) -> None:
+        if not frozen and len(finished(store)) >= 2:
+            frozen.append(max(int(mark.name.split("-")[-1]) for mark in marks.iterdir()))
+            os.kill(frozen[0], signal.SIGSTOP)
+
+    outcome = run_study(
+        study, store, workers=2, limits=Limits(stall_seconds=10.0), on_event=freeze_one_worker
+    )
+    assert outcome.counts == {"ok": RUNS - 1, "error": 1}
+    ((_, _, message),) = outcome.failed
+    assert message.startswith("the loading path made no progress for 10 s (limit stall_seconds)")
+    assert len(list(marks.iterdir())) == RUNS
+    assert not psutil.pid_exists(frozen[0])
 
 
 def test_ctrl_c_stops_cleanly(slow: tuple[Study, Store, Path], tmp_path: Path) -> None:

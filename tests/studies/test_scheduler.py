@@ -2,62 +2,130 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
+from distributed import Security
 
-from studies import GridLost, Store, StudyEvent, run_study
+from studies import (
+    Access,
+    GridLost,
+    Limits,
+    Store,
+    Study,
+    StudyError,
+    StudyEvent,
+    StudyOutcome,
+    run_study,
+)
+from studies.command.cli import main
+from studies.execution.cluster import connect
 from tests.studies.conftest import fake_study
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """Start a scheduler and one worker with dask's own commands."""
+Process = subprocess.Popen[bytes]
+
+BLIND = """
+import os
+from studies.execution.proof import Proof
+Proof._seen = lambda self: os.path.exists({!r})
+"""
+"""Makes a worker see no directory before a file exists."""
+
+
+@dataclass
+class Stage:
+    """Processes started with dask's own commands."""
+
+    home: Path
+    address: str
+    started: ExitStack
+    tls: list[str] = field(default_factory=list)
+
+    def scheduler(self) -> Process:
+        return self._dask(
+            "scheduler", "--host", self.address, "--no-dashboard", "--dashboard-address", ":0"
+        )
+
+    def worker(self, *options: str) -> Process:
+        return self._dask(
+            "worker", self.address, "--nthreads", "1", "--local-directory", str(self.home),
+            "--no-dashboard", "--death-timeout", "30", *options,
+        )  # fmt: skip
+
+    def ready(self) -> None:
+        """Wait until a worker is connected."""
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                with connect(Access(self.address)) as client:
+                    return client.wait_for_workers(1, timeout=60)
+            except GridLost:
+                assert time.monotonic() < deadline
+
+    def _dask(self, *arguments: str) -> Process:
+        process = self.started.enter_context(
+            subprocess.Popen(
+                [sys.executable, "-m", "dask", *arguments, *self.tls],
+                cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )
+        )  # fmt: skip
+        self.started.callback(process.kill)
+        return process
+
+
+def free_port() -> int:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
-    scheduler = ["scheduler", "--host", address, "--no-dashboard", "--dashboard-address", ":0"]
-    worker = ["worker", address, "--nthreads", "1", "--local-directory", str(tmp_path)]
+        return int(free.getsockname()[1])
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Iterator[Stage]:
     with ExitStack() as started:
-        processes = []
-        for arguments in (scheduler, [*worker, "--no-dashboard", "--death-timeout", "30"]):
-            command = [sys.executable, "-m", "dask", *arguments]
-            process = started.enter_context(
-                subprocess.Popen(
-                    command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-                )
-            )
-            started.callback(process.kill)
-            processes.append(process)
-        yield address, processes[0]
+        yield Stage(tmp_path, f"tcp://127.0.0.1:{free_port()}", started)
 
 
-def test_a_running_scheduler_computes_the_study(
-    cluster: tuple[str, subprocess.Popen[bytes]], store: Store
-) -> None:
-    address, _ = cluster
-    events: list[StudyEvent] = []
-    deadline = time.monotonic() + 20
+@pytest.fixture
+def cluster(stage: Stage) -> tuple[str, Process]:
+    """Start a scheduler and one worker."""
+    scheduler = stage.scheduler()
+    stage.worker()
+    return stage.address, scheduler
+
+
+def answered(study: Study, store: Store, scheduler: Access | str, **options: Any) -> StudyOutcome:
+    """Compute a study as soon as the scheduler answers."""
+    deadline = time.monotonic() + 30
     while True:
         try:
-            outcome = run_study(fake_study(), store, scheduler=address, on_event=events.append)
-            break
-        except GridLost:
-            assert time.monotonic() < deadline
+            return run_study(study, store, scheduler=scheduler, **options)
+        except GridLost as error:
+            if "no scheduler answers" not in str(error) or time.monotonic() > deadline:
+                raise
+
+
+def test_a_running_scheduler_computes_the_study(cluster: tuple[str, Process], store: Store) -> None:
+    address, _ = cluster
+    events: list[StudyEvent] = []
+    outcome = answered(fake_study(), store, address, on_event=events.append)
     assert outcome.counts == {"ok": 4}
     assert len([event for event in events if event.kind == "run"]) == 4
 
 
 def test_a_lost_scheduler_is_told_apart_from_failed_runs(
-    cluster: tuple[str, subprocess.Popen[bytes]], store: Store, monkeypatch: pytest.MonkeyPatch
+    cluster: tuple[str, Process], store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("studies.execution.cluster._CONNECT", 3.0)
     address, scheduler = cluster
@@ -83,4 +151,94 @@ def test_no_scheduler_at_the_address_is_one_clear_error_and_leaves_nothing(
     monkeypatch.setattr("studies.execution.cluster._CONNECT", 1.0)
     with pytest.raises(GridLost, match=f"no scheduler answers at {address}: "):
         run_study(fake_study(), store, scheduler=address)
+    assert not store.directory.exists()
+
+
+def test_a_worker_that_does_not_see_the_directory_computes_nothing(
+    stage: Stage, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(stage.home)
+    store = Store("out")  # the user is told of the directory by this name
+    seen = stage.home / "mounted"
+    blind = stage.home / "blind.py"
+    blind.write_text(BLIND.format(str(seen)))
+    stage.scheduler()
+    stage.worker("--preload", str(blind))
+    events: list[StudyEvent] = []
+
+    def hear(event: StudyEvent) -> None:
+        events.append(event)
+        if event.kind == "waiting" and event.message:
+            assert not list(Path("out").rglob("*.nc"))
+            seen.touch()
+
+    stage.ready()
+    with pytest.raises(GridLost, match="does not see the directory out"):
+        run_study(fake_study(), store, scheduler=stage.address, limits=Limits(patience=8.0))
+    assert store.catalogue.runs()[1] == 0
+    assert not list(Path("out").rglob("*.nc"))
+    outcome = run_study(fake_study(), store, scheduler=stage.address, on_event=hear)
+    assert outcome.counts == {"ok": 4}
+    waits = [event.message for event in events if event.kind == "waiting"]
+    assert len(waits) == 2
+    assert re.fullmatch(
+        r"the worker tcp://127\.0\.0\.1:\d+ does not see the directory out; "
+        "mount it there under the same path",
+        waits[0],
+    )
+    assert waits[1] == ""
+    assert not list(Path("out").rglob("token*"))
+
+
+def test_a_scheduler_without_workers_is_waited_for_aloud(
+    stage: Stage, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.execution.grid._QUIET", 2.0)
+    stage.scheduler()
+    told: list[str] = []
+
+    def hear(event: StudyEvent) -> None:
+        if event.kind == "waiting":
+            told.append(event.message)
+            if len(told) == 1:
+                stage.worker()
+
+    assert answered(fake_study(), store, stage.address, on_event=hear).counts == {"ok": 4}
+    assert told[0].startswith("no worker is connected to the scheduler")
+    assert told[-1] == ""
+
+
+def test_certificates_in_files_open_a_scheduler_that_asks_for_them(
+    stage: Stage, store: Store
+) -> None:
+    made = Security.temporary()
+    files = {"ca": made.tls_ca_file, "cert": made.tls_client_cert, "key": made.tls_client_key}
+    names = {name: str(stage.home / f"{name}.pem") for name in files}
+    for name, text in files.items():
+        Path(names[name]).write_text(text)
+    stage.address = stage.address.replace("tcp:", "tls:")
+    stage.tls = [
+        "--tls-ca-file", names["ca"], "--tls-cert", names["cert"], "--tls-key", names["key"],
+    ]  # fmt: skip
+    stage.scheduler()
+    stage.worker()
+    access = Access(stage.address, **names)
+    assert answered(fake_study(), store, access).counts == {"ok": 4}
+
+
+def test_a_scheduler_that_needs_certificates_is_refused_before_anything_is_written(
+    study_file: Callable[..., Path], store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
+    address = "tls://127.0.0.1:1"
+    with pytest.raises(StudyError, match="needs certificates"):
+        run_study(fake_study(), store, scheduler=address)
+    run = ["run", str(study_file()), "--out", str(store.directory)]
+    assert main([*run, "--scheduler", address]) == 2
+    assert "--tls-ca" in capsys.readouterr().err
+    assert main([*run, "--scheduler", address, "--tls-ca", "no.pem", "--tls-cert", "no.pem"]) == 2
+    assert "certificates = 'no.pem, no.pem': cannot be used" in capsys.readouterr().err
+    assert main([*run, "--memory", "much"]) == 2
+    assert "memory = 'much': must be a size" in capsys.readouterr().err
+    assert main([*run, "--stall-seconds", "0"]) == 2
+    assert "stall_seconds = 0.0: must be greater than 0" in capsys.readouterr().err
     assert not store.directory.exists()
