@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from solver.scenes import SCENES
+from solver.scenes import SCENES, Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
-from studies.definition.vocabulary import MISSING, OK
+from studies.definition.vocabulary import OK
+from studies.errors import StoreFull, StudyError
 from studies.execution.task import PathTask, walk
 from studies.storage import dataset as layout
 from studies.storage.combine import combine
@@ -50,7 +50,7 @@ class StudyOutcome:
     Attributes
     ----------
     study_id : content id of the study
-    counts : number of runs by status, ``missing`` included
+    counts : number of runs by status, ``missing`` included, as the data set holds them
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
     dataset : the combined data set
@@ -103,6 +103,8 @@ def run_study(
         when another process computes into the same store
     StudyError
         when the store cannot be written to
+    StoreFull
+        when the disk is full; with room, the same call computes the rest
     GridLost
         when the scheduler is gone; the same call computes the rest
     """
@@ -119,27 +121,20 @@ def run_study(
     with store.writing():
         store.save_study(study)
         cases = list(study.cases())
-        known = store.catalogue.rows(case.id for case in cases)
+        known = store.sound(case.id for case in cases)
         done = {key for key, row in known.items() if resume or row["status"] == OK}
         wanted = {case.id for case in cases} - done
-        store.discard(wanted)
         work = _Work(study, store, wanted, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, scheduler, stop)
-        dataset = store.dataset_path(study.id)
-        combine(study, store, cases)
-        rows = store.catalogue.rows(case.id for case in cases)
-    counts = Counter(rows[case.id]["status"] if case.id in rows else MISSING for case in cases)
+        combined = combine(study, store, cases)
+        store.catalogue.remove(combined.missing)
     return StudyOutcome(
         study_id=study.id,
-        counts=dict(counts),
-        failed=[
-            (row["id"], row["status"], row["message"])
-            for row in rows.values()
-            if row["status"] != OK
-        ],
+        counts=combined.counts,
+        failed=combined.failed,
         computed=sorted(work.computed),
-        dataset=dataset,
+        dataset=combined.path,
         wall_seconds=time.monotonic() - started,
         stopped=asked and bool(wanted - work.computed),
     )
@@ -170,19 +165,29 @@ class _Work:
 
         scene = SCENES[self.study.scene]
         tasks = [
-            PathTask(scene, path, self.store.directory.resolve(), solver_hash())
-            for path in map(self._rest, self.study.paths())
-            if path.cases
+            self._task(scene, path) for path in map(self._rest, self.study.paths()) if path.cases
         ]
+        unwritable: list[StoreFull | StudyError] = []
         self._fractions = {task.path.id: (len(task.path.cases), 0.0) for task in tasks}
         with Grid(min(workers, len(tasks)), scheduler) as grid:
-            for item in grid.run(walk, tasks, stop):
+            for item in grid.run(walk, tasks, lambda: bool(unwritable) or stop()):
                 if not isinstance(item, Finished):
                     self._hear(item.content)
                 elif item.error is None:
                     self._keep(tasks[item.position].path.id, item.result)
+                elif isinstance(item.error, StoreFull | StudyError):
+                    unwritable.append(item.error)
                 else:
                     self._give_up(tasks[item.position], item.error)
+        for error in unwritable:  # by the name the user gave, not the worker's
+            directory = str(self.store.directory)
+            if isinstance(error, StoreFull):
+                raise StoreFull(directory)
+            raise StudyError("directory", directory, error.allowed)
+
+    def _task(self, scene: Scene, path: LoadingPath) -> PathTask:
+        stale = self.store.modified(case.id for case in path.cases)
+        return PathTask(scene, path, self.store.directory.resolve(), solver_hash(), stale)
 
     def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)

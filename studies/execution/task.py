@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
+from studies.errors import StoreFull, StudyError
 from studies.storage import dataset as layout
 from studies.storage.store import Store
 
@@ -27,12 +28,15 @@ class PathTask:
     directory : of the store
     source : `solver_hash` of the process that started the study; a worker whose own differs
         refuses the task
+    stale : by id, the time of change [ns] of the files that the study replaces; a file that has
+        another one was written by a worker that died on this task, and is kept
     """
 
     scene: Scene
     path: LoadingPath
     directory: Path
     source: str
+    stale: Mapping[str, int] = field(default_factory=dict)
 
 
 class StopAsked(Exception):
@@ -47,6 +51,11 @@ def walk(
     A run whose file exists is not computed again: where a worker died, the next one continues.
     When the scene raises an error, the runs that have no record yet are written as broken, with
     the error as their message. A record that cannot be written breaks its own run only.
+
+    Raises
+    ------
+    StoreFull, StudyError
+        when nothing can be written to the store, which is no run's fault
     """
     if task.source != solver_hash():
         raise RuntimeError(
@@ -66,9 +75,12 @@ def walk(
             raise StopAsked
 
     owed: dict[Any, Case] = {}
+    written = store.modified(case.id for case in task.path.cases)
     for case in task.path.cases:
-        if store.run_path(case.id).exists():
-            keep(store.read_row(case.id))
+        fresh = written.get(case.id) != task.stale.get(case.id)
+        row = store.found(case.id) if fresh else None
+        if row:
+            keep(row)
         else:
             owed[case.values[task.scene.branch]] = case
     reason = NO_RECORD
@@ -82,6 +94,8 @@ def walk(
                 keep(row)
     except StopAsked:
         return rows
+    except (StoreFull, StudyError):
+        raise
     except Exception as error:
         reason = _reason(error)
     for case in owed.values():
@@ -93,6 +107,8 @@ def _written(store: Store, scene: Scene, case: Case, record: Record) -> dict[str
     """Write the run a record tells of, as broken when the record cannot be written."""
     try:
         return store.write_run(layout.run_dataset(scene, case, record))
+    except (StoreFull, StudyError):
+        raise
     except Exception as error:
         return store.write_run(layout.broken_dataset(scene, case, _reason(error)))
 

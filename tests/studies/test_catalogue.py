@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from studies import CatalogueDamaged
 from studies.storage.catalogue import Catalogue
 
 KILLED_WRITER = """
@@ -20,8 +20,8 @@ connection = sqlite3.connect(sys.argv[1])
 connection.execute("PRAGMA cache_size = 1")
 connection.execute("BEGIN")
 for number in range(1000):
-    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, ""]
-    connection.execute("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, "", 0, 0, 0]
+    connection.execute(f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 13)})", row)
 os.kill(os.getpid(), 9)
 """
 """Fills so many pages that some reach the file before the transaction has ended."""
@@ -31,7 +31,7 @@ def row(run_id: str) -> dict[str, Any]:
     return {
         "id": run_id, "scene": "fake", "status": "ok", "message": "", "parameters": {},
         "scalars": {"increments": 7}, "path": "", "created": "", "cpu_seconds": 0.0,
-        "solver_source": "",
+        "solver_source": "", "size": 1, "modified": 2,
     }  # fmt: skip
 
 
@@ -127,5 +127,5 @@ def test_readers_of_the_very_first_write_see_all_of_it_or_nothing(tmp_path: Path
 
 def test_what_is_no_catalogue_is_named_as_such(catalogue: Catalogue) -> None:
     catalogue.path.write_text("something else, and long enough to be a page of a database" * 20)
-    with pytest.raises(sqlite3.DatabaseError, match="not a database"):
+    with pytest.raises(CatalogueDamaged, match=r"catalogue\.sqlite .* not a database"):
         catalogue.ids()
