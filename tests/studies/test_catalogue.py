@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sqlite3
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -129,3 +132,24 @@ def test_what_is_no_catalogue_is_named_as_such(catalogue: Catalogue) -> None:
     catalogue.path.write_text("something else, and long enough to be a page of a database" * 20)
     with pytest.raises(CatalogueDamaged, match=r"catalogue\.sqlite .* not a database"):
         catalogue.ids()
+
+
+def test_the_last_page_of_a_hundred_thousand_runs_costs_no_more_than_a_fifth_of_a_second(
+    catalogue: Catalogue,
+) -> None:
+    catalogue.put(row(f"{i:032x}") | {"created": f"{i % 977:05}"} for i in range(100_000))
+    started = time.process_time()
+    rows, total = catalogue.runs(limit=100, offset=99_900)
+    assert time.process_time() - started < 0.2
+    assert total == 100_000
+    assert [each["created"] for each in rows] == ["00976"] * 100
+    assert len(catalogue.rows(f"{i:032x}" for i in range(0, 100_000, 5))) == 20_000
+
+
+def test_a_row_that_is_not_what_was_written_is_damage(catalogue: Catalogue) -> None:
+    catalogue.put([row("0")])
+    with closing(sqlite3.connect(catalogue.path)) as connection, connection:
+        connection.execute("UPDATE runs SET scalars = replace(scalars, '7', '8')")
+    for read in (*READERS.values(), Catalogue.stamps):
+        with pytest.raises(CatalogueDamaged, match="row of run '0' is damaged"):
+            read(catalogue)
