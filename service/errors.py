@@ -16,7 +16,7 @@ from starlette.exceptions import HTTPException
 
 from service.logs import REQUEST
 from studies import StudyError
-from studies.errors import StoreFull
+from studies.errors import CatalogueDamaged, StoreFull
 
 log = logging.getLogger(__name__)
 
@@ -48,8 +48,11 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     QueueFull: HTTPStatus.SERVICE_UNAVAILABLE,
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
+    CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
     OSError: HTTPStatus.SERVICE_UNAVAILABLE,
 }
+
+NO_ROOM = "no room is left on the disk of the data directory"
 
 
 MEDIA_TYPE = "application/problem+json"
@@ -160,7 +163,8 @@ def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
     status = status_of(exc)
     later = {"retry-after": "10"} if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
-    return problem(request, status, str(exc), headers=later)
+    said = NO_ROOM if isinstance(exc, StoreFull) else str(exc)
+    return problem(request, status, said, headers=later)
 
 
 def on_system_error(request: Request, exc: OSError) -> Problem:
@@ -191,7 +195,9 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {
     StudyError: on_field_error,
     RequestValidationError: on_validation_error,
-    **dict.fromkeys((NotFound, Conflict, QueueFull, QueueLost, StoreFull), on_plain_error),
+    **dict.fromkeys(
+        (NotFound, Conflict, QueueFull, QueueLost, StoreFull, CatalogueDamaged), on_plain_error
+    ),
     OSError: on_system_error,
     HTTPException: on_http_error,
     Exception: on_unexpected,

@@ -271,7 +271,7 @@ class Jobs:
         """Return what an error of SQLite means for the queue."""
         match getattr(error, "sqlite_errorcode", None):
             case sqlite3.SQLITE_FULL:
-                return StoreFull(f"no room is left for {self.path.name}")
+                return StoreFull(str(self.path.parent))
             case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_READONLY | sqlite3.SQLITE_IOERR:
                 return OSError(f"{self.path.name} cannot be used now: {error}")
         return QueueLost(f"{self.path.name} is gone or damaged ({error})")

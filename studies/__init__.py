@@ -9,7 +9,14 @@ import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from studies.errors import GridLost, StoreBusy, StudyError
+from studies.errors import (
+    CatalogueDamaged,
+    GridLost,
+    RunUnreadable,
+    StoreBusy,
+    StoreFull,
+    StudyError,
+)
 
 if TYPE_CHECKING:
     from studies.definition.cases import Case, LoadingPath
@@ -43,11 +50,14 @@ _RENAMED = {"Path": "LoadingPath"}
 __all__ = [
     "Access",
     "Case",
+    "CatalogueDamaged",
     "GridLost",
     "Limits",
     "LoadingPath",
+    "RunUnreadable",
     "Store",
     "StoreBusy",
+    "StoreFull",
     "Study",
     "StudyError",
     "StudyEvent",

@@ -30,9 +30,43 @@ class StoreBusy(RuntimeError):
     """Another process is computing into the same directory."""
 
 
+class StoreFull(RuntimeError):
+    """No room is left for results: running again computes the rest, once there is some.
+
+    Parameters
+    ----------
+    directory : where results were to be written
+    """
+
+    def __init__(self, directory: str) -> None:
+        super().__init__(directory)
+        self.directory = directory
+
+    def __str__(self) -> str:
+        return f"no room is left in {self.directory}"
+
+
+class RunUnreadable(RuntimeError):
+    """The file of a run is absent, damaged, or not the file of this run.
+
+    Parameters
+    ----------
+    run_id : of the run
+    reason : what is wrong with its file
+    """
+
+    def __init__(self, run_id: str, reason: str) -> None:
+        super().__init__(run_id, reason)
+        self.run_id = run_id
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"run {self.run_id} cannot be read: {self.reason}"
+
+
+class CatalogueDamaged(RuntimeError):
+    """The catalogue cannot be used; whoever computes next makes it anew from the runs."""
+
+
 class GridLost(ConnectionError):
     """The scheduler could not be reached or forgot its tasks; running again computes the rest."""
-
-
-class StoreFull(RuntimeError):
-    """No room is left on the device of the directory; running again computes the rest."""

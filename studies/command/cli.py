@@ -10,7 +10,7 @@ from typing import Any
 
 from studies.command import commands
 from studies.command.commands import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
-from studies.errors import GridLost, StoreBusy, StudyError
+from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError
 from studies.execution.limits import Limits
 
 
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return options.command(options)
     except StudyError as error:
         return complain(error, BAD_INPUT)
-    except (StoreBusy, GridLost) as error:
+    except (CatalogueDamaged, GridLost, StoreBusy, StoreFull) as error:
         return complain(error, FAILED)
     except KeyboardInterrupt:
         return INTERRUPTED

@@ -228,10 +228,11 @@ def _save(drawn: Any, path: Path) -> None:
 @contextmanager
 def _written(option: str, path: Path) -> Iterator[Path]:
     """Give a path to write to, for the file that an option names."""
+    from studies.storage.room import needs_room
     from studies.storage.store import appearing
 
     try:
-        with appearing(path) as part:
+        with needs_room(path.parent), appearing(path) as part:
             yield part
     except OSError as error:
         raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None

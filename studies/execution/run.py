@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -16,7 +15,8 @@ from solver.scenes import SCENES
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
-from studies.definition.vocabulary import MISSING, OK
+from studies.definition.vocabulary import OK
+from studies.errors import StoreFull, StudyError
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
@@ -59,7 +59,7 @@ class StudyOutcome:
     Attributes
     ----------
     study_id : content id of the study
-    counts : number of runs by status, ``missing`` included
+    counts : number of runs by status, ``missing`` included, as the data set holds them
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
     dataset : the combined data set
@@ -116,6 +116,8 @@ def run_study(
         when another process computes into the same store
     StudyError
         when the store cannot be written to, or the certificates cannot be used
+    StoreFull
+        when the disk is full; with room, the same call computes the rest
     GridLost
         when the scheduler is gone, or no worker took the work for too long; the same call
         computes the rest
@@ -134,27 +136,20 @@ def run_study(
     with store.writing():
         store.save_study(study)
         cases = list(study.cases())
-        known = store.catalogue.rows(case.id for case in cases)
+        known = store.sound(case.id for case in cases)
         done = {key for key, row in known.items() if resume or row["status"] == OK}
         wanted = {case.id for case in cases} - done
-        store.discard(wanted)
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, access, stop)
-        dataset = store.dataset_path(study.id)
-        combine(study, store, cases)
-        rows = store.catalogue.rows(case.id for case in cases)
-    counts = Counter(rows[case.id]["status"] if case.id in rows else MISSING for case in cases)
+        combined = combine(study, store, cases)
+        store.catalogue.remove(combined.missing)
     return StudyOutcome(
         study_id=study.id,
-        counts=dict(counts),
-        failed=[
-            (row["id"], row["status"], row["message"])
-            for row in rows.values()
-            if row["status"] != OK
-        ],
+        counts=combined.counts,
+        failed=combined.failed,
         computed=sorted(work.computed),
-        dataset=dataset,
+        dataset=combined.path,
         wall_seconds=time.monotonic() - started,
         stopped=asked and bool(wanted - work.computed),
     )
@@ -182,8 +177,9 @@ class _Work:
 
     def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run one task for each path that lacks runs."""
-        from studies.execution.grid import Finished, Grid, Waiting  # dask takes a second to import
+        from studies.execution.grid import Finished, Grid, Message, Waiting  # takes a second
 
+        unwritable: list[StoreFull | StudyError] = []
         with ExitStack() as opening:
             tasks = self._tasks(opening.enter_context(proof_of(self.store, self.study.id)))
             if access is None:
@@ -191,22 +187,33 @@ class _Work:
                 access = opening.enter_context(own_workers(len(first), self.limits.memory))
                 tasks = chain(first, tasks)
             grid = opening.enter_context(Grid(access))
-            for item in grid.run(walk, tasks, stop, self.limits, self.priority):
-                if isinstance(item, Finished):
-                    self._close(item.task, item.error)
-                elif isinstance(item, Waiting):
-                    self.emit(
-                        StudyEvent(kind="waiting", progress=self._progress(), message=item.reason)
-                    )
-                else:
-                    self._hear(item.content)
+
+            def leave() -> bool:
+                return bool(unwritable) or stop()
+
+            for item in grid.run(walk, tasks, leave, self.limits, self.priority):
+                match item:
+                    case Waiting(reason):
+                        self._tell("waiting", message=reason)
+                    case Message(content):
+                        self._hear(content)
+                    case Finished(_, StoreFull() | StudyError() as error):
+                        unwritable.append(error)
+                    case Finished(task, error):
+                        self._close(task, error)
+        for error in unwritable:  # by the name the user gave, not the worker's
+            directory = str(self.store.directory)
+            if isinstance(error, StoreFull):
+                raise StoreFull(directory)
+            raise StudyError("directory", directory, error.allowed)
 
     def _tasks(self, proof: Proof) -> Iterator[PathTask]:
         scene, directory = SCENES[self.study.scene], self.store.directory.resolve()
         for path in map(self._rest, self.study.paths()):
             if path.cases:
                 self._walking[path.id] = (len(path.cases), 0.0)
-                yield PathTask(scene, path, directory, solver_hash(), proof)
+                stale = self.store.modified(case.id for case in path.cases)
+                yield PathTask(scene, path, directory, solver_hash(), proof, stale)
 
     def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)
@@ -221,11 +228,7 @@ class _Work:
         fraction = max(before, content["fraction"])
         if cases:
             self._walking[path] = (cases, fraction)
-        self.emit(
-            StudyEvent(
-                kind="path", progress=self._progress(), path=path, fraction=fraction,
-            )
-        )  # fmt: skip
+        self._tell("path", path=path, fraction=fraction)
 
     def _keep(self, path: str, rows: Sequence[Mapping[str, Any]]) -> None:
         fresh = [row for row in rows if row["id"] not in self.computed]
@@ -233,21 +236,22 @@ class _Work:
             self.store.catalogue.put(fresh)
         for row in fresh:
             self.computed.add(row["id"])
-            self.emit(
-                StudyEvent(
-                    kind="run", progress=self._progress(), path=path, run=row["id"],
-                    status=row["status"], message=row["message"],
-                )
-            )  # fmt: skip
+            self._tell(
+                "run", path=path, run=row["id"], status=row["status"], message=row["message"]
+            )
+
+    def _tell(self, kind: str, **content: Any) -> None:
+        self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
 
     def _close(self, task: PathTask, error: Exception | None) -> None:
         """Record the runs of a path that were not heard of; as broken when it did not end well."""
         self._walked += self._walking.pop(task.path.id)[0]
+        stored = task.stored(self.store)
         for case in task.path.cases:
             if case.id in self.computed:
                 continue
-            if self.store.run_path(case.id).exists():
-                self._keep(task.path.id, [self.store.read_row(case.id)])
+            if case.id in stored:
+                self._keep(task.path.id, [stored[case.id]])
             elif error is not None:
                 broken = layout.broken_dataset(task.scene, case, str(error))
                 self._keep(task.path.id, [self.store.write_run(broken)])

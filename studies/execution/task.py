@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
+from studies.errors import StoreFull, StudyError
 from studies.execution.proof import Proof
 from studies.storage import dataset as layout
 from studies.storage.store import Store
@@ -29,6 +30,8 @@ class PathTask:
     source : `solver_hash` of the process that started the study; a worker whose own differs
         refuses the task
     proof : that the worker sees the directory; None where this is known
+    stale : by id, the time of change [ns] of the files that the study replaces; a file that has
+        another one was written by a worker that died on this task, and is kept
     """
 
     scene: Scene
@@ -36,6 +39,13 @@ class PathTask:
     directory: Path
     source: str
     proof: Proof | None = None
+    stale: Mapping[str, int] = field(default_factory=dict)
+
+    def stored(self, store: Store) -> dict[str, dict[str, Any]]:
+        """Return, by id, the rows of the runs that this task has stored."""
+        times = store.modified(case.id for case in self.path.cases)
+        fresh = [run_id for run_id, time in times.items() if time != self.stale.get(run_id)]
+        return {run_id: row for run_id in fresh if (row := store.found(run_id))}
 
 
 class StopAsked(Exception):
@@ -50,6 +60,11 @@ def walk(
     A run whose file exists is not computed again: where a worker died, the next one continues.
     When the scene raises an error, the runs that have no record yet are written as broken, with
     the error as their message. A record that cannot be written breaks its own run only.
+
+    Raises
+    ------
+    StoreFull, StudyError
+        when nothing can be written to the store, which is no run's fault
     """
     if task.proof is not None:
         task.proof.check(should_stop)
@@ -68,12 +83,12 @@ def walk(
         if should_stop():
             raise StopAsked
 
-    owed: dict[Any, Case] = {}
-    for case in task.path.cases:
-        if store.run_path(case.id).exists():
-            keep(store.read_row(case.id))
-        else:
-            owed[case.values[task.scene.branch]] = case
+    stored = task.stored(store)
+    for row in stored.values():
+        keep(row)
+    owed = {
+        case.values[task.scene.branch]: case for case in task.path.cases if case.id not in stored
+    }
     reason = NO_RECORD
     try:
         if owed:
@@ -85,6 +100,8 @@ def walk(
                 keep(row)
     except StopAsked:
         return
+    except (StoreFull, StudyError):
+        raise
     except Exception as error:
         reason = _reason(error)
     for case in owed.values():
@@ -95,6 +112,8 @@ def _written(store: Store, scene: Scene, case: Case, record: Record) -> dict[str
     """Write the run a record tells of, as broken when the record cannot be written."""
     try:
         return store.write_run(layout.run_dataset(scene, case, record))
+    except (StoreFull, StudyError):
+        raise
     except Exception as error:
         return store.write_run(layout.broken_dataset(scene, case, _reason(error)))
 

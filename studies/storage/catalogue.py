@@ -4,22 +4,26 @@ The process that computes is the only writer. Readers, in other threads or proce
 their own short connections. They may write, for one reason: the first to come after a writer was
 killed undoes what that left half done. The journal is SQLite's rollback journal: unlike the
 write-ahead log it needs no memory shared between machines, so the directory may lie on a network
-volume.
+volume. SQLite has no checksums: each row carries its own.
 """
 
 from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
+
 _COLUMNS = (
     "id", "scene", "status", "message", "parameters", "scalars", "path", "created",
-    "cpu_seconds", "solver_source",
+    "cpu_seconds", "solver_source", "size", "modified",
 )  # fmt: skip
+_ALL = ", ".join((*_COLUMNS, "checksum"))
 _JSON = ("parameters", "scalars")
 _WAIT = 30.0
 """Seconds a connection waits for another one's lock."""
@@ -27,14 +31,19 @@ _WAIT = 30.0
 _TABLE = """runs (
     id TEXT PRIMARY KEY, scene TEXT NOT NULL, status TEXT NOT NULL, message TEXT NOT NULL,
     parameters TEXT NOT NULL, scalars TEXT NOT NULL, path TEXT NOT NULL, created TEXT NOT NULL,
-    cpu_seconds REAL, solver_source TEXT NOT NULL
+    cpu_seconds REAL, solver_source TEXT NOT NULL, size INTEGER, modified INTEGER,
+    checksum INTEGER NOT NULL
 )"""
+_INDICES = {"runs_by_time": "created, id", "runs_by_scene": "scene, status"}
 
 Row = dict[str, Any]
 
 
 class Catalogue:
     """Rows of runs in an SQLite file.
+
+    Every method raises `CatalogueDamaged` where the file is not what was written, `StoreFull` where
+    the disk is full, and `StoreBusy` where another process does not let go of the file.
 
     Parameters
     ----------
@@ -75,7 +84,8 @@ class Catalogue:
             (total,) = connection.execute(f"SELECT count(*) FROM runs {where}", values).fetchone()
             page = _select(
                 connection,
-                f"{where} ORDER BY created, id LIMIT ? OFFSET ?",
+                f"WHERE rowid IN (SELECT rowid FROM runs {where} ORDER BY created, id "
+                "LIMIT ? OFFSET ?) ORDER BY created, id",
                 [*values, limit, offset],
             )
         return page, total
@@ -101,8 +111,8 @@ class Catalogue:
 
     def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Insert or replace rows in one transaction."""
-        marks = ", ".join("?" for _ in _COLUMNS)
-        values = [[_stored(row, column) for column in _COLUMNS] for row in rows]
+        marks = ", ".join("?" for _ in (*_COLUMNS, "checksum"))
+        values = [_stored(row) for row in rows]
         with self._writing() as connection:
             connection.executemany(f"INSERT OR REPLACE INTO runs VALUES ({marks})", values)
 
@@ -116,43 +126,104 @@ class Catalogue:
         with self._reading() as connection:
             return {row[0] for row in connection.execute("SELECT id FROM runs")}
 
+    def stamps(self) -> dict[str, tuple[int | None, int | None]]:
+        """Return, by id, length and time of change [ns] of each run's file, as they were noted.
+
+        All there is is read and compared with its checksums: a damaged catalogue is found here.
+        """
+        with self._reading() as connection:
+            for (finding,) in connection.execute("PRAGMA integrity_check(1)"):
+                if finding != "ok":
+                    raise CatalogueDamaged(f"{self.path.name} is damaged: {finding}")
+            every = map(_values, connection.execute(f"SELECT {_ALL} FROM runs"))
+            return {values[0]: (values[-2], values[-1]) for values in every}
+
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
         """Give a connection that sees one state; nothing written yet is a table without rows."""
         there = self.path.exists()
         address = f"{self.path.resolve().as_uri()}?mode=rw" if there else ":memory:"
-        with _connection(address, "BEGIN") as connection:
-            tables = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'runs'")
-            if tables.fetchone() is None:
+        with self._connection(address, "BEGIN") as connection:
+            if not self._made(connection):
                 connection.execute(f"CREATE TEMP TABLE {_TABLE}")
             yield connection
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """Give a connection whose changes, the table itself included, come at once or never."""
-        with _connection(self.path.resolve().as_uri(), "BEGIN IMMEDIATE") as connection, connection:
-            connection.execute(f"CREATE TABLE IF NOT EXISTS {_TABLE}")
-            connection.execute("CREATE INDEX IF NOT EXISTS runs_by_scene ON runs (scene, status)")
+        address = self.path.resolve().as_uri()
+        with self._connection(address, "BEGIN IMMEDIATE") as connection, connection:
+            if not self._made(connection):
+                connection.execute(f"CREATE TABLE {_TABLE}")
+            for name, columns in _INDICES.items():
+                connection.execute(f"CREATE INDEX IF NOT EXISTS {name} ON runs ({columns})")
             yield connection
 
+    def _made(self, connection: sqlite3.Connection) -> bool:
+        """Tell whether there is a table, and refuse one that another version has made."""
+        found = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
+        if found and found[0] != f"CREATE TABLE {_TABLE}":
+            raise CatalogueDamaged(f"{self.path.name} has the columns of another version")
+        return bool(found)
 
-@contextmanager
-def _connection(address: str, begin: str) -> Iterator[sqlite3.Connection]:
-    connection = sqlite3.connect(address, uri=True, timeout=_WAIT, isolation_level=None)
-    with closing(connection):
-        connection.execute(begin)
-        yield connection
+    @contextmanager
+    def _connection(self, address: str, begin: str) -> Iterator[sqlite3.Connection]:
+        try:
+            connection = sqlite3.connect(address, uri=True, timeout=_WAIT, isolation_level=None)
+            with closing(connection):
+                connection.execute(begin)
+                yield connection
+        except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
+            raise  # not the file's doing
+        except (sqlite3.DatabaseError, _WrongRow) as error:
+            raise self._told(error) from error
+
+    def _told(self, error: Exception) -> Exception:
+        """Return an error of SQLite in our terms."""
+        reason = f"{self.path.name} cannot be used: {error}"
+        # A write past a quota or past the allowed size of a file is an I/O error to SQLite.
+        full = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE}
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)
+        if code in full:
+            return StoreFull(str(self.path.parent))
+        if code & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+            return StoreBusy(f"{reason}; another process holds it")
+        # A plain error is content that no statement of ours expects, such as text that is no JSON.
+        damaged = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR}
+        if code & 0xFF in damaged or self.path.is_dir():
+            return CatalogueDamaged(f"{reason}; it is made anew when a study is computed here")
+        return OSError(reason)
+
+
+class _WrongRow(ValueError):
+    """A row is not what was written."""
 
 
 def _select(connection: sqlite3.Connection, rest: str, values: list[Any]) -> list[Row]:
-    found = connection.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs {rest}", values)
-    return [_row(row) for row in found]
+    return [_row(row) for row in connection.execute(f"SELECT {_ALL} FROM runs {rest}", values)]
 
 
-def _stored(row: Mapping[str, Any], column: str) -> Any:
-    return json.dumps(row[column]) if column in _JSON else row[column]
+def _stored(row: Mapping[str, Any]) -> list[Any]:
+    """Return the values of a row as SQLite gives them back, and their checksum."""
+    seconds = row["cpu_seconds"]
+    plain = {"cpu_seconds": seconds if seconds is None else float(seconds)}
+    texts = {column: json.dumps(row[column]) for column in _JSON}
+    values = [(dict(row) | plain | texts).get(column) for column in _COLUMNS]
+    return [*values, _checksum(values)]
 
 
-def _row(values: tuple[Any, ...]) -> Row:
-    row = dict(zip(_COLUMNS, values, strict=True))
+def _row(stored: Sequence[Any]) -> Row:
+    row = dict(zip(_COLUMNS, _values(stored), strict=True))
     return row | {column: json.loads(row[column]) for column in _JSON}
+
+
+def _values(stored: Sequence[Any]) -> list[Any]:
+    """Return the values of a row that agree with their checksum."""
+    *values, checksum = stored
+    if _checksum(values) != checksum:
+        raise _WrongRow(f"the row of run {values[0]!r} is damaged")
+    return values
+
+
+def _checksum(values: Sequence[Any]) -> int:
+    return zlib.crc32(repr(values).encode("utf-8", "backslashreplace"))

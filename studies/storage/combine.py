@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,17 +17,37 @@ from solver.scenes import SCENES, Scene
 from studies.definition.cases import Case
 from studies.definition.parameters import parameters_of
 from studies.definition.study import Study
-from studies.definition.vocabulary import MISSING, STATUSES, SYMMETRIC
+from studies.definition.vocabulary import MISSING, OK, STATUSES, SYMMETRIC
+from studies.errors import RunUnreadable
 from studies.storage import dataset as layout
 from studies.storage.provenance import provenance, together, what_ran
+from studies.storage.room import Reservoir, needs_room
+from studies.storage.runfile import opened
 from studies.storage.store import Store, appearing
 
 SAME = 1e-9
 """Relative difference below which two runs are taken to have the same grid."""
 
 
-def combine(study: Study, store: Store, cases: Sequence[Case]) -> Path:
-    """Write the combined data set of `study` and return its path.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Combined:
+    """What the data set of a study holds.
+
+    Attributes
+    ----------
+    path : the data set
+    counts, failed : as those of a `StudyOutcome`
+    missing : ids of the runs that it lacks
+    """
+
+    path: Path
+    counts: Mapping[str, int]
+    failed: Sequence[tuple[str, str, str]]
+    missing: Sequence[str]
+
+
+def combine(study: Study, store: Store, cases: Sequence[Case]) -> Combined:
+    """Write the combined data set of `study`, and return what it holds.
 
     Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is
     no dimension but a coordinate over the labels of that axis. Runs are matched by
@@ -39,31 +60,52 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> Path:
     tell what ran to compute the runs, which may have been elsewhere, and whether all runs are one
     half of symmetric bodies.
     """
+    while True:
+        found = [case for case in cases if store.run_path(case.id).exists()]
+        try:
+            return _combined(study, store, cases, found)
+        except RunUnreadable as error:  # what it left in the data set must go: from the beginning
+            store.set_aside(error)
+
+
+def _combined(study: Study, store: Store, cases: Sequence[Case], found: Sequence[Case]) -> Combined:
     scene = SCENES[study.scene]
     target = store.dataset_path(study.id)
-    found = [case for case in cases if store.run_path(case.id).exists()]
     axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
     frame = _Frame(axes=axes, usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
     halves: set[int] = set()
     for case in found:
-        with h5py.File(store.run_path(case.id), "r") as run:
+        with opened(store.run_path(case.id)) as run:
             frame.learn(run)
             ran.add(what_ran(run.attrs))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))
     attributes = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
     symmetric = {SYMMETRIC: int(halves == {1})}
-    with appearing(target) as part, h5netcdf.File(part, "w") as file:
-        file.attrs.update(attributes | symmetric)
-        frame.create_axes(file, scene)
-        frame.create_fields(file)
-        for case in found:
-            with h5py.File(store.run_path(case.id), "r") as run:
+    outcomes: dict[str, tuple[str, str]] = {}
+    store.clear_directory(target)
+    with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
+        with h5netcdf.File(disk, "w") as file:
+            file.attrs.update(attributes | symmetric)
+            frame.create_axes(file, scene)
+            frame.create_fields(file)
+            for case in found:
                 place = dict(zip(study.axes, case.index, strict=True))
-                frame.place(file, run, tuple(place.get(name, 0) for name in axes))
-        frame.write_small(file)
-    return target
+                at = tuple(place.get(name, 0) for name in axes)
+                with opened(store.run_path(case.id)) as run:
+                    frame.place(file, run, at)
+                    code, message = (frame.small[name][0][at] for name in ("status", "message"))
+                    outcomes[case.id] = STATUSES[code], str(message)
+                disk.check()
+            frame.write_small(file)
+        disk.check()
+    return Combined(
+        path=target,
+        counts=dict(Counter(outcomes.get(case.id, (MISSING, ""))[0] for case in cases)),
+        failed=[(run_id, *each) for run_id, each in outcomes.items() if each[0] != OK],
+        missing=[case.id for case in cases if case.id not in outcomes],
+    )
 
 
 def _axes(study: Study, scene: Scene) -> dict[str, list[Any]]:
@@ -173,6 +215,7 @@ class _Frame:
                 compression="gzip",
                 compression_opts=1,
                 shuffle=True,
+                fletcher32=True,
             )
             variable.attrs.update(attributes | self.auxiliary)
 
@@ -236,6 +279,7 @@ def _write(
         tuple(dimensions),
         dtype=h5py.string_dtype() if text else values.dtype,
         fillvalue=None if text or complete else _absent(name, values.dtype),
+        fletcher32=bool(dimensions) and not text,
     )
     variable[...] = values
     variable.attrs.update(attributes)

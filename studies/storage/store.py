@@ -5,41 +5,57 @@ runs/<run id>.nc              one file a run, shared by all studies
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 catalogue.sqlite              made anew from the files when it is missing or damaged
+unreadable/                   files that were damaged or in a wrong place
 ```
-A file appears under its name only when it is complete.
+A file appears under its name only when it is complete. The file of a run is believed as long as
+its checksum is right and its id is its name; it is verified in full when a study relies on it, and
+when its length or time of change is not what the catalogue noted.
 """
 
 from __future__ import annotations
 
 import fcntl
+import itertools
 import json
+import logging
 import os
-import sqlite3
+import tempfile
 import uuid
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import h5py
 import xarray as xr
 
 from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.errors import StoreBusy, StudyError
+from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, StudyError
 from studies.storage import dataset as layout
-from studies.storage.catalogue import Catalogue
+from studies.storage import runfile
+from studies.storage.catalogue import Catalogue, Row
+from studies.storage.room import needs_room
 
 ENGINE: Literal["h5netcdf"] = "h5netcdf"
 """netCDF backend of every file read or written here; safe with several threads."""
 
 
+_BATCH = 500
+"""Runs that are verified before their rows are put."""
+
+_LOG = logging.getLogger("studies")
+
+
 class Store:
     """Results under one directory.
+
+    Whatever writes raises `StoreFull` where the disk is full, and `StudyError` where the directory
+    does not let itself be written to.
 
     Parameters
     ----------
     directory : made by the first write
+    held : whether the caller holds the writer's lock for us, as the service does for its children
     """
 
     def __init__(self, directory: Path | str, held: bool = False) -> None:
@@ -62,34 +78,79 @@ class Store:
     def save_study(self, study: Study) -> Path:
         """Keep what the study asks for, and return its directory."""
         directory = self.study_directory(study.id)
-        if not (directory / "study.json").exists():
-            directory.mkdir(parents=True, exist_ok=True)
-            with appearing(directory / "study.json") as part:
-                part.write_text(json.dumps(study.to_dict(), indent=2) + "\n", encoding="utf-8")
+        path = directory / "study.json"
+        if not _holds_json(path):
+            with self._writable():
+                directory.mkdir(parents=True, exist_ok=True)
+                self.clear_directory(path)
+                with appearing(path) as part:
+                    part.write_text(json.dumps(study.to_dict(), indent=2) + "\n", encoding="utf-8")
         return directory
 
-    def write_run(self, run: xr.Dataset) -> dict[str, Any]:
+    def write_run(self, run: xr.Dataset) -> Row:
         """Write the file of one run, and return its row for the catalogue."""
         path = self.run_path(run.attrs["id"])
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with appearing(path) as part:
-            run.to_netcdf(part, engine=ENGINE, encoding=layout.encoding(run))
-        return layout.summary(run.attrs, layout.singles(run))
+        content = runfile.sealed(run)
+        with self._writable():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with appearing(path) as part:
+                part.write_bytes(content)
+            return layout.summary(run.attrs, layout.singles(run)) | runfile.stamp(path)
 
-    def read_row(self, run_id: str) -> dict[str, Any]:
+    def read_row(self, run_id: str) -> Row:
         """Return the catalogue's row of a run, read from its file.
 
-        h5py reads the few values needed; xarray would take fifty times as long.
+        Raises
+        ------
+        RunUnreadable
+            when there is no file, or not what was written under this name
         """
-        with h5py.File(self.run_path(run_id), "r") as run:
-            rank = run["status"].ndim
-            wanted = {name: each for name, each in run.items() if each.ndim == rank}
-            values = {
-                name: (each.asstr() if each.dtype.kind == "O" else each)[...].item()
-                for name, each in wanted.items()
-                if not each.is_scale
-            }
-            return layout.summary(run.attrs, values)
+        return runfile.row(self.run_path(run_id))
+
+    def found(self, run_id: str) -> Row | None:
+        """Return the row of a run as its file has it; a file that cannot be read is set aside."""
+        try:
+            return self.read_row(run_id)
+        except RunUnreadable as error:
+            self.set_aside(error)
+            return None
+
+    def sound(self, run_ids: Iterable[str]) -> dict[str, Row]:
+        """Return, by id, the rows of the runs whose file is there and as it was written.
+
+        Every file is verified in full; the others are set aside. The catalogue follows the files.
+        """
+        wanted = list(run_ids)
+        known = self.catalogue.rows(wanted)
+        found = {run_id: self._verified(run_id, known.get(run_id)) for run_id in wanted}
+        rows = {run_id: row for run_id, row in found.items() if row is not None}
+        if gone := known.keys() - rows.keys():
+            self.catalogue.remove(gone)
+        if fresh := [row for run_id, row in rows.items() if row is not known.get(run_id)]:
+            self.catalogue.put(fresh)
+        return rows
+
+    def _verified(self, run_id: str, row: Row | None) -> Row | None:
+        """Return the row of a run, the one given where the file is still that one."""
+        path = self.run_path(run_id)
+        try:
+            sealed = runfile.verify(path)
+        except RunUnreadable as error:
+            self.set_aside(error)
+            return None
+        same = row is not None and row | runfile.stamp(path) == row
+        return row if sealed and same else self.found(run_id)
+
+    def set_aside(self, error: RunUnreadable) -> None:
+        """Move a file that cannot be read out of the way, so that the run is computed again."""
+        path = self.run_path(error.run_id)
+        if path.exists():
+            self._move(path, f"{error.reason}; the run will be computed again")
+
+    def modified(self, run_ids: Iterable[str]) -> dict[str, int]:
+        """Return, by id, the time of change [ns] of those runs' files that are there."""
+        paths = {run_id: self.run_path(run_id) for run_id in run_ids}
+        return {run_id: path.stat().st_mtime_ns for run_id, path in paths.items() if path.exists()}
 
     def discard(self, run_ids: Collection[str]) -> None:
         """Delete runs that shall be computed again."""
@@ -97,23 +158,35 @@ class Store:
             self.run_path(run_id).unlink(missing_ok=True)
         self.catalogue.remove(run_ids)
 
+    def delete_run(self, run_id: str) -> None:
+        """Delete a run: its file and its row."""
+        self.discard([run_id])
+
     def reconcile(self) -> None:
         """Bring the catalogue into line with the files that exist and can be read."""
         try:
-            known = self.catalogue.ids()
-        except sqlite3.OperationalError:  # such as a locked file, which is not damaged
-            raise
-        except sqlite3.DatabaseError:
+            known = self.catalogue.stamps()
+        except CatalogueDamaged as error:
             for damaged in self.directory.glob(f"{self.catalogue.path.name}*"):  # and its journal
-                damaged.unlink()
-            known = set()
-        found = self._files()
-        self.catalogue.remove(known - found)
-        self.catalogue.put(self.read_row(run_id) for run_id in found - known)
+                self.clear_directory(damaged)
+                damaged.unlink(missing_ok=True)
+            _LOG.warning("%s", error)
+            known = {}
+        there = {
+            path.stem: tuple(runfile.stamp(path).values())
+            for path in (self.directory / "runs").glob("*.nc")
+            if is_id(path.stem)
+        }
+        self.catalogue.remove(known.keys() - there.keys())
+        changed = iter([run_id for run_id, state in there.items() if known.get(run_id) != state])
+        while batch := list(itertools.islice(changed, _BATCH)):
+            self.sound(batch)
 
     @contextmanager
     def writing(self) -> Iterator[None]:
         """Hold the directory as its only writer; delete the unfinished files of killed writers.
+
+        A store whose lock the caller holds (`held`) takes it as it is.
 
         Raises
         ------
@@ -125,12 +198,12 @@ class Store:
         if self.held:
             yield
             return
-        try:
-            (self.directory / "runs").mkdir(parents=True, exist_ok=True)
+        with self._writable():
+            for name in ("runs", "studies"):
+                (self.directory / name).mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=self.directory / name):
+                    pass  # a directory may be there and yet refuse files
             holding = (self.directory / ".lock").open("w")
-        except OSError as error:
-            allowed = f"must be a directory to write in ({error.strerror})"
-            raise StudyError("directory", str(self.directory), allowed) from None
         with holding as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -144,10 +217,31 @@ class Store:
             self.reconcile()
             yield
 
-    def _files(self) -> set[str]:
-        """Return the ids of all runs whose file can be read."""
-        found = (self.directory / "runs").glob("*.nc")
-        return {path.stem for path in found if is_id(path.stem) and _opens(path)}
+    @contextmanager
+    def _writable(self) -> Iterator[None]:
+        """Say in our terms, with the directory as it was given, why nothing can be written."""
+        try:
+            with needs_room(self.directory):
+                yield
+        except OSError as error:
+            allowed = f"must be a directory to write in ({error.strerror})"
+            raise StudyError("directory", str(self.directory), allowed) from None
+
+    def clear_directory(self, path: Path) -> None:
+        """Set a directory aside that stands in the place of a file."""
+        if path.is_dir():
+            self._move(path, "it is a directory in the place of a file")
+
+    def _move(self, path: Path, reason: str) -> None:
+        """Move what is in the way to ``unreadable/``, and say so in one line."""
+        target = self.directory / "unreadable" / path.name
+        with self._writable():
+            target.parent.mkdir(exist_ok=True)
+            if target.exists():
+                target = target.with_name(f"{path.name}.{uuid.uuid4().hex}")
+            path.rename(target)
+        here, there = (each.relative_to(self.directory) for each in (path, target))
+        _LOG.warning("%s cannot be read and is now %s: %s", here, there, reason)
 
 
 @contextmanager
@@ -163,13 +257,12 @@ def appearing(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def _opens(path: Path) -> bool:
-    """Tell whether a file is complete, as far as its head and its length tell."""
+def _holds_json(path: Path) -> bool:
     try:
-        with h5py.File(path, "r"):
-            return True
-    except OSError:
+        json.loads(path.read_bytes())
+    except (OSError, ValueError):
         return False
+    return True
 
 
 def _checked(content_id: str) -> str:

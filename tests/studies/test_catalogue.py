@@ -5,13 +5,16 @@ from __future__ import annotations
 import sqlite3
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from studies import CatalogueDamaged
 from studies.storage.catalogue import Catalogue
 
 KILLED_WRITER = """
@@ -20,8 +23,8 @@ connection = sqlite3.connect(sys.argv[1])
 connection.execute("PRAGMA cache_size = 1")
 connection.execute("BEGIN")
 for number in range(1000):
-    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, ""]
-    connection.execute("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, "", 0, 0, 0]
+    connection.execute(f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 13)})", row)
 os.kill(os.getpid(), 9)
 """
 """Fills so many pages that some reach the file before the transaction has ended."""
@@ -31,7 +34,7 @@ def row(run_id: str) -> dict[str, Any]:
     return {
         "id": run_id, "scene": "fake", "status": "ok", "message": "", "parameters": {},
         "scalars": {"increments": 7}, "path": "", "created": "", "cpu_seconds": 0.0,
-        "solver_source": "",
+        "solver_source": "", "size": 1, "modified": 2,
     }  # fmt: skip
 
 
@@ -127,5 +130,26 @@ def test_readers_of_the_very_first_write_see_all_of_it_or_nothing(tmp_path: Path
 
 def test_what_is_no_catalogue_is_named_as_such(catalogue: Catalogue) -> None:
     catalogue.path.write_text("something else, and long enough to be a page of a database" * 20)
-    with pytest.raises(sqlite3.DatabaseError, match="not a database"):
+    with pytest.raises(CatalogueDamaged, match=r"catalogue\.sqlite .* not a database"):
         catalogue.ids()
+
+
+def test_the_last_page_of_a_hundred_thousand_runs_costs_no_more_than_a_fifth_of_a_second(
+    catalogue: Catalogue,
+) -> None:
+    catalogue.put(row(f"{i:032x}") | {"created": f"{i % 977:05}"} for i in range(100_000))
+    started = time.process_time()
+    rows, total = catalogue.runs(limit=100, offset=99_900)
+    assert time.process_time() - started < 0.2
+    assert total == 100_000
+    assert [each["created"] for each in rows] == ["00976"] * 100
+    assert len(catalogue.rows(f"{i:032x}" for i in range(0, 100_000, 5))) == 20_000
+
+
+def test_a_row_that_is_not_what_was_written_is_damage(catalogue: Catalogue) -> None:
+    catalogue.put([row("0")])
+    with closing(sqlite3.connect(catalogue.path)) as connection, connection:
+        connection.execute("UPDATE runs SET scalars = replace(scalars, '7', '8')")
+    for read in (*READERS.values(), Catalogue.stamps):
+        with pytest.raises(CatalogueDamaged, match="row of run '0' is damaged"):
+            read(catalogue)

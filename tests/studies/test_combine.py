@@ -53,7 +53,7 @@ def test_a_study_is_of_symmetric_bodies_where_all_its_runs_are(
         given = replace(record(case.parameters), symmetric=bool(half))
         store.write_run(run_dataset(FAKE, case, given))
     store.save_study(study)
-    with open_netcdf(combine(study, store, cases)) as together:
+    with open_netcdf(combine(study, store, cases).path) as together:
         assert together.attrs["symmetric"] == told
 
 
@@ -71,10 +71,10 @@ def test_what_ran_is_told_of_all_runs_though_others_combine_them(
         store.write_run(run_dataset(FAKE, case, record(case.parameters)))
     monkeypatch.undo()
     store.save_study(study)
-    with open_netcdf(combine(study, store, cases[:1])) as one:
+    with open_netcdf(combine(study, store, cases[:1]).path) as one:
         assert json.loads(one.attrs["versions"]) == {"numpy": "1.0"}
         assert one.attrs["linear_solver"] == "superlu"
-    with open_netcdf(combine(study, store, cases)) as all_:
+    with open_netcdf(combine(study, store, cases).path) as all_:
         assert json.loads(all_.attrs["versions"]) == {"numpy": "1.0, 2.0"}
         assert all_.attrs["linear_solver"] == "pardiso, superlu"
 

@@ -1,0 +1,126 @@
+"""The file of a run: its last line is a checksum of the whole, which every reading looks at first.
+
+The line follows the end that HDF5 knows, so that every netCDF reader opens the file as any other.
+It covers each byte and the id. HDF5's own checksums, which the arrays have too, leave names,
+attributes and texts uncovered, and HDF5 may end the process when it reads damaged ones.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import h5py
+import xarray as xr
+from xarray.backends import H5NetCDFStore
+
+from studies.errors import RunUnreadable, StoreFull
+from studies.storage import dataset as layout
+
+SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
+"""Attribute of a file that has the line; a file without either is older, and has no checksum."""
+
+_LINE = re.compile(rb"\nrun ([0-9a-f]{32}) sha256 ([0-9a-f]{64})\n")
+_LENGTH = 110
+_DIGEST = 65
+"""Bytes of the whole line, and of what it does not cover itself."""
+_NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
+
+
+def sealed(run: xr.Dataset) -> bytes:
+    """Return what to write of a run: its netCDF, and the last line."""
+    begun = _packed(run) + f"\nrun {run.attrs['id']} sha256 ".encode()
+    return begun + hashlib.sha256(begun).hexdigest().encode() + b"\n"
+
+
+def _packed(run: xr.Dataset) -> bytes:
+    """Return a run as netCDF, made in memory: HDF5 does not survive a full disk.
+
+    xarray would lock the file across all workers, although nobody else can see it.
+    """
+    memory = io.BytesIO()
+    with h5netcdf.File(memory, "w") as file:
+        run.assign_attrs(SEALED).dump_to_store(
+            H5NetCDFStore(file, lock=False), encoding=layout.encoding(run)
+        )
+    return memory.getvalue()
+
+
+def verify(path: Path) -> bool:
+    """Tell whether a checksum vouches for the file, which an older file lacks.
+
+    Raises
+    ------
+    RunUnreadable
+        when it is not what was written under this name
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        if error.errno not in _NO_FILE:
+            raise
+        raise RunUnreadable(path.stem, str(error.strerror)) from None
+    line = _LINE.fullmatch(content, max(len(content) - _LENGTH, 0))
+    if line is None:
+        if SEALED["checksum"].encode() in content:
+            raise RunUnreadable(path.stem, "its end is damaged")
+        return False
+    whole = hashlib.sha256(memoryview(content)[:-_DIGEST]).hexdigest()
+    if whole.encode() != line[2]:
+        raise RunUnreadable(path.stem, "its checksum is wrong")
+    _compare(line[1].decode(), path)
+    return True
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[h5py.File]:
+    """Give the file of a run, verified and open.
+
+    What goes wrong while a file without checksum is read is taken for damage of that file. What
+    goes wrong with a sound one is not.
+    """
+    vouched = verify(path)
+    try:
+        with h5py.File(path, "r") as run:
+            _compare(run.attrs["id"], path)
+            yield run
+    except (MemoryError, RunUnreadable, StoreFull):
+        raise
+    except Exception as error:  # h5py knows no error of its own: OSError, KeyError, RuntimeError …
+        if vouched:
+            raise
+        raise RunUnreadable(path.stem, f"{type(error).__name__}: {error}") from None
+
+
+def stamp(path: Path) -> dict[str, int]:
+    """Return length and time of change [ns] of a file, by which the catalogue knows it again."""
+    state = path.stat()
+    return {"size": state.st_size, "modified": state.st_mtime_ns}
+
+
+def row(path: Path) -> dict[str, Any]:
+    """Return the catalogue's row of a run, read from its file.
+
+    h5py reads the few values needed; xarray would take fifty times as long.
+    """
+    with opened(path) as run:
+        rank = run["status"].ndim
+        wanted = {name: each for name, each in run.items() if each.ndim == rank}
+        values = {
+            name: (each.asstr() if each.dtype.kind == "O" else each)[...].item()
+            for name, each in wanted.items()
+            if not each.is_scale
+        }
+        return layout.summary(run.attrs, values) | stamp(path)
+
+
+def _compare(run_id: str, path: Path) -> None:
+    if run_id != path.stem:
+        raise RunUnreadable(path.stem, f"it is the run {run_id}")

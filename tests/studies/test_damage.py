@@ -1,0 +1,300 @@
+"""What is damaged is noticed, told in one line, set aside and computed again."""
+
+from __future__ import annotations
+
+import logging
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies import (
+    CatalogueDamaged,
+    RunUnreadable,
+    Store,
+    Study,
+    open_study,
+    run_study,
+)
+from studies.storage.combine import combine
+from studies.storage.dataset import run_dataset
+from tests.studies.conftest import compute_here, fake_study
+from tests.studies.fakes import FAKE, record
+
+ComputedStudy = tuple[Study, Store]
+
+
+@pytest.fixture
+def damaged(computed: ComputedStudy, tmp_path: Path) -> ComputedStudy:
+    """A copy of a computed study, to be damaged."""
+    study, source = computed
+    return study, Store(shutil.copytree(source.directory, tmp_path / "copy"))
+
+
+def first(study: Study) -> str:
+    return next(study.cases()).id
+
+
+def repeat(study: Study, store: Store, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Run a study again with the tasks done in this process; return what was computed."""
+
+    def compute(work: object, workers: int, scheduler: object, stop: object) -> None:
+        for path in map(work._rest, study.paths()):
+            if path.cases:
+                work._keep(path.id, walk(work._task(FAKE, path), lambda _: None, lambda: False))
+
+    from studies.execution.task import walk
+
+    monkeypatch.setattr("studies.execution.run._Work.compute", compute)
+    outcome = run_study(study, store)
+    assert outcome.counts == {"ok": study.size}
+    assert outcome.ok
+    return list(outcome.computed)
+
+
+def true_numbers(study: Study, store: Store) -> None:
+    """Assert that the data set holds what the scene gives."""
+    with open_study(store.dataset_path(study.id)) as together:
+        for case in study.cases():
+            at = {name: case.values[name] for name in ("load_ratio", "friction")}
+            found = together["peak_residual_tension"].sel(at).item()
+            assert found == record(case.parameters).scalars["peak_residual_tension"]
+
+
+def test_no_flipped_byte_of_a_run_goes_unnoticed(damaged: ComputedStudy) -> None:
+    study, store = damaged
+    path = store.run_path(first(study))
+    whole = path.read_bytes()
+    draw = random.Random(5)
+    for at in [*draw.sample(range(len(whole)), 200), *range(len(whole) - 120, len(whole))]:
+        flipped = bytearray(whole)
+        flipped[at] ^= draw.randrange(1, 256)
+        path.write_bytes(flipped)
+        with pytest.raises(RunUnreadable, match=path.stem):
+            store.read_row(path.stem)
+    path.write_bytes(whole)
+    assert store.read_row(path.stem)["status"] == "ok"
+
+
+def flip(study: Study, store: Store) -> None:
+    path = store.run_path(first(study))
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def swap(study: Study, store: Store) -> None:
+    one, *_, other = (store.run_path(case.id) for case in study.cases())
+    shutil.copyfile(other, one)
+
+
+def foreign(study: Study, store: Store) -> None:
+    path = store.run_path(first(study))
+    xr.Dataset({"a": ("b", np.zeros(3))}, attrs={"id": path.stem}).to_netcdf(path)
+
+
+def cut(study: Study, store: Store) -> None:
+    path = store.run_path(first(study))
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def empty(study: Study, store: Store) -> None:
+    store.run_path(first(study)).write_bytes(b"")
+
+
+def directory(study: Study, store: Store) -> None:
+    store.run_path(first(study)).unlink()
+    store.run_path(first(study)).mkdir()
+
+
+@pytest.mark.parametrize("damage", [flip, swap, foreign, cut, empty, directory])
+@pytest.mark.parametrize("quietly", [False, True], ids=["", "same-length-and-time"])
+def test_a_damaged_run_is_told_set_aside_and_computed_again(
+    damaged: ComputedStudy,
+    damage: Callable[[Study, Store], None],
+    quietly: bool,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    study, store = damaged
+    damage(study, store)
+    if quietly:  # as the disk damages it; the catalogue notices no change
+        row = store.catalogue.run(first(study))
+        assert row is not None
+        state = store.run_path(first(study)).stat()
+        store.catalogue.put([row | {"size": state.st_size, "modified": state.st_mtime_ns}])
+    with caplog.at_level(logging.WARNING, "studies"):
+        assert repeat(study, store, monkeypatch) == [first(study)]
+    (line,) = caplog.messages
+    assert f"runs/{first(study)}.nc cannot be read and is now unreadable/" in line
+    assert str(store.directory) not in line
+    assert (store.directory / "unreadable" / f"{first(study)}.nc").exists()
+    true_numbers(study, store)
+    caplog.clear()
+    assert repeat(study, store, monkeypatch) == []
+    assert caplog.messages == []
+
+
+def test_a_run_damaged_in_mid_study_is_missing_and_computed_by_the_next_repeat(
+    damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = damaged
+    flip(study, store)
+    combined = combine(study, store, list(study.cases()))
+    assert combined.counts == {"missing": 1, "ok": 3}
+    assert combined.missing == [first(study)]
+    assert combined.failed == []
+    assert repeat(study, store, monkeypatch) == [first(study)]
+
+
+def test_rows_without_files_are_missing(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers that see another directory report runs that are not here."""
+    study = fake_study()
+    elsewhere = Store(store.directory.parent / "elsewhere")
+    rows = [
+        elsewhere.write_run(run_dataset(FAKE, case, record(case.parameters)))
+        for case in study.cases()
+    ]
+    monkeypatch.setattr(
+        "studies.execution.run._Work.compute", lambda work, *_: work._keep("path", rows)
+    )
+    outcome = run_study(study, store)
+    assert outcome.counts == {"missing": 4}
+    assert not outcome.ok
+    assert store.catalogue.ids() == set()
+
+
+def test_a_file_deleted_in_mid_study_is_missing(
+    damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = damaged
+    failed = store.catalogue.run(first(study))
+    assert failed is not None
+    store.catalogue.put([failed | {"status": "error"}])  # so that there is something to compute
+    last = list(study.cases())[-1].id
+    monkeypatch.setattr(
+        "studies.execution.run._Work.compute", lambda *_: store.run_path(last).unlink()
+    )
+    outcome = run_study(study, store)
+    assert outcome.counts == {"ok": 3, "missing": 1}
+    assert not outcome.ok
+
+
+def test_an_older_file_without_checksum_is_read(damaged: ComputedStudy) -> None:
+    study, store = damaged
+    path = store.run_path(first(study))
+    case = next(study.cases())
+    older = run_dataset(FAKE, case, record(case.parameters))
+    older.to_netcdf(path, engine="h5netcdf")
+    store.reconcile()
+    assert store.catalogue.ids() == {case.id for case in study.cases()}
+    assert combine(study, store, list(study.cases())).counts == {"ok": 4}
+
+
+def test_numbers_have_checksums_that_every_reader_verifies(computed: ComputedStudy) -> None:
+    study, store = computed
+    for path in (store.run_path(first(study)), store.dataset_path(study.id)):
+        with netCDF4.Dataset(path) as file:
+            numbers = [
+                variable for name, variable in file.variables.items() if variable.dtype is not str
+            ]
+            assert {variable.filters()["fletcher32"] for variable in numbers} == {True}
+
+
+def other_page(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[4096:8192] = bytes(range(256)) * 16
+    path.write_bytes(content)
+
+
+def other_text(path: Path) -> None:
+    content = path.read_bytes()
+    assert content.count(b'"friction": 0.4') >= 1
+    path.write_bytes(content.replace(b'"friction": 0.4', b'"friction": 0.5'))
+
+
+def other_columns(path: Path) -> None:
+    import sqlite3
+
+    path.unlink()
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE TABLE runs (id TEXT PRIMARY KEY, colour TEXT)")
+    connection.close()
+
+
+def a_directory(path: Path) -> None:
+    path.unlink()
+    (path / "inside").mkdir(parents=True)
+
+
+def half(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+@pytest.mark.parametrize("damage", [other_page, other_text, other_columns, a_directory, half])
+def test_a_damaged_catalogue_is_named_and_made_anew_from_the_files(
+    damaged: ComputedStudy, damage: Callable[[Path], None], caplog: pytest.LogCaptureFixture
+) -> None:
+    _, store = damaged
+    before = store.catalogue.runs()
+    damage(store.catalogue.path)
+    with pytest.raises(CatalogueDamaged, match=r"catalogue\.sqlite") as told:
+        store.catalogue.runs()
+        store.catalogue.stamps()
+    assert str(store.directory) not in str(told.value)
+    with store.writing():
+        assert store.catalogue.runs() == before
+    assert [line for line in caplog.messages if "catalogue.sqlite" in line]
+    kept = store.directory / "unreadable" / "catalogue.sqlite" / "inside"
+    assert kept.exists() == (damage is a_directory)
+
+
+@pytest.mark.parametrize("name", ["dataset.nc", "study.json"])
+@pytest.mark.parametrize("in_its_place", [b"", b"neither netCDF nor JSON", None])
+def test_a_damaged_file_of_a_study_is_written_anew(
+    damaged: ComputedStudy, name: str, in_its_place: bytes | None
+) -> None:
+    study, store = damaged
+    path = store.study_directory(study.id) / name
+    before = path.read_bytes()
+    path.unlink()
+    if in_its_place is None:
+        path.mkdir()
+    else:
+        path.write_bytes(in_its_place)
+    assert run_study(study, store).ok
+    if name == "study.json":
+        assert path.read_bytes() == before
+    true_numbers(study, store)
+
+
+def test_a_run_that_is_deleted_is_gone_with_its_row(damaged: ComputedStudy) -> None:
+    study, store = damaged
+    store.delete_run(first(study))
+    assert not store.run_path(first(study)).exists()
+    assert store.catalogue.run(first(study)) is None
+    assert store.catalogue.runs()[1] == 3
+
+
+def test_a_repeat_that_stops_leaves_failed_runs_and_the_data_set_as_they_were(
+    store: Store,
+) -> None:
+    study = fake_study(trouble="limit", sweep={"load_ratio": [0.3, 0.9]})
+    compute_here(study, store)
+    seen: list[bytes] = []
+    before = store.dataset_path(study.id).read_bytes()
+
+    def stop() -> bool:
+        seen.append(store.dataset_path(study.id).read_bytes())
+        return True
+
+    outcome = run_study(study, store, workers=1, should_stop=stop)
+    assert outcome.stopped
+    assert set(seen) == {before}
+    assert outcome.counts == {"ok": 1, "limit_load": 1}, outcome.failed
+    assert [message for *_, message in outcome.failed] == ["flows at 0.75"]
