@@ -97,6 +97,10 @@ FORM = (
 """Modules of this package that lay records out: names, units, dimensions, attributes."""
 
 
+NO_NUMBERS = frozenset({"effort"})
+"""Functions of a scene that no number of a run comes from."""
+
+
 @cache
 def solver_hash() -> str:
     """Return the digest of all that decides what a run's file holds, but for its words.
@@ -116,13 +120,16 @@ def solver_hash() -> str:
 def written(scene: Scene) -> list[list[str]]:
     """Return what a scene is put together of, for `content_id`.
 
-    These are the names of its parameters and functions, each with the digest of the module that it
-    is written in, where this is none of the solver's. Of a script counts what workers see of it:
-    not what stands under ``if __name__ == "__main__":``. What the module imports does not count,
-    and code without a file, such as a cell of a notebook, has no digest.
+    These are the names of its parameters and of its functions that make numbers, each with the
+    digest of the module that it is written in, where this is none of the solver's. Of a script
+    counts what workers see of it: not what stands under ``if __name__ == "__main__":``. What the
+    module imports does not count, and code without a file, such as a cell of a notebook, has no
+    digest.
     """
     given: list[Any] = [type(scene)]
     for item in fields(scene):
+        if item.name in NO_NUMBERS:
+            continue
         value = getattr(scene, item.name)
         given += value if isinstance(value, tuple) else [value]
     called = [getattr(each, "func", each) for each in given if callable(each)]

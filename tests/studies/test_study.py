@@ -166,7 +166,7 @@ def test_memory_does_not_grow_with_the_number_of_runs() -> None:
     passed(many(20))  # what is kept for all studies of the scene
     axis = peak(lambda: Study.known(many(4000)).size)  # what each value of an axis sets is held
     assert axis < 200_000
-    assert peak(lambda: passed(many(4000))) < axis + 1_000_000  # 4000 cases would be 6 MB
+    assert peak(lambda: passed(many(4000))) < axis + 1_000_000  # 4000 cases would be 3 MB
 
 
 def test_20_000_runs_are_checked_and_named_in_a_second() -> None:
