@@ -15,17 +15,21 @@ if TYPE_CHECKING:
     from studies.definition.cases import Case, LoadingPath
     from studies.definition.parameters import scene_schema
     from studies.definition.study import Study
+    from studies.execution.estimate import Bounds, Estimate, estimate
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
     from studies.views.reading import open_netcdf, open_study
 
 _HOMES = {
+    "Bounds": "execution.estimate",
     "Case": "definition.cases",
+    "Estimate": "execution.estimate",
     "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
     "StudyEvent": "execution.run",
     "StudyOutcome": "execution.run",
+    "estimate": "execution.estimate",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "run_study": "execution.run",
@@ -36,7 +40,9 @@ _RENAMED = {"Path": "LoadingPath"}
 """Old public names that still work, and their new ones."""
 
 __all__ = [
+    "Bounds",
     "Case",
+    "Estimate",
     "GridLost",
     "LoadingPath",
     "Store",
@@ -45,6 +51,7 @@ __all__ = [
     "StudyError",
     "StudyEvent",
     "StudyOutcome",
+    "estimate",
     "open_netcdf",
     "open_study",
     "run_study",

@@ -63,6 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one a core)")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
+    one.add_argument("--dry-run", action="store_true", help="tell what it would cost, and end")
 
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")

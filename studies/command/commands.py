@@ -21,18 +21,24 @@ SHOWN = 100
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
+    from studies.command.cost import dry_run, long_run
     from studies.command.progress import Progress
     from studies.execution.run import run_study
     from studies.storage.store import Store
     from studies.views.reading import open_study
     from studies.views.tables import messages, runs_table
 
-    study = Study.from_toml(options.study)
+    study, store = Study.from_toml(options.study), Store(options.out)
+    if options.dry_run:
+        print(dry_run(study, store))
+        return OK
+    if warning := long_run(study, store):
+        print(warning, file=sys.stderr)
     progress = Progress(study)
     with _interruption() as interrupted:
         outcome = run_study(
             study,
-            Store(options.out),
+            store,
             workers=options.workers,
             scheduler=options.scheduler,
             resume=options.resume,
