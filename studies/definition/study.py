@@ -65,16 +65,14 @@ class Study(BaseModel):
 
         All combinations of the sweep are gone through once; none is kept.
         """
-        study = cls.known(content)
-        study.expansion.check()
-        return study
+        return cls.known(content).checked()
 
     @classmethod
     def known(cls, content: Mapping[str, Any]) -> Self:
         """Return the study without going through its combinations; the rest is checked.
 
         This is for content that `from_dict` has accepted before, and for looking at the size of a
-        study before `Expansion.check` goes through it.
+        study before `checked` goes through it.
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
@@ -87,6 +85,17 @@ class Study(BaseModel):
                 raise cause from None
             field = ".".join(str(part) for part in first["loc"])
             raise StudyError(field, first["input"], first["msg"]) from None
+
+    def checked(self) -> Self:
+        """Return the study after a pass through its combinations, each of which the scene takes.
+
+        Raises
+        ------
+        StudyError
+            for the first one that the scene refuses
+        """
+        self.expansion.check()
+        return self
 
     @model_validator(mode="before")
     @classmethod
