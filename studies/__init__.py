@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from studies.definition.parameters import scene_schema
     from studies.definition.study import Study
     from studies.execution.cluster import Access, own_workers
+    from studies.execution.estimate import Bounds, Estimate, estimate
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
@@ -32,11 +33,14 @@ _HOMES = {
     "Access": "execution.cluster",
     "Case": "definition.cases",
     "Limits": "execution.limits",
+    "Bounds": "execution.estimate",
+    "Estimate": "execution.estimate",
     "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
     "StudyEvent": "execution.run",
     "StudyOutcome": "execution.run",
+    "estimate": "execution.estimate",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",
@@ -49,8 +53,10 @@ _RENAMED = {"Path": "LoadingPath"}
 
 __all__ = [
     "Access",
+    "Bounds",
     "Case",
     "CatalogueDamaged",
+    "Estimate",
     "GridLost",
     "Limits",
     "LoadingPath",
@@ -62,6 +68,7 @@ __all__ = [
     "StudyError",
     "StudyEvent",
     "StudyOutcome",
+    "estimate",
     "open_netcdf",
     "open_study",
     "own_workers",

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 ROUNDING = 1e-9
 """Relative difference below which two times are the same."""
@@ -180,6 +180,12 @@ def shared(one: Program, other: Program) -> int:
             count += sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
         return count
     return count
+
+
+def walked(programs: Sequence[Program]) -> int:
+    """Return how many increments it takes to walk programs, those of two in a row shared once."""
+    before = (shared(one, other) for one, other in pairwise(programs))
+    return sum(program.count for program in programs) - sum(before)
 
 
 def load_and_release(load: float, step: float, unload_steps: int) -> Program:

@@ -6,10 +6,11 @@ scene's ``branch`` parameter share the increments they have in common.
 
 from __future__ import annotations
 
+from solver.scenes.effort import Effort
 from solver.scenes.punch import PUNCH
 from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
 
 SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING)}
 
-__all__ = ["SCENES", "Monitor", "Scene"]
+__all__ = ["SCENES", "Effort", "Monitor", "Scene"]

@@ -91,43 +91,48 @@ class ContactParameters(MaterialParameters):
 
 def check(parameters: Any) -> None:
     """Raise `ModelError` for the first field that breaks its annotation."""
-    for name, kind, choices, bounds in _rules(parameters.__class__):
+    for name, kinds, wanted, choices, bounds in _rules(parameters.__class__):
         value = getattr(parameters, name)
         if choices:
             if value not in choices:
                 raise ModelError(name, value, "must be one of " + ", ".join(choices))
             continue
-        if kind is bool:
+        if kinds is bool:
             if not isinstance(value, bool):
                 raise ModelError(name, value, "must be true or false")
             continue
-        wanted = "an integer" if kind is int else "a number"
-        number = isinstance(value, int if kind is int else (int, float))
-        if isinstance(value, bool) or not number or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, kinds) or not math.isfinite(value):
             raise ModelError(name, value, f"must be {wanted}")
-        if not all(_holds(bound, value) for bound in bounds):
-            allowed = " and ".join(_words(bound) for bound in bounds)
-            raise ModelError(name, value, "must be " + allowed)
+        for test, limit, _ in bounds:
+            if not test(value, limit):
+                allowed = " and ".join(f"{words} {limit:g}" for _, limit, words in bounds)
+                raise ModelError(name, value, "must be " + allowed)
+
+
+_Bound = tuple[Callable[[float, float], bool], float, str]
+_Rule = tuple[str, Any, str, tuple[str, ...], tuple[_Bound, ...]]
 
 
 @cache
-def _rules(kind: Any) -> tuple[tuple[str, Any, tuple[str, ...], tuple[Any, ...]], ...]:
-    """Return name, type, permitted words and bounds of every field."""
+def _rules(kind: Any) -> tuple[_Rule, ...]:
+    """Return name, types, these in words, permitted words and bounds of every field."""
     rules = []
     hints = typing.get_type_hints(kind, include_extras=True)
     for item in fields(kind):
         hint = hints[item.name]
-        words = typing.get_args(hint) if typing.get_origin(hint) is Literal else ()
-        of, *limits = (str,) if words else typing.get_args(hint) or (hint,)
+        choices = typing.get_args(hint) if typing.get_origin(hint) is Literal else ()
+        of, *limits = (str,) if choices else typing.get_args(hint) or (hint,)
         bounds = tuple(bound for limit in limits for bound in _bounds(limit))
-        rules.append((item.name, of, words, bounds))
+        kinds, wanted = (of, "an integer") if of in (int, bool) else ((int, float), "a number")
+        rules.append((item.name, kinds, wanted, choices, bounds))
     return tuple(rules)
 
 
-def _bounds(limit: Any) -> list[Any]:
-    if isinstance(limit, Interval):
-        return [part for part in limit if part is not None]
-    return [limit] if isinstance(limit, (Ge, Gt, Le, Lt)) else []
+def _bounds(limit: Any) -> list[_Bound]:
+    parts = limit if isinstance(limit, Interval) else [limit]
+    known = (part for part in parts if isinstance(part, (Ge, Gt, Le, Lt)))
+    return [(test, getattr(part, name), words) for part in known
+            for name, words, test in [_TESTS[type(part)]]]  # fmt: skip
 
 
 _TESTS: dict[type, tuple[str, str, Callable[[float, float], bool]]] = {
@@ -136,13 +141,3 @@ _TESTS: dict[type, tuple[str, str, Callable[[float, float], bool]]] = {
     Le: ("le", "at most", operator.le),
     Lt: ("lt", "less than", operator.lt),
 }
-
-
-def _holds(bound: Any, value: float) -> bool:
-    name, _, test = _TESTS[type(bound)]
-    return test(value, getattr(bound, name))
-
-
-def _words(bound: Any) -> str:
-    name, words, _ = _TESTS[type(bound)]
-    return f"{words} {getattr(bound, name):g}"

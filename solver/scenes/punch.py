@@ -21,7 +21,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.loading.program import Program, load_and_release
+from solver.loading.program import Program, load_and_release, walked
 from solver.mesh import graded, grid
 from solver.mesh.elements import element_type
 from solver.model.body import Body
@@ -34,10 +34,13 @@ from solver.results.look import Look, Values
 from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.view import View
+from solver.scenes.effort import Effort, lattice
 from solver.scenes.parameters import ContactParameters, Length, Ratio, described
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 _LARGEST = 0.08  # of a, under the punch
@@ -102,7 +105,7 @@ def _nodes(parameters: PunchParameters) -> tuple[NDArray[np.float64], ...]:
     )
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=256)
 def _graded_nodes(
     a: float, h: float, growth: float, size: float, height: float
 ) -> tuple[NDArray[np.float64], ...]:
@@ -141,6 +144,27 @@ def model(parameters: PunchParameters) -> Model:
 def program(parameters: PunchParameters) -> Program:
     """Return the history: the pressure is raised, then taken away with the punch."""
     return load_and_release(parameters.load_ratio, parameters.load_step, parameters.unload_steps)
+
+
+def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
+    """Return the work of loading up to each load ratio in turn, and of releasing each."""
+    element = parameters.element
+    under, beyond, up, down = (len(nodes) - 1 for nodes in _nodes(parameters))
+    punch, plane = lattice(under, up, element), lattice(under + beyond, down, element)
+    # an elastic punch is reduced to its contact surface; x is held on the line of symmetry
+    own = 2 * punch.along - 1 if parameters.elastic_punch else 2 * punch.nodes - punch.up
+    increments = _increments(tuple(load_ratios), parameters.load_step, parameters.unload_steps)
+    return Effort(
+        elements=punch.elements + plane.elements,
+        unknowns=own + 2 * plane.nodes - plane.up - plane.along,
+        increments=increments,
+        most_increments=increments,
+    )
+
+
+@lru_cache(maxsize=1024)
+def _increments(load_ratios: tuple[float, ...], step: float, unload_steps: int) -> int:
+    return walked([load_and_release(load, step, unload_steps) for load in sorted(load_ratios)])
 
 
 def view(parameters: PunchParameters) -> View:
@@ -221,6 +245,7 @@ PUNCH = Scene(
     view=view,
     outputs=(maps, profiles, surfaces, contact, extremes, figures),
     costs=(cost,),
+    effort=effort,
     advice={
         Status.LIMIT_LOAD: "lower load_ratio, or let the material harden",
         Status.NOT_CONVERGED: "reduce load_step, or refine the mesh by smallest_element or growth",

@@ -30,6 +30,7 @@ from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.scenes.passes import Trace, passes, shakedown
+from solver.scenes.rolling_effort import effort
 from solver.scenes.rolling_model import RollingParameters, model
 from solver.scenes.scene import Scene
 
@@ -260,6 +261,7 @@ ROLLING = Scene(
     costs=(cost, progress),
     trace=Trace.of,
     settling=settling,
+    effort=effort,
     warnings=warnings,
     advice={
         Status.LIMIT_LOAD: "lower load_ratio or traction, or let the material harden",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -12,23 +12,19 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.walker import HALVINGS
 from solver.materials.material import Material
-from solver.mesh import graded, grid, mapped, merged
+from solver.mesh import grid, mapped, merged
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
 from solver.scenes.parameters import ContactParameters, Friction, Length, described
+from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes, with_middle
 from solver.scenes.schedule import Schedule
-
-if TYPE_CHECKING:
-    from skfem import Mesh
 
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
 _SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
 _HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
-_DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
 _PERIOD = 6.0  # least length of a track without ends / Hertz half-width
-_HUB = 0.3  # radius of the rigid hub / R
 _LONGEST_REACH = 0.8  # of half the rim
 _MOST_COLUMNS = 3000
 _MOST_INCREMENTS = 100_000
@@ -164,6 +160,16 @@ class RollingParameters(ContactParameters):
         return self.track / 2 * self._turning + self.margin
 
     @property
+    def fine(self) -> float:
+        """Half the length of the half-space with elements of the given side [mm]."""
+        return self.track / 2 + (0.0 if self.periodic else self.margin)
+
+    @property
+    def guided(self) -> bool:
+        """Whether the rotation of the wheel is prescribed; otherwise its moment is."""
+        return self.traction == 1.0 or self.control == "creepage" or self.frictionless
+
+    @property
     def _turning(self) -> float:
         """Largest length of rim / length of track over which it passes."""
         return 1 + max(0.0, -self.given_creepage)
@@ -205,31 +211,23 @@ class RollingParameters(ContactParameters):
         )
 
 
-def _with_middle(mesh: Mesh, name: str, half: float) -> Mesh:
-    """Return a grid with a name for its top where the first coordinate is within ``half``."""
-    top = np.asarray(mesh.boundaries["top"])
-    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
-    return mesh.with_boundaries({name: top[np.abs(middle) < half]})
+def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
+    """Return what `half_space_nodes` takes."""
+    p, a = parameters, parameters.half_width
+    far = p.track if p.periodic else _HALF_SPACE * a
+    return p.fine, far, a, p.element_size, p.growth, p.periodic
 
 
 def _half_space(parameters: RollingParameters) -> Body:
-    a, h = parameters.half_width, parameters.element_size
+    x, y = half_space_nodes(*track_grid(parameters))
     periodic = parameters.periodic
-    fine = parameters.track / 2 + (0.0 if periodic else parameters.margin)
-    far = parameters.track if periodic else _HALF_SPACE * a
-    beyond = fine + graded(far, h, 1.4, far / 4)[1:]
-    track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
-    x = track if periodic else np.concatenate([-beyond[::-1], track, beyond])
-    deep = graded(_DEEP * a, h, parameters.growth, _DEEP * a)
-    deeper = deep[-1] + graded(far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[1:]
-    y = -np.concatenate([deep, deeper])[::-1]
     travelling = None
     if parameters.load == "hertz":
         schedule = parameters.schedule
         ratio = parameters.friction * parameters.traction
         travelling = TravellingPressure(
             boundary="top",
-            half_width=a,
+            half_width=parameters.half_width,
             peak=parameters.peak_pressure,
             amplitude=schedule.load,
             position=schedule.position,
@@ -237,7 +235,7 @@ def _half_space(parameters: RollingParameters) -> Body:
         )
     return Body(
         name="half_space",
-        mesh=_with_middle(grid(x, y), "track", fine),
+        mesh=with_middle(grid(x, y), "track", parameters.fine),
         material=parameters.material(),
         supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
@@ -246,13 +244,9 @@ def _half_space(parameters: RollingParameters) -> Body:
 
 
 def _wheel(parameters: RollingParameters) -> Body:
-    R, h = parameters.radius, parameters.element_size
-    reach = parameters.reach
-    rim = np.linspace(-reach, reach, 2 * math.ceil(reach / h) + 1)
-    beyond = reach + graded(math.pi * R - reach, h, 1.5, 0.3 * R)[1:]
-    angle = np.concatenate([-beyond[::-1], rim, beyond]) / R
-    radius = R - graded((1 - _HUB) * R, h, 1.3, 0.2 * R)[::-1]
-    ring = _with_middle(grid(angle, radius), "rim", reach / R)
+    R, reach = parameters.radius, parameters.reach
+    angle, radius = wheel_nodes(R, reach, parameters.element_size)
+    ring = with_middle(grid(angle, radius), "rim", reach / R)
     turned = parameters.wheel_turned
 
     def around(p: np.ndarray) -> np.ndarray:
@@ -265,7 +259,7 @@ def _wheel(parameters: RollingParameters) -> Body:
     rotation: Amplitude | None = None
     if parameters.traction == 1.0:  # locked
         rotation = Amplitude(position.time, np.full_like(position.value, -turned))
-    elif parameters.control == "creepage" or parameters.frictionless:
+    elif parameters.guided:
         # without friction no moment turns the wheel: its rotation is prescribed as rolling
         turning = (1 - parameters.given_creepage) * position.value / R
         rotation = Amplitude(position.time, -turned - turning)

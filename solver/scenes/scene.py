@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.loading.control import Control
-from solver.loading.program import Program, shared
+from solver.loading.program import Program, walked
 from solver.loading.walker import Settling, Walker
 from solver.model.model import Model
 from solver.results.audit import AUDIT, audit
@@ -21,6 +20,7 @@ from solver.results.record import Record, Status
 from solver.results.samples import Samples
 from solver.results.touch import touch_of
 from solver.results.view import View
+from solver.scenes.effort import Effort
 
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
@@ -49,6 +49,8 @@ class Scene:
     costs : functions that compute quantities of every run, also of one that failed
     trace : (samples, states of a lap) -> what is kept of each lap
     settling : (parameters) -> how increments are halved, or None to take those of the program
+    effort : (parameters, values of ``branch``) -> the work of walking this path, told in
+        microseconds, without a mesh; without it a study is estimated by its runs alone
     warnings : (run) -> texts for the user, added to the message of its record
     advice : for an outcome, what the user can do
     """
@@ -65,6 +67,7 @@ class Scene:
     refining: frozenset[str] = frozenset()
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
     settling: Callable[[Any], Settling | None] | None = None
+    effort: Callable[[Any, Sequence[float]], Effort] | None = None
     warnings: Callable[[Look], tuple[str, ...]] | None = None
     advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
 
@@ -143,8 +146,7 @@ def _merged(look: Look, outputs: Sequence[Output]) -> Values:
 
 def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:
     """Return the function to call after each increment: it tells the monitor the share done."""
-    before = [0, *(shared(one, other) for one, other in pairwise(programs))]
-    expected = sum(p.count - first for p, first in zip(programs, before, strict=True))
+    expected = walked(programs)
     done = 0
 
     def report() -> None:

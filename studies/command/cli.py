@@ -76,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
         help="end after so long without a worker that takes the work (default: wait)",
     )  # fmt: skip
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
+    one.add_argument("--dry-run", action="store_true", help="tell what it would cost, and end")
 
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")

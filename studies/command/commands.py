@@ -21,6 +21,7 @@ SHOWN = 100
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
+    from studies.command.cost import dry_run, long_run
     from studies.command.progress import Progress
     from studies.execution.cluster import Access
     from studies.execution.limits import Limits
@@ -29,7 +30,6 @@ def run(options: argparse.Namespace) -> int:
     from studies.views.reading import open_study
     from studies.views.tables import messages, runs_table
 
-    study = Study.from_toml(options.study)
     limits = Limits(
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
         memory=options.memory, patience=options.patience,
@@ -37,11 +37,17 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(
         options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
     )
+    study, store = Study.from_toml(options.study), Store(options.out)
+    if options.dry_run:
+        print(dry_run(study, store))
+        return OK
+    if warning := long_run(study, store):
+        print(warning, file=sys.stderr)
     progress = Progress(study)
     with _interruption() as interrupted:
         outcome = run_study(
             study,
-            Store(options.out),
+            store,
             workers=options.workers,
             scheduler=access,
             resume=options.resume,

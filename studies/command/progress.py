@@ -28,7 +28,8 @@ class Progress:
     def __init__(self, study: Study, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr
         self._bar = self._stream.isatty()
-        self._names = {case.id: _place(study, case) for case in study.cases()}
+        cases = () if self._bar else study.cases()  # a bar names no runs
+        self._names = {case.id: _place(study, case) for case in cases}
         self._started = time.monotonic()
         self._begun: float | None = None
         self._progress = 0.0

@@ -12,6 +12,7 @@ import hashlib
 import json
 import re
 import sys
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
@@ -41,6 +42,46 @@ def content_id(*parts: Any) -> str:
     return _digest(canonical([*parts, solver_hash()]).encode())
 
 
+class Namer:
+    """Names tables that share most of their entries; what they share is written once.
+
+    The id of a table is ``content_id(kind, name, table, source)``.
+
+    Parameters
+    ----------
+    kind, name, source : the parts of content around the table
+    table : the entries that hold where no others are given
+    """
+
+    def __init__(self, kind: str, name: str, table: Mapping[str, Any], source: Any) -> None:
+        keys = sorted(table)
+        self._places = {key: place for place, key in enumerate(keys)}
+        self._texts = [self.entry(key, table[key]) for key in keys]
+        self._before = canonical([kind, name]).removesuffix("]") + ",{"
+        self._after = "}," + canonical([source, solver_hash()]).removeprefix("[")
+
+    @staticmethod
+    def entry(key: str, value: Any) -> str:
+        """Return the text of one entry."""
+        return f"{canonical(key)}:{canonical(value)}"
+
+    def places(self, keys: Iterable[str]) -> Places:
+        """Return where entries with these keys stand, for those that the table has."""
+        return [(k, self._places[key]) for k, key in enumerate(keys) if key in self._places]
+
+    def id_of(self, changes: Iterable[tuple[Places, Sequence[str]]]) -> str:
+        """Return the content id of the table with other entries at some places."""
+        texts = self._texts.copy()
+        for places, entries in changes:
+            for k, place in places:
+                texts[place] = entries[k]
+        return _digest(f"{self._before}{','.join(texts)}{self._after}".encode())
+
+
+Places = list[tuple[int, int]]
+"""Numbers of entries in a list of them, and the place of each in the table of a `Namer`."""
+
+
 def is_id(text: str) -> bool:
     """Tell whether `text` has the form of a content id."""
     return ID_PATTERN.fullmatch(text) is not None
@@ -54,6 +95,10 @@ FORM = (
     "storage/provenance.py",
 )
 """Modules of this package that lay records out: names, units, dimensions, attributes."""
+
+
+NO_NUMBERS = frozenset({"effort"})
+"""Functions of a scene that no number of a run comes from."""
 
 
 @cache
@@ -75,13 +120,16 @@ def solver_hash() -> str:
 def written(scene: Scene) -> list[list[str]]:
     """Return what a scene is put together of, for `content_id`.
 
-    These are the names of its parameters and functions, each with the digest of the module that it
-    is written in, where this is none of the solver's. Of a script counts what workers see of it:
-    not what stands under ``if __name__ == "__main__":``. What the module imports does not count,
-    and code without a file, such as a cell of a notebook, has no digest.
+    These are the names of its parameters and of its functions that make numbers, each with the
+    digest of the module that it is written in, where this is none of the solver's. Of a script
+    counts what workers see of it: not what stands under ``if __name__ == "__main__":``. What the
+    module imports does not count, and code without a file, such as a cell of a notebook, has no
+    digest.
     """
     given: list[Any] = [type(scene)]
     for item in fields(scene):
+        if item.name in NO_NUMBERS:
+            continue
         value = getattr(scene, item.name)
         given += value if isinstance(value, tuple) else [value]
     called = [getattr(each, "func", each) for each in given if callable(each)]

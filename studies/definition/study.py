@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from solver.scenes import SCENES
-from studies.definition.cases import Case, LoadingPath, loading_paths
-from studies.definition.identity import content_id, written
+from studies.definition.cases import Case, LoadingPath
+from studies.definition.expansion import Expansion
+from studies.definition.identity import content_id
 from studies.definition.parameters import one_of, parameters_of, scene_named
 from studies.definition.sweep import (
     Axes,
     checked_axes,
     checked_table,
     checked_text,
-    expanded,
     linked_values,
     owners,
 )
@@ -47,7 +46,6 @@ class Study(BaseModel):
     scene: str
     parameters: dict[str, Any] = Field(default_factory=dict)
     sweep: Axes = Field(default_factory=dict)
-    _cases: tuple[Case, ...] = PrivateAttr(default=())
 
     @classmethod
     def from_toml(cls, path: Path | str) -> Self:
@@ -63,7 +61,19 @@ class Study(BaseModel):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """Check and normalise the content of a study file (or of its JSON equivalent)."""
+        """Check and normalise the content of a study file (or of its JSON equivalent).
+
+        All combinations of the sweep are gone through once; none is kept.
+        """
+        return cls.known(content).checked()
+
+    @classmethod
+    def known(cls, content: Mapping[str, Any]) -> Self:
+        """Return the study without going through its combinations; the rest is checked.
+
+        This is for content that `from_dict` has accepted before, and for looking at the size of a
+        study before `checked` goes through it.
+        """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
         try:
@@ -75,6 +85,17 @@ class Study(BaseModel):
                 raise cause from None
             field = ".".join(str(part) for part in first["loc"])
             raise StudyError(field, first["input"], first["msg"]) from None
+
+    def checked(self) -> Self:
+        """Return the study after a pass through its combinations, each of which the scene takes.
+
+        Raises
+        ------
+        StudyError
+            for the first one that the scene refuses
+        """
+        self.expansion.check()
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -96,11 +117,10 @@ class Study(BaseModel):
         }
         return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": axes}
 
-    @model_validator(mode="after")
-    def _expand(self) -> Self:
-        """Build every case, which is how the scene checks the parameters; they are kept."""
-        self._cases = tuple(expanded(SCENES[self.scene], self.parameters, self.sweep))
-        return self
+    @cached_property
+    def expansion(self) -> Expansion:
+        """The runs, built when they are asked for."""
+        return Expansion(SCENES[self.scene], self.parameters, self.sweep)
 
     @cached_property
     def id(self) -> str:
@@ -114,7 +134,7 @@ class Study(BaseModel):
             name: list(axis.items()) if isinstance(axis, dict) else axis
             for name, axis in self.sweep.items()
         }
-        source = written(SCENES[self.scene])
+        source = self.expansion.source
         return content_id("study", self.name, self.scene, self.fixed, axes, source)
 
     @property
@@ -138,20 +158,24 @@ class Study(BaseModel):
     @property
     def size(self) -> int:
         """Number of runs."""
-        return math.prod(len(axis) for axis in self.sweep.values())
+        return self.expansion.size
+
+    def run_ids(self) -> Iterator[str]:
+        """Yield the ids of the runs, in the order of `cases`, and build nothing else."""
+        return self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
-        """Yield the runs of the study, the last axis running fastest."""
-        return iter(self._cases)
+        """Yield the runs of the study, the last axis running fastest; nothing is kept."""
+        return self.expansion.cases()
 
     def place(self, case: Case) -> dict[str, Any]:
         """Return the value, or the label, of a run of the study on each axis."""
         pairs = zip(self.axes.items(), case.index, strict=True)
         return {name: values[position] for (name, values), position in pairs}
 
-    def paths(self) -> list[LoadingPath]:
-        """Return the loading paths of the study: the cases that one task computes together."""
-        return loading_paths(SCENES[self.scene], self._cases)
+    def paths(self) -> Iterator[LoadingPath]:
+        """Yield the loading paths of the study: the cases that one task computes together."""
+        return self.expansion.paths()
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""

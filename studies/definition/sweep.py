@@ -7,16 +7,12 @@ combination of labels, what the labels set is fixed, and the lists are swept.
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 from solver.results.quantities import QUANTITIES
-from solver.scenes import Scene
-from studies.definition.cases import Case, cases_of
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter, nearest
 from studies.errors import StudyError
@@ -95,29 +91,6 @@ def linked_values(axes: Axes) -> dict[str, tuple[str, list[Any]]]:
     }
 
 
-def expanded(scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> Iterator[Case]:
-    """Yield every point of the sweep, the last axis running fastest.
-
-    Raises
-    ------
-    StudyError
-        when the scene refuses a combination of parameters
-    """
-    linked = {name: axis for name, axis in axes.items() if isinstance(axis, dict)}
-    lists = {name: axis for name, axis in axes.items() if isinstance(axis, list)}
-    for point in itertools.product(*(enumerate(axis.items()) for axis in linked.values())):
-        index = tuple(position for position, _ in point)
-        labels = dict(zip(linked, (label for _, (label, _) in point), strict=True))
-        given = dict(fixed)
-        for _, (_, settings) in point:
-            given |= settings
-        try:
-            for case in cases_of(scene, given, lists):
-                yield replace(case, index=(*index, *case.index))
-        except StudyError as error:
-            raise _located(error, linked, labels) from error
-
-
 def _settings(axes: Axes) -> Iterator[tuple[str, str]]:
     """Yield each parameter of each axis, and the axis."""
     for name, axis in axes.items():
@@ -189,19 +162,3 @@ def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None
     else:
         return
     raise StudyError(f"sweep.{name}", content, allowed)
-
-
-def _located(
-    error: StudyError, linked: Mapping[str, LinkedAxis], labels: Mapping[str, str]
-) -> StudyError:
-    """Return the error of a case, naming the label it arises with, and the label's own value."""
-    if not labels:
-        return error
-    parameter = error.field.removeprefix("parameters.")
-    fields = (
-        f"sweep.{axis}.{label}.{parameter}"
-        for axis, label in labels.items()
-        if parameter in linked[axis][label]
-    )
-    where = ", ".join(f"{axis} = {label}" for axis, label in labels.items())
-    return StudyError(next(fields, error.field), error.value, f"{error.allowed}, where {where}")

@@ -135,14 +135,13 @@ def run_study(
         _answering(access)
     with store.writing():
         store.save_study(study)
-        cases = list(study.cases())
-        known = store.sound(case.id for case in cases)
+        known = store.sound(study.run_ids())
         done = {key for key, row in known.items() if resume or row["status"] == OK}
-        wanted = {case.id for case in cases} - done
+        wanted = set(study.run_ids()) - done
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, access, stop)
-        combined = combine(study, store, cases)
+        combined = combine(study, store, study.cases())
         store.catalogue.remove(combined.missing)
     return StudyOutcome(
         study_id=study.id,

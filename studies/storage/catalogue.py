@@ -109,6 +109,28 @@ class Catalogue:
             )
             return dict(found.fetchall())
 
+    def having(self, status: str, run_ids: Iterable[str]) -> set[str]:
+        """Return those of `run_ids` that have this status."""
+        wanted = json.dumps(list(run_ids))
+        with self._reading() as connection:
+            found = connection.execute(
+                "SELECT id FROM runs WHERE id IN (SELECT value FROM json_each(?)) AND status = ?",
+                [wanted, status],
+            )
+            return {row[0] for row in found}
+
+    def figures(
+        self, scene: str, status: str, names: Sequence[str], limit: int
+    ) -> list[tuple[Any, ...]]:
+        """Return figures of the last runs of a scene, a row each; None for an absent one."""
+        columns = ", ".join("json_extract(scalars, ?)" for _ in names)
+        with self._reading() as connection:
+            return connection.execute(
+                f"SELECT {columns} FROM runs WHERE scene = ? AND status = ? "
+                "ORDER BY rowid DESC LIMIT ?",
+                [*(f"$.{name}" for name in names), scene, status, limit],
+            ).fetchall()
+
     def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Insert or replace rows in one transaction."""
         marks = ", ".join("?" for _ in (*_COLUMNS, "checksum"))

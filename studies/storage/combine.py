@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -46,7 +46,7 @@ class Combined:
     missing: Sequence[str]
 
 
-def combine(study: Study, store: Store, cases: Sequence[Case]) -> Combined:
+def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
     """Write the combined data set of `study`, and return what it holds.
 
     Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is
@@ -60,23 +60,26 @@ def combine(study: Study, store: Store, cases: Sequence[Case]) -> Combined:
     tell what ran to compute the runs, which may have been elsewhere, and whether all runs are one
     half of symmetric bodies.
     """
+    places = {case.id: case.index for case in cases}
     while True:
-        found = [case for case in cases if store.run_path(case.id).exists()]
+        found = {key: at for key, at in places.items() if store.run_path(key).exists()}
         try:
-            return _combined(study, store, cases, found)
+            return _combined(study, store, found, [key for key in places if key not in found])
         except RunUnreadable as error:  # what it left in the data set must go: from the beginning
             store.set_aside(error)
 
 
-def _combined(study: Study, store: Store, cases: Sequence[Case], found: Sequence[Case]) -> Combined:
+def _combined(
+    study: Study, store: Store, found: Mapping[str, tuple[int, ...]], missing: Sequence[str]
+) -> Combined:
     scene = SCENES[study.scene]
     target = store.dataset_path(study.id)
     axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
     frame = _Frame(axes=axes, usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
     halves: set[int] = set()
-    for case in found:
-        with opened(store.run_path(case.id)) as run:
+    for run_id in found:
+        with opened(store.run_path(run_id)) as run:
             frame.learn(run)
             ran.add(what_ran(run.attrs))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
@@ -90,21 +93,22 @@ def _combined(study: Study, store: Store, cases: Sequence[Case], found: Sequence
             file.attrs.update(attributes | symmetric)
             frame.create_axes(file, scene)
             frame.create_fields(file)
-            for case in found:
-                place = dict(zip(study.axes, case.index, strict=True))
+            for run_id, index in found.items():
+                place = dict(zip(study.axes, index, strict=True))
                 at = tuple(place.get(name, 0) for name in axes)
-                with opened(store.run_path(case.id)) as run:
+                with opened(store.run_path(run_id)) as run:
                     frame.place(file, run, at)
                     code, message = (frame.small[name][0][at] for name in ("status", "message"))
-                    outcomes[case.id] = STATUSES[code], str(message)
+                    outcomes[run_id] = STATUSES[code], str(message)
                 disk.check()
             frame.write_small(file)
         disk.check()
+    counts = Counter(status for status, _ in outcomes.values())
     return Combined(
         path=target,
-        counts=dict(Counter(outcomes.get(case.id, (MISSING, ""))[0] for case in cases)),
+        counts=dict(counts | Counter({MISSING: len(missing)} if missing else {})),
         failed=[(run_id, *each) for run_id, each in outcomes.items() if each[0] != OK],
-        missing=[case.id for case in cases if case.id not in outcomes],
+        missing=missing,
     )
 
 

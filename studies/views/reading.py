@@ -78,7 +78,7 @@ def _progress(file: Path) -> str:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         name = content["name"]
-        study = Study.from_dict(content)
+        study = Study.known(content)
     except StudyError:  # such as a parameter that the scene no longer has
         pass
     except (OSError, ValueError, TypeError, KeyError):
@@ -86,7 +86,7 @@ def _progress(file: Path) -> str:
     if study is None or study.id != file.parent.name:
         return f"{name}: begun with another version of the solver"
     store = Store(file.parents[2])
-    finished = sum(store.run_path(case.id).is_file() for case in study.cases())
+    finished = sum(store.run_path(run_id).is_file() for run_id in study.run_ids())
     return f"{study.name}: {finished} of {study.size} runs finished"
 
 

@@ -60,7 +60,7 @@ def ids(module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> tuple[str, str, 
     """Return the ids of a study of the module's scene, of its run and of its path."""
     monkeypatch.setitem(SCENES, "own", module.OWN)
     study = Study.from_dict({"name": "own", "scene": "own", "sweep": {"friction": [0.1]}})
-    return study.id, next(study.cases()).id, study.paths()[0].id
+    return study.id, next(study.cases()).id, next(study.paths()).id
 
 
 @pytest.mark.parametrize(

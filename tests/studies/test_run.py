@@ -191,10 +191,10 @@ def test_an_error_of_the_listener_stops_the_work_and_frees_the_store(store: Stor
         pass
 
 
-def test_the_command_builds_a_parameter_object_once_for_each_case(
+def test_the_command_builds_a_parameter_object_once_for_each_case_and_each_path(
     study_file: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Study, progress, tasks and data set share one expansion of the sweep."""
+    """A case is checked by building it; of a path the first one goes to the worker."""
     built: list[FakeParameters] = []
     checked = FakeParameters.__post_init__
 
@@ -205,7 +205,8 @@ def test_the_command_builds_a_parameter_object_once_for_each_case(
     monkeypatch.setattr(FakeParameters, "__post_init__", counted)
     assert main(["run", str(study_file()), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
     points = [(each.load_ratio, each.friction) for each in built]
-    assert points == [(0.3, 0.0), (0.3, 0.4), (0.9, 0.0), (0.9, 0.4)]
+    assert points[:4] == [(0.3, 0.0), (0.3, 0.4), (0.9, 0.0), (0.9, 0.4)]
+    assert points[4:] == [(0.3, 0.0), (0.3, 0.4)]
 
 
 def test_a_worker_with_another_solver_refuses(store: Store) -> None:

@@ -7,14 +7,18 @@ import math
 import subprocess
 import sys
 import time
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import studies.definition.expansion
 import studies.definition.identity
 from solver.scenes import SCENES
 from studies import Study, StudyError, scene_schema
+from studies.definition.identity import content_id, written
 from studies.definition.sweep import MAXIMUM_RUNS
 from tests.studies.conftest import fake_study
 
@@ -136,12 +140,83 @@ def test_the_scene_alone_decides_what_a_value_may_be(monkeypatch: pytest.MonkeyP
     assert case.parameters.points == 1
 
 
-def test_a_sweep_is_expanded_once() -> None:
-    study = Study.from_dict(GOOD)
-    first, again = list(study.cases()), list(study.cases())
-    assert all(one is other for one, other in zip(first, again, strict=True))
-    together = [case for path in study.paths() for case in path.cases]
-    assert {id(case) for case in together} == {id(case) for case in first}
+def many(runs: int) -> dict[str, Any]:
+    """A study of the punch with so many runs, a multiple of 20, of four a loading path."""
+    stresses = [300.0 + 0.01 * k for k in range(runs // 20)]
+    sweep = {"load_ratio": [0.3, 0.5, 0.7, 0.9], "friction": [0.0, 0.1, 0.2, 0.3, 0.4]}
+    return {"name": "many", "scene": "punch", "sweep": sweep | {"yield_stress": stresses}}
+
+
+def peak(work: Callable[[], Any]) -> int:
+    """Most bytes that the work holds at a time."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_memory_does_not_grow_with_the_number_of_runs() -> None:
+    def passed(content: dict[str, Any]) -> None:
+        study = Study.from_dict(content)
+        for each in (study.run_ids(), study.cases(), study.paths()):
+            assert sum(1 for _ in each)
+
+    passed(many(20))  # what is kept for all studies of the scene
+    axis = peak(lambda: Study.known(many(4000)).size)  # what each value of an axis sets is held
+    assert axis < 200_000
+    assert peak(lambda: passed(many(4000))) < axis + 1_000_000  # 4000 cases would be 3 MB
+
+
+def test_20_000_runs_are_checked_and_named_in_a_second() -> None:
+    started = time.process_time()
+    study = Study.from_dict(many(20_000))
+    ids = set(study.run_ids())
+    assert time.process_time() - started < 1.0
+    assert len(ids) == study.size == 20_000
+    assert study.expansion.path_count == 5_000
+
+
+def test_content_known_already_is_not_gone_through() -> None:
+    content = many(80_000)
+    started = time.process_time()
+    study = Study.known(content)
+    assert study.size == 80_000
+    assert time.process_time() - started < 0.5
+    content["parameters"] = {"friction": 2}
+    with pytest.raises(StudyError, match="swept too"):
+        Study.known(content)
+
+
+@pytest.mark.parametrize("name", ["punch", "rolling-table", "shakedown-map"])
+def test_ids_are_those_of_the_whole_content(name: str) -> None:
+    study = Study.from_toml(ROOT / "data" / "studies" / f"{name}.toml")
+    scene = SCENES[study.scene]
+    source = written(scene)
+    cases = list(study.cases())
+    assert [case.id for case in cases] == list(study.run_ids())
+    for case in cases[::7]:
+        assert case.id == content_id("run", scene.name, case.values, source)
+    for path in study.paths():
+        for case in path.cases:
+            shared = {key: each for key, each in case.values.items() if key != scene.branch}
+            assert path.id == content_id("path", scene.name, shared, source)
+        assert path.parameters in [case.parameters for case in path.cases]
+    assert {case.id for path in study.paths() for case in path.cases} == {c.id for c in cases}
+
+
+def test_a_scene_is_read_once_for_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+    counted = studies.definition.expansion.written
+    monkeypatch.setattr(
+        studies.definition.expansion, "written", lambda scene: calls.append(scene) or counted(scene)
+    )
+    study = Study.from_dict(
+        with_(sweep={"both": {"a": {"friction": 0.1}, "b": {"friction": 0.2, "load_ratio": 1}}})
+    )
+    assert (study.id, len(list(study.cases())), len(list(study.paths()))) == (study.id, 2, 2)
+    assert len(calls) == 1
 
 
 def test_the_old_name_of_a_loading_path_works_with_a_warning() -> None:
@@ -209,7 +284,7 @@ def test_axes_follow_the_scene_and_values_stay_as_written() -> None:
 
 
 def test_paths_hold_what_differs_in_the_branch_parameter_only_in_increasing_order() -> None:
-    paths = Study.from_dict(GOOD).paths()
+    paths = list(Study.from_dict(GOOD).paths())
     assert len(paths) == 2
     for path in paths:
         assert [case.parameters.load_ratio for case in path.cases] == [0.3, 0.5]
@@ -274,7 +349,7 @@ def test_the_schema_carries_units_and_ranges() -> None:
 def test_the_ready_study_of_the_punch_is_45_runs_in_15_paths() -> None:
     study = Study.from_toml(ROOT / "data" / "studies" / "punch.toml")
     assert study.size == 45
-    assert len(study.paths()) == 15
+    assert len(list(study.paths())) == 15
 
 
 def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray() -> None:

@@ -1,0 +1,67 @@
+"""The work of a loading path of the rolling scene."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from solver.loading.walker import HALVINGS
+from solver.scenes.effort import Effort, lattice
+from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
+from solver.scenes.rolling_model import track_grid
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from solver.scenes.rolling_model import RollingParameters
+
+_ELEMENT = "quad8"
+
+
+def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
+    """Return the work of rolling up to the largest number of passes."""
+    elements, unknowns = _size(parameters)
+    schedule = parameters.schedule
+    fixed = schedule.press * (1 + schedule.driven) + schedule.release
+    rolled = 2 * schedule.half_steps
+    n = int(max(passes))
+    # the first pass is repeated with increments halved once, twice, …; the last halving is kept
+    times = [2**k for k in range(HALVINGS + 1 if parameters.advance_tolerance else 1)]
+    first = sum(fixed + rolled * each for each in times)
+    return Effort(
+        elements=elements,
+        unknowns=unknowns,
+        increments=n * (fixed + rolled),
+        most_increments=first + (n - 1) * (fixed + rolled * times[-1]),
+    )
+
+
+def _size(parameters: RollingParameters) -> tuple[int, int]:
+    """Return the elements, and the unknowns of the half-space and of the wheel's rim."""
+    elements, unknowns = _track(*track_grid(parameters))
+    if parameters.load == "hertz":
+        return elements, unknowns
+    own, rim = _wheel(parameters.radius, parameters.reach, parameters.element_size)
+    hub = 1 if parameters.guided else 2  # its height, and its rotation
+    return elements + own, unknowns + rim + hub
+
+
+@lru_cache(maxsize=4096)
+def _track(
+    fine: float, far: float, a: float, h: float, growth: float, periodic: bool
+) -> tuple[int, int]:
+    """Return elements and unknowns of the half-space."""
+    x, y = half_space_nodes(fine, far, a, h, growth, periodic)
+    track = lattice(len(x) - 1, len(y) - 1, _ELEMENT)
+    if periodic:  # the nodes of the right side are those of the left; the bottom is held
+        return track.elements, 2 * (track.nodes - track.up) - 2 * (track.along - 1)
+    # x is held at both sides, x and y at the bottom, whose corners belong to both
+    return track.elements, 2 * track.nodes - 2 * track.up - 2 * track.along + 2
+
+
+@lru_cache(maxsize=4096)
+def _wheel(radius: float, reach: float, h: float) -> tuple[int, int]:
+    """Return the elements of the wheel, and the unknowns of its rim."""
+    angle, rings = wheel_nodes(radius, reach, h)
+    ring = lattice(len(angle) - 1, len(rings) - 1, _ELEMENT)
+    return ring.elements, 2 * lattice(rim_elements(reach, h), 0, _ELEMENT).along

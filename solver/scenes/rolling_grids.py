@@ -1,0 +1,62 @@
+"""The grids of wheel and track: where their nodes are along each of the two directions."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.mesh import graded
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from skfem import Mesh
+
+    Array = NDArray[np.float64]
+
+_DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
+_HUB = 0.3  # radius of the rigid hub / R
+
+
+def half_space_nodes(
+    fine: float, far: float, a: float, h: float, growth: float, periodic: bool
+) -> tuple[Array, Array]:
+    """Return x and y of the half-space's nodes [mm].
+
+    Parameters
+    ----------
+    fine : half the length with elements of side ``h`` [mm]
+    far : depth, and width beyond the fine length if not ``periodic`` [mm]
+    a : Hertz half-width [mm]
+    growth : ratio of neighbouring sides in depth
+    """
+    beyond = fine + graded(far, h, 1.4, far / 4)[1:]
+    track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
+    x = track if periodic else np.concatenate([-beyond[::-1], track, beyond])
+    deep = graded(_DEEP * a, h, growth, _DEEP * a)
+    deeper = deep[-1] + graded(far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[1:]
+    return x, -np.concatenate([deep, deeper])[::-1]
+
+
+def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
+    """Return angle [rad] and radius [mm] of the nodes of a wheel of radius ``R``.
+
+    Elements of side ``h`` lie within an arc ``reach`` of the lowest point.
+    """
+    rim = np.linspace(-reach, reach, rim_elements(reach, h) + 1)
+    beyond = reach + graded(math.pi * R - reach, h, 1.5, 0.3 * R)[1:]
+    angle = np.concatenate([-beyond[::-1], rim, beyond]) / R
+    return angle, R - graded((1 - _HUB) * R, h, 1.3, 0.2 * R)[::-1]
+
+
+def rim_elements(reach: float, h: float) -> int:
+    """Return the number of elements of side ``h`` along the part of the rim that may touch."""
+    return 2 * math.ceil(reach / h)
+
+
+def with_middle(mesh: Mesh, name: str, half: float) -> Mesh:
+    """Return a grid with a name for its top where the first coordinate is within ``half``."""
+    top = np.asarray(mesh.boundaries["top"])
+    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
+    return mesh.with_boundaries({name: top[np.abs(middle) < half]})

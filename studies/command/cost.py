@@ -1,0 +1,59 @@
+"""What a study will cost, in words."""
+
+from __future__ import annotations
+
+from studies.definition.study import Study
+from studies.execution.estimate import Estimate, estimate
+from studies.storage.store import Store
+
+_LONG = 3600.0
+"""Seconds of processor time from which `residua run` says so before it begins."""
+
+_UNITS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
+
+
+def dry_run(study: Study, store: Store) -> str:
+    """Return what computing `study` into `store` would cost."""
+    found = estimate(study, store)
+    unknown = "not known"
+    lines = {
+        "runs": f"{found.runs} in all, {found.to_compute} to compute",
+        "loading paths": f"{found.paths} to walk",
+        "unknowns": unknown if found.unknowns is None else f"at most {found.unknowns} a run",
+        "increments": unknown
+        if found.increments is None
+        else f"{found.increments} in all, at most {found.longest} on a path",
+        "processor time": _time(found) or unknown,
+        "disk": f"about {_size(found.bytes)}",
+        "told from": found.basis,
+    }
+    table = (f"{name:<16}{text}" for name, text in lines.items())
+    return "\n".join([f"{study.name}: nothing is computed or written", *table])
+
+
+def long_run(study: Study, store: Store) -> str:
+    """Return one line that tells of more than an hour of processor time; else nothing."""
+    try:
+        found = estimate(study, store)
+    except Exception:  # a damaged catalogue, which computing makes anew, keeps nobody from work
+        return ""
+    if found.cpu_seconds is None or found.cpu_seconds[1] < _LONG:
+        return ""
+    return f"{study.name}: {_time(found)} of processor time; --dry-run tells more"
+
+
+def _time(found: Estimate) -> str:
+    if found.cpu_seconds is None:
+        return ""
+    low, likely, high = found.cpu_seconds
+    size, unit = next((each for each in _UNITS if likely >= 2 * each[0]), _UNITS[-1])
+    return f"about {_short(likely / size)} {unit} ({_short(low / size)} to {_short(high / size)})"
+
+
+def _short(number: float) -> str:
+    """Return a number with two digits that count."""
+    return f"{number:.0f}" if number >= 10 else f"{number:.1f}"
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{count / 1e6:.0f} MB"

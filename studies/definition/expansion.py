@@ -1,0 +1,175 @@
+"""A sweep gone through: nothing is kept but what each axis sets, however many runs there are."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from solver.errors import ModelError
+from solver.scenes import Scene
+from studies.definition.cases import Case, LoadingPath
+from studies.definition.identity import Namer, Places, written
+from studies.definition.parameters import parameters_of
+from studies.definition.sweep import Axes
+from studies.errors import StudyError
+
+
+class _Setting(NamedTuple):
+    """What one position of an axis sets, in the order of the names of the axis.
+
+    ``values`` are as JSON holds them, ``typed`` as the parameter object does, and ``entries`` as
+    they are written in what ids are made of.
+    """
+
+    values: tuple[Any, ...]
+    typed: tuple[Any, ...]
+    entries: tuple[str, ...]
+
+
+class _Axis(NamedTuple):
+    """An axis: the parameters it sets, their places in the names of runs and of paths."""
+
+    names: tuple[str, ...]
+    run: Places
+    path: Places
+    settings: list[_Setting]
+
+    def together(self, branch: str) -> list[tuple[int, ...]]:
+        """Return the positions that share a loading path: they differ in `branch` alone."""
+        groups: dict[tuple[str, ...], list[int]] = {}
+        for position, setting in enumerate(self.settings):
+            named = zip(self.names, setting.entries, strict=True)
+            others = tuple(entry for name, entry in named if name != branch)
+            groups.setdefault(others, []).append(position)
+        return [tuple(group) for group in groups.values()]
+
+
+class Expansion:
+    """The runs of a sweep, built one after the other when they are asked for.
+
+    Parameters
+    ----------
+    scene : the scene that is swept
+    fixed : parameters that are not swept, as JSON holds them; the rest are the scene's defaults
+    axes : as `checked_axes` returns them
+
+    Attributes
+    ----------
+    source : what the scene is put together of, see `written`; it is read once
+    size : number of runs
+    path_count : number of loading paths
+    """
+
+    def __init__(self, scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> None:
+        self._scene, self._axes = scene, axes
+        known = parameters_of(scene)
+        self._values = {name: parameter.default for name, parameter in known.items()}
+        self._values |= fixed
+        self._typed = {name: known[name].typed(value) for name, value in self._values.items()}
+        self.source = written(scene)
+        shared = {name: value for name, value in self._values.items() if name != scene.branch}
+        self._run = Namer("run", scene.name, self._values, self.source)
+        self._path = Namer("path", scene.name, shared, self.source)
+        self._sets = [self._axis(_settings(name, axis)) for name, axis in axes.items()]
+        self._together = [axis.together(scene.branch) for axis in self._sets]
+        self.size = math.prod(len(axis.settings) for axis in self._sets)
+        self.path_count = math.prod(map(len, self._together))
+
+    def check(self) -> None:
+        """Build the parameter object of every run, which is how the scene checks it.
+
+        Raises
+        ------
+        StudyError
+            when the scene refuses a combination of parameters
+        """
+        for index in self._indices():
+            try:
+                self._parameters(index)
+            except ModelError as error:
+                raise self._located(error, index) from error
+
+    def run_ids(self) -> Iterator[str]:
+        """Yield the ids of the runs, the last axis running fastest."""
+        return (self._run_id(index) for index in self._indices())
+
+    def cases(self) -> Iterator[Case]:
+        """Yield the runs, the last axis running fastest."""
+        return map(self._case, self._indices())
+
+    def paths(self) -> Iterator[LoadingPath]:
+        """Yield the loading paths, in the order in which `cases` comes upon them."""
+        branch = self._scene.branch
+        for choice in itertools.product(*self._together):
+            indices = list(itertools.product(*choice))
+            yield LoadingPath(
+                self._path.id_of((axis.path, each.entries) for axis, each in self._at(indices[0])),
+                self._parameters(indices[0]),
+                tuple(sorted(map(self._case, indices), key=lambda case: case.values[branch])),
+            )
+
+    def _indices(self) -> Iterator[tuple[int, ...]]:
+        return itertools.product(*(range(len(axis.settings)) for axis in self._sets))
+
+    def _at(self, index: tuple[int, ...]) -> list[tuple[_Axis, _Setting]]:
+        return [(axis, axis.settings[i]) for axis, i in zip(self._sets, index, strict=True)]
+
+    def _case(self, index: tuple[int, ...]) -> Case:
+        values = dict(self._values)
+        for axis, setting in self._at(index):
+            values.update(zip(axis.names, setting.values, strict=True))
+        return Case(self._run_id(index), self._scene, values, index)
+
+    def _run_id(self, index: tuple[int, ...]) -> str:
+        return self._run.id_of((axis.run, each.entries) for axis, each in self._at(index))
+
+    def _parameters(self, index: tuple[int, ...]) -> Any:
+        typed = dict(self._typed)
+        for axis, setting in self._at(index):
+            typed.update(zip(axis.names, setting.typed, strict=True))
+        return self._scene.parameters(**typed)
+
+    def _axis(self, settings: list[dict[str, Any]]) -> _Axis:
+        known = parameters_of(self._scene)
+        names = tuple(settings[0])
+        positions = [
+            _Setting(
+                tuple(values.values()),
+                tuple(known[name].typed(value) for name, value in values.items()),
+                tuple(itertools.starmap(Namer.entry, values.items())),
+            )
+            for values in settings
+        ]
+        return _Axis(names, self._run.places(names), self._path.places(names), positions)
+
+    def _located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
+        """Return what the scene refused, named as the study file names it.
+
+        A value out of its own range is told with that range, and with its unit. Otherwise the
+        values of the sweep that come together there are told too, since another combination may do.
+        """
+        field, at, where = f"parameters.{error.field}", [], []
+        for (name, axis), i in zip(self._axes.items(), index, strict=True):
+            if isinstance(axis, dict):
+                label = list(axis)[i]
+                where.append(f"{name} = {label}")
+                if error.field in axis[label]:
+                    field = f"sweep.{name}.{label}.{error.field}"
+            else:
+                at.append(f"{name} = {axis[i]}")
+                if error.field == name:
+                    field = f"sweep.{name}[{i}]"
+        parameter = parameters_of(self._scene).get(error.field)
+        if parameter is not None and not parameter.in_range(error.value):
+            allowed = parameter.refusal(field, error.value).allowed
+        else:
+            allowed = f"{error.allowed} (at {', '.join(at)})" if at else error.allowed
+        labels = f", where {', '.join(where)}" if where else ""
+        return StudyError(field, error.value, allowed + labels)
+
+
+def _settings(name: str, axis: Any) -> list[dict[str, Any]]:
+    """Return what each position of an axis sets, by parameter."""
+    return list(axis.values()) if isinstance(axis, dict) else [{name: value} for value in axis]

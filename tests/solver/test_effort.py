@@ -1,0 +1,92 @@
+"""What a scene tells of the work of a path is what the solver then makes and walks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from solver.contact.system import System
+from solver.scenes import SCENES, Scene
+
+COARSE = {"smallest_element": 0.02, "growth": 2.0}
+ROUGH = {"element_size": 4.0, "growth": 1.5, "advance_step": 5.0}
+CASES: list[tuple[str, dict[str, Any]]] = [
+    ("punch", COARSE),
+    ("punch", COARSE | {"element": "quad9", "friction": 0.3}),
+    ("punch", COARSE | {"element": "quad4", "half_plane_size": 20.0}),
+    ("punch", COARSE | {"element": "tri6", "half_width": 7.0}),
+    ("punch", COARSE | {"element": "tri3", "punch_height": 4.0}),
+    ("punch", COARSE | {"elastic_punch": True}),
+    ("punch", {"smallest_element": 0.003, "growth": 1.6}),
+    ("rolling", ROUGH),
+    ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}),
+    ("rolling", ROUGH | {"periodic": True, "track": 100.0}),
+    ("rolling", ROUGH | {"periodic": True, "track": 100.0, "load": "hertz"}),
+    ("rolling", ROUGH | {"traction": 0.5}),
+    ("rolling", ROUGH | {"traction": 1.0, "radius": 200.0, "element_size": 2.0}),
+    ("rolling", ROUGH | {"control": "creepage", "given_creepage": -0.01, "track": 33.0}),
+    ("rolling", ROUGH | {"friction": 0.0, "element_size": 3.0, "load_ratio": 2.0}),
+]
+
+
+def parts(scene: Scene, changes: dict[str, Any]) -> tuple[Any, Callable[..., Any]]:
+    assert scene.effort is not None
+    return scene.parameters(**changes), scene.effort
+
+
+@pytest.mark.parametrize(("name", "changes"), CASES)
+def test_elements_and_unknowns_are_those_of_the_system(name: str, changes: dict[str, Any]) -> None:
+    scene = SCENES[name]
+    parameters, effort = parts(scene, changes)
+    system = System(scene.model(parameters))
+    told = effort(parameters, [getattr(parameters, scene.branch)])
+    assert told.elements == sum(body.mesh.nelements for body in system.model.bodies)
+    assert told.unknowns == system.n_unknowns
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "values"),
+    [
+        ("punch", COARSE | {"yield_stress": 300.0}, [0.5]),
+        ("punch", COARSE | {"friction": 0.2, "unload_steps": 3}, [0.9, 0.6]),
+        ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}, [1, 2]),
+        ("rolling", ROUGH | {"load": "hertz", "press_steps": 3, "advance_step": 8.0}, [1]),
+    ],
+)
+def test_increments_are_those_that_are_walked(
+    name: str, changes: dict[str, Any], values: list[float]
+) -> None:
+    scene = SCENES[name]
+    parameters, effort = parts(scene, changes)
+    calls: list[float] = []
+    (*_, last) = scene.path(parameters, values, calls.append)
+    told = effort(parameters, values)
+    assert last.status.name == "OK"
+    assert last.scalars["cut_increments"] == 0
+    assert last.scalars["degrees_of_freedom"] == told.unknowns
+    assert len(calls) == told.increments + 1  # the end is told too
+    assert told.most_increments == told.increments
+
+
+def test_halving_of_increments_is_told_as_the_most_there_can_be() -> None:
+    parameters, effort = parts(SCENES["rolling"], ROUGH | {"passes": 3, "advance_tolerance": 1e-9})
+    told = effort(parameters, [3])
+    fixed, rolled = 8 + 4, 10
+    assert told.increments == 3 * (fixed + rolled)
+    assert told.most_increments == 9 * fixed + rolled * (127 + 2 * 64)
+
+
+@pytest.mark.parametrize(("name", "branch"), [("punch", [0.3, 0.6]), ("rolling", [1, 2, 3])])
+def test_effort_takes_microseconds(name: str, branch: list[float]) -> None:
+    """A hundred paths that differ in what decides the mesh, then as many that do not."""
+    one = "half_width" if name == "punch" else "radius"
+    meshes = [{one: 300.0 + k} for k in range(100)]
+    for changes in (meshes, [{"friction": k / 200} for k in range(100)]):
+        known = [parts(SCENES[name], each) for each in changes]
+        started = time.process_time()
+        for parameters, effort in known:
+            effort(parameters, branch)
+        assert time.process_time() - started < 0.1, changes[0]
