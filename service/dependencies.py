@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 
 from service.errors import NotFound
 from service.jobs import Job, Jobs
+from service.keys import Scope
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
@@ -51,6 +52,13 @@ def get_settings(request: Request) -> Settings:
     return settings
 
 
+def get_caller(request: Request) -> Scope | None:
+    """Return what the caller may do; None for a stranger, who may ask for little."""
+    scope: Scope | None = request.state.caller
+    return scope
+
+
+TheCaller = Annotated[Scope | None, Depends(get_caller)]
 TheJobs = Annotated[Jobs, Depends(get_jobs)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]

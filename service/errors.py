@@ -13,6 +13,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.headers import HEADERS
 from studies import StudyError
 
 LONGEST_VALUE = 200
@@ -158,7 +159,9 @@ def on_http_error(request: Request, exc: HTTPException) -> Problem:
 
 def on_unexpected(request: Request, exc: Exception) -> Problem:
     """Answer a defect without showing its inside; the server writes the traceback to its log."""
-    return problem(request, HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log")
+    # No middleware sees this answer, which is made outside of them all.
+    status, detail = HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log"
+    return problem(request, status, detail, headers=HEADERS)
 
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {

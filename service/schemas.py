@@ -130,5 +130,5 @@ class Health(BaseModel):
     """Whether studies can be accepted and computed."""
 
     status: Literal["ready", "failing"]
-    data_writable: bool
-    executor_alive: bool
+    data_writable: bool | None = Field(default=None, description="for callers with a key")
+    executor_alive: bool | None = Field(default=None, description="for callers with a key")

@@ -2,23 +2,58 @@
 
 from __future__ import annotations
 
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from pathlib import Path
+from typing import Annotated, Any
 
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, Field, FilePath, ValidationError
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from studies.errors import StudyError
+
+
+def _words(given: Any) -> Any:
+    """Return the parts of a text in which commas stand between them."""
+    return [word.strip() for word in given.split(",")] if isinstance(given, str) else given
 
 
 class Settings(BaseSettings):
     """Settings of one service process."""
 
-    model_config = SettingsConfigDict(env_prefix="RESIDUA_", frozen=True, extra="forbid")
+    model_config = SettingsConfigDict(
+        env_prefix="RESIDUA_", env_ignore_empty=True, frozen=True, extra="forbid"
+    )
 
-    data: Path = Field(
-        default=Path("residua-data"), description="directory of runs, studies and the queue"
+    data: Path = Field(default=Path("out"), description="directory of runs, studies and the queue")
+    host: str = Field(default="127.0.0.1", description="where to listen")
+    port: int = Field(default=8000, ge=0, le=65535, description="where to listen")
+    published: str | None = Field(
+        default=None, description="address at which a container's port is reached, in place of host"
+    )
+    require_keys: bool = Field(
+        default=False, description="ask for API keys also where only this machine gets in"
+    )
+    allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_words)] = Field(
+        default=(), description="names callers may use besides localhost and addresses; * for any"
+    )
+    forwarded_allow_ips: str | None = Field(
+        default=None, description="proxies whose X-Forwarded-For and -Proto are believed"
+    )
+    root_path: str = Field(
+        default="",
+        pattern=r"^(/[\w.~-]+)*$",
+        description="path that a proxy strips",
     )
     scheduler: str | None = Field(
         default=None, description="dask scheduler; without one each study starts its own workers"
     )
+    scheduler_ca: FilePath | None = Field(
+        default=None, description="certificate that a scheduler at tls:// must have, PEM"
+    )
+    scheduler_cert: FilePath | None = Field(
+        default=None, description="certificate we show the scheduler, PEM"
+    )
+    scheduler_key: FilePath | None = Field(default=None, description="its key, PEM")
     workers: int | None = Field(
         default=None, ge=1, description="worker processes when there is no scheduler"
     )
@@ -35,3 +70,35 @@ class Settings(BaseSettings):
     lock_seconds: float = Field(
         default=20.0, ge=0, description="time to wait for another service to leave the directory"
     )
+
+    @property
+    def keys_asked(self) -> bool:
+        """Whether callers need a key: by where we listen, never by where they seem to come from.
+
+        Behind a proxy on this machine every caller comes from 127.0.0.1.
+        """
+        host = self.published or self.host
+        address = address_of(host)
+        local = address.is_loopback if address else host == "localhost"
+        return self.require_keys or not local
+
+
+def chosen(**given: Any) -> Settings:
+    """Return the settings: what is given and not None, the rest from the environment.
+
+    A `StudyError` names the variable that is wrong.
+    """
+    try:
+        return Settings(**{name: each for name, each in given.items() if each is not None})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = f"RESIDUA_{first['loc'][0]}".upper()
+        raise StudyError(name, first["input"], first["msg"]) from None
+
+
+def address_of(host: str) -> IPv4Address | IPv6Address | None:
+    """Return the address that a host is given by; nothing for a name."""
+    try:
+        return ip_address(host)
+    except ValueError:
+        return None
