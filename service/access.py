@@ -20,7 +20,7 @@ NEEDED = [
     (re.compile(pattern, re.DOTALL), scope)
     for pattern, scope in (
         # A browser sends no key with the address of a page; these tell what is no secret.
-        (r"(GET|HEAD) /(health|docs|redoc|openapi\.json|static-offline-docs/.*)", None),
+        (r"(GET|HEAD) /(health|docs(/.*)?|openapi\.json)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
         (r"POST /(studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
         (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),

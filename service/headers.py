@@ -13,10 +13,10 @@ HEADERS = {
     "content-security-policy": f"default-src 'none'; {OURS_ALONE}",
 }
 PAGE = (
-    "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
-    f"img-src 'self' data: blob:; worker-src blob:; {OURS_ALONE}"
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    f"{OURS_ALONE}"
 )
-"""Policy of the interactive documentation, our only page: its start-up script stands in it."""
+"""Policy of the interactive documentation, our only page: scripts come from here alone."""
 
 
 class SecurityHeaders:

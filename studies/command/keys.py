@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import sys
+from pathlib import Path
 from typing import Any
 
 OK = 0
@@ -14,9 +16,11 @@ def keys(options: argparse.Namespace) -> int:
     """Make, list or remove the API keys of a service."""
     # By name, since studies must work where the service is not installed.
     service: Any = importlib.import_module("service.keys")
-    settings: Any = importlib.import_module("service.settings")
+    settings: Any = importlib.import_module("service.settings").Settings
+    # The other settings do not matter here, and may name what is not there yet.
+    data = options.data or os.environ.get("RESIDUA_DATA") or settings.model_fields["data"].default
     try:
-        options.act(service.Keys(settings.chosen(data=options.data).data), options)
+        options.act(service.Keys(Path(data)), options)
     except service.KeysError as error:
         raise OSError(str(error)) from None
     return OK
