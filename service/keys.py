@@ -82,7 +82,7 @@ class Keys:
         """Make a key and return its text, which is stored nowhere; the name must be new."""
         if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII):
             raise StudyError("name", name, "must be 1 to 64 letters, digits, '.', '_' or '-'")
-        text = secrets.token_urlsafe(32)
+        text = f"residua_{secrets.token_urlsafe(32)}"  # no dash first; known at sight in a leak
         with self._changing() as keys:
             if name in keys:
                 raise StudyError("name", name, "must be new: there is a key of this name")

@@ -147,7 +147,7 @@ def test_the_file_of_keys_holds_none_and_is_for_its_owner(tmp_path: Path) -> Non
     texts = [keys.add(name, Scope.READ) for name in ("a", "b")]
     assert keys.path.stat().st_mode & 0o777 == 0o600
     assert not [text for text in texts if text in keys.path.read_text()]
-    assert len(set(texts)) == 2 and all(len(text) == 43 for text in texts), "256 bits"
+    assert len(set(texts)) == 2 and all(len(text) == 8 + 43 for text in texts), "256 bits"
     assert [path.name for path in tmp_path.iterdir()] == ["keys.json"]
 
 
