@@ -1,4 +1,6 @@
-FROM python:3.11-slim
+# The tag says what it is, the digest which one: the same image for everybody, until the line is
+# changed. `docker buildx imagetools inspect python:3.11-slim` shows the digest of today's.
+FROM python:3.11-slim@sha256:9c900dea9e8fb7e16277c179b555cc72d29a352dbc33cff48ad5a0412fd5bfc7
 
 # meshio, h5py and the solvers come as wheels: no compiler is needed.
 ENV PIP_NO_CACHE_DIR=1 \
@@ -16,8 +18,11 @@ COPY service service
 COPY data data
 RUN if [ "$(uname -m)" = x86_64 ]; then extra='[mkl]'; else extra=''; fi \
     && pip install --constraint constraints.txt ".$extra"
+COPY docker/watched.py /usr/local/lib/watched.py
 
-RUN useradd --create-home --uid 1000 residua && install --directory --owner residua /data
+RUN useradd --create-home --uid 1000 residua \
+    && install --directory --owner residua /data \
+    && install --directory --owner residua --mode 700 /certificates
 USER residua
 WORKDIR /home/residua
 VOLUME /data
@@ -26,4 +31,7 @@ EXPOSE 8000
 HEALTHCHECK --interval=15s --timeout=5s --start-period=60s --retries=3 \
     CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/health', timeout=4)"]
 
+ENTRYPOINT ["python", "/usr/local/lib/watched.py", "http://127.0.0.1:8000/health"]
+# Inside a container the address says nothing about who gets in: without a key it does not start,
+# unless RESIDUA_PUBLISHED says that the port is published on 127.0.0.1 only.
 CMD ["residua", "serve", "--host", "0.0.0.0", "--port", "8000", "--data", "/data"]

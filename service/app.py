@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import sys
 from collections.abc import AsyncIterator
 from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import uvicorn
-from fastapi import FastAPI
-from pydantic import ValidationError
+from fastapi import FastAPI, Security
+from fastapi.security import HTTPBearer
 
 import solver
 from service import errors, logs, routes
+from service.access import Gate
 from service.examiner import Examiner
+from service.headers import SecurityHeaders
+from service.keys import Keys, KeysError
 from service.limits import BodyLimit
 from service.lock import DirectoryInUse, lock_directory
 from service.metrics import Metrics
@@ -24,8 +28,11 @@ from service.pool import Pool
 from service.recovery import open_queue
 from service.retention import Keeper
 from service.runner import Runner
-from service.settings import Settings
+from service.settings import Settings, chosen
 from studies import Store, StoreBusy, StudyError
+
+BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
+"""How the description of the service announces that keys are asked; `Gate` does the asking."""
 
 DESCRIPTION = """Elastic-plastic contact studies: post one, watch it, fetch its data set.
 
@@ -42,7 +49,15 @@ def create_app(settings: Settings) -> FastAPI:
     ------
     DirectoryInUse
         If another service works in the data directory.
+    KeysError
+        If callers need a key and there is none.
     """
+    keys = Keys(settings.data)
+    if settings.keys_asked and not keys.all():
+        raise KeysError(
+            f"{settings.published or settings.host} is open to others, who need an API key; make "
+            f"one: residua keys add NAME --scope admin --data {shlex.quote(str(settings.data))}"
+        )
     lock = lock_directory(settings.data, settings.lock_seconds)
     store = open_store(settings.data)
     restore = partial(open_queue, settings.data / "jobs.sqlite", store, settings.max_queue)
@@ -75,11 +90,14 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.keeper = keeper
     app.state.metrics = metrics
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    app.add_middleware(Gate, settings=settings, keys=keys)
+    app.add_middleware(SecurityHeaders)
     # Added last, it is the outermost: what the others refuse is measured and logged too.
     app.add_middleware(logs.Observed, observe=metrics.observe)
     errors.install(app)
     for router in routes.ROUTERS:
-        app.include_router(router)
+        needs_key = settings.keys_asked and "health" not in router.tags
+        app.include_router(router, dependencies=[Security(BEARER)] if needs_key else [])
     return app
 
 
@@ -92,8 +110,15 @@ def open_store(directory: Path) -> Store:
     return store
 
 
-def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) -> None:
+def serve(
+    host: str | None = None,
+    port: int | None = None,
+    data: Path | str | None = None,
+    scheduler: str | None = None,
+) -> None:
     """Serve until a signal comes; a study that is running then resumes at the next start.
+
+    What is None comes from the environment, see `Settings`.
 
     Parameters
     ----------
@@ -101,27 +126,26 @@ def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) 
     data : directory of runs, studies and the queue
     scheduler : address of a dask scheduler; without one each study starts its own workers
     """
-    given: dict[str, Any] = {} if scheduler is None else {"scheduler": scheduler}
     try:
-        settings = Settings(data=Path(data), **given)
+        settings = chosen(host=host, port=port, data=data, scheduler=scheduler)
         logs.configure(settings.log_format)
         app = create_app(settings)
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = f"RESIDUA_{first['loc'][0]}".upper()
-        refuse(f"{name} = {first['input']!r}: {first['msg']}")
-    except (DirectoryInUse, StudyError) as error:
+    except (DirectoryInUse, KeysError, StudyError) as error:
         refuse(str(error))
     except OSError as error:
-        refuse(f"data = {str(data)!r}: must be a directory to write in ({error.strerror})")
+        refuse(f"data = {str(settings.data)!r}: must be a directory to write in ({error.strerror})")
     uvicorn.run(
         app,
-        host=host,
-        port=port,
+        host=settings.host,
+        port=settings.port,
+        root_path=settings.root_path,
         timeout_graceful_shutdown=OPEN_STREAMS_SECONDS,
         server_header=False,
         log_config=None,
         access_log=False,
+        # Without a proxy that is known, anybody on this machine could write other names in the log.
+        proxy_headers=settings.forwarded_allow_ips is not None,
+        forwarded_allow_ips=settings.forwarded_allow_ips,
     )
 
 

@@ -25,7 +25,7 @@ OUTDATED = "the solver has changed since the study was accepted: post it again"
 
 def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> None:
     """Compute what is missing of the study in the order, and tell how it goes."""
-    study = Study.from_dict(order["study"])
+    study = Study.known(order["study"])
     if study.id != order["id"]:
         outlet.send("refused", {"reason": OUTDATED})
         return

@@ -10,6 +10,7 @@ from service.errors import NotFound
 from service.examiner import Examiner
 from service.job import Job
 from service.jobs import Jobs
+from service.keys import Scope
 from service.metrics import Metrics
 from service.retention import Keeper
 from service.runner import Runner
@@ -53,5 +54,12 @@ def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
     return row
 
 
+def get_caller(request: Request) -> Scope | None:
+    """Return what the caller may do; None for a stranger, who may ask for little."""
+    scope: Scope | None = request.state.caller
+    return scope
+
+
+TheCaller = Annotated[Scope | None, Depends(get_caller)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]

@@ -14,6 +14,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.headers import HEADERS
 from service.logs import REQUEST
 from studies import StudyError
 from studies.errors import CatalogueDamaged, StoreFull
@@ -188,8 +189,10 @@ def on_http_error(request: Request, exc: HTTPException) -> Problem:
 
 def on_unexpected(request: Request, exc: Exception) -> Problem:
     """Answer a defect without showing its inside; the server writes the traceback to its log."""
-    status, known = HTTPStatus.INTERNAL_SERVER_ERROR, {"x-request-id": REQUEST.get()}
-    return problem(request, status, "the service failed; see its log", headers=known)
+    # No middleware sees this answer, which is made outside of them all.
+    known = {**HEADERS, "x-request-id": REQUEST.get()}
+    status, detail = HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log"
+    return problem(request, status, detail, headers=known)
 
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {

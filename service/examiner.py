@@ -16,10 +16,11 @@ from collections.abc import AsyncIterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from service.settings import Settings
-from studies import Study
+from studies import Bounds, Estimate, Store, Study, estimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +31,12 @@ class Examined:
     ----------
     study : checked
     runs : ids of its runs in the order of its cases
+    estimate : what it costs
     """
 
     study: Study
     runs: list[str]
+    estimate: Estimate
 
 
 class Examiner:
@@ -45,7 +48,7 @@ class Examiner:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+        self._directory, self._bounds = settings.data.resolve(), settings.bounds
         self._process = self._start()
 
     @contextlib.asynccontextmanager
@@ -63,12 +66,14 @@ class Examiner:
         Raises
         ------
         StudyError
-            For anything wrong with it.
+            For anything wrong with it, or when it asks for more than the settings allow.
         """
         for last in (False, True):
             try:
                 running = asyncio.get_running_loop()
-                return await running.run_in_executor(self._process, examined, dict(content))
+                return await running.run_in_executor(
+                    self._process, examined, dict(content), self._directory, self._bounds
+                )
             except BrokenProcessPool:  # such as one that was killed
                 self._process = self._start()
                 if last:
@@ -80,10 +85,14 @@ class Examiner:
         return ProcessPoolExecutor(1, mp_context=spawn, initializer=_attend)
 
 
-def examined(content: dict[str, Any]) -> Examined:
-    """Check a study and name its runs; in the examiner's process."""
-    study = Study.from_dict(content)
-    return Examined(study, [case.id for case in study.cases()])
+def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
+    """Check a study, name its runs and tell what it costs; in the examiner's process."""
+    study = Study.known(content)
+    bounds.check_size(study)
+    runs = list(study.checked().run_ids())
+    cost = estimate(study, Store(directory))
+    bounds.check(cost)
+    return Examined(study, runs, cost)
 
 
 def _attend() -> None:

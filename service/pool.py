@@ -67,7 +67,7 @@ class Pool:
             "data": str(self.settings.data.resolve()),
             "workers": self.settings.workers,
             "memory": self.settings.worker_memory,
-            "access": self.settings.outside_access(),
+            "access": self.settings.outside_access,
             "grace": self.settings.grace_seconds,
         }
         try:

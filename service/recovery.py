@@ -46,13 +46,13 @@ def open_queue(path: Path, store: Store, longest: int | None) -> Jobs:
 def _find(file: Path, jobs: Jobs, store: Store) -> None:
     """Put a study of the directory into the queue, if this version of the solver knows it."""
     try:
-        study = Study.from_dict(json.loads(file.read_text(encoding="utf-8")))
+        study = Study.known(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:  # StudyError is a ValueError
         log.warning("studies/%s: not found again: %s", file.parent.name, error)
         return
     if study.id != file.parent.name:
         return
-    jobs.accept(study.id, study.to_dict(), (case.id for case in study.cases()))
+    jobs.accept(study.id, study.to_dict(), study.run_ids())
     with suppress(StudyError), open_netcdf(store.dataset_path(study.id)) as dataset:
         codes = dataset["status"].to_numpy().ravel().tolist()
         counts = Counter(STATUSES[code] for code in codes)

@@ -166,9 +166,9 @@ class Keeper:
         for path in (self.store.directory / "studies").glob("*/study.json"):
             with suppress(ValueError, OSError):
                 if path.parent.name not in known:
-                    study = Study.from_dict(json.loads(path.read_text(encoding="utf-8")))
+                    study = Study.known(json.loads(path.read_text(encoding="utf-8")))
                     if study.id == path.parent.name:
-                        needed.update(case.id for case in study.cases())
+                        needed.updatestudy.run_ids()
         return needed
 
 

@@ -11,7 +11,7 @@ import sys
 import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -214,7 +214,7 @@ class Runner:
             "study": await asyncio.to_thread(self.jobs.study, job.id),
             "data": str(self.settings.data.resolve()),
             "access": await self.pool.access(),
-            "limits": self.settings.limits(),
+            "limits": asdict(self.settings.limits),
             "priority": job.priority,
             "again": job.again,
             "grace": self.settings.grace_seconds,

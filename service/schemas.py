@@ -133,7 +133,9 @@ class Health(BaseModel):
     """Whether studies can be accepted and computed."""
 
     status: Literal["ready", "waiting", "failing"]
-    data_writable: bool
-    queue_readable: bool
-    executor_alive: bool
-    waiting: dict[str, str] = Field(description="running studies that wait, and what for")
+    data_writable: bool | None = Field(default=None, description="for callers with a key")
+    queue_readable: bool | None = Field(default=None, description="for callers with a key")
+    executor_alive: bool | None = Field(default=None, description="for callers with a key")
+    waiting: dict[str, str] | None = Field(
+        default=None, description="running studies that wait, and what for; with a key"
+    )

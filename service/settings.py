@@ -2,24 +2,61 @@
 
 from __future__ import annotations
 
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, Field, FilePath, ValidationError
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from studies.errors import StudyError
+from studies.execution.cluster import Access
+from studies.execution.estimate import Bounds
+from studies.execution.limits import Limits
+
+
+def _words(given: Any) -> Any:
+    """Return the parts of a text in which commas stand between them."""
+    return [word.strip() for word in given.split(",")] if isinstance(given, str) else given
 
 
 class Settings(BaseSettings):
     """Settings of one service process."""
 
-    model_config = SettingsConfigDict(env_prefix="RESIDUA_", frozen=True, extra="forbid")
+    model_config = SettingsConfigDict(
+        env_prefix="RESIDUA_", env_ignore_empty=True, frozen=True, extra="forbid"
+    )
 
-    data: Path = Field(
-        default=Path("residua-data"), description="directory of runs, studies and the queue"
+    data: Path = Field(default=Path("out"), description="directory of runs, studies and the queue")
+    host: str = Field(default="127.0.0.1", description="where to listen")
+    port: int = Field(default=8000, ge=0, le=65535, description="where to listen")
+    published: str | None = Field(
+        default=None, description="address at which a container's port is reached, in place of host"
+    )
+    require_keys: bool = Field(
+        default=False, description="ask for API keys also where only this machine gets in"
+    )
+    allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_words)] = Field(
+        default=(), description="names callers may use besides localhost and addresses; * for any"
+    )
+    forwarded_allow_ips: str | None = Field(
+        default=None, description="proxies whose X-Forwarded-For and -Proto are believed"
+    )
+    root_path: str = Field(
+        default="",
+        pattern=r"^(/[\w.~-]+)*$",
+        description="path that a proxy strips",
     )
     scheduler: str | None = Field(
         default=None, description="dask scheduler; without one each study starts its own workers"
     )
+    scheduler_ca: FilePath | None = Field(
+        default=None, description="certificate that a scheduler at tls:// must have, PEM"
+    )
+    scheduler_cert: FilePath | None = Field(
+        default=None, description="certificate we show the scheduler, PEM"
+    )
+    scheduler_key: FilePath | None = Field(default=None, description="its key, PEM")
     workers: int | None = Field(
         default=None, ge=1, description="worker processes when there is no scheduler"
     )
@@ -61,19 +98,75 @@ class Settings(BaseSettings):
     keep_bytes: int | None = Field(
         default=None, ge=0, description="size of the data above which the oldest are deleted"
     )
+    max_runs: int = Field(default=100_000, ge=1, description="most runs of a study")
+    max_unknowns: int = Field(default=2_000_000, ge=1, description="most unknowns of a run")
+    max_increments: int = Field(
+        default=50_000, ge=1, description="most increments of a loading path"
+    )
+    max_cpu_seconds: float | None = Field(
+        default=None, gt=0, description="most processor time a study is likely to take"
+    )
+    max_bytes: int | None = Field(default=None, ge=1, description="most bytes a study may store")
     log_format: Literal["plain", "json"] = Field(default="plain", description="form of the log")
 
-    def limits(self) -> dict[str, Any]:
-        """Return the arguments of `studies.execution.limits.Limits`."""
-        return {
-            "stall_seconds": self.stall_seconds,
-            "path_seconds": self.path_seconds,
-            "memory": self.worker_memory,
-            "patience": self.patience_seconds,
-        }
+    @property
+    def limits(self) -> Limits:
+        """What the work on a study may take."""
+        return Limits(
+            stall_seconds=self.stall_seconds,
+            path_seconds=self.path_seconds,
+            memory=self.worker_memory,
+            patience=self.patience_seconds,
+        )
 
+    @property
+    def bounds(self) -> Bounds:
+        """What a study may ask for."""
+        return Bounds(
+            runs=self.max_runs,
+            unknowns=self.max_unknowns,
+            increments=self.max_increments,
+            cpu_seconds=self.max_cpu_seconds,
+            bytes=self.max_bytes,
+        )
+
+    @property
     def outside_access(self) -> dict[str, Any] | None:
-        """Return how the outside scheduler is reached; None when the workers are our own."""
+        """How the outside scheduler is reached; None when the workers are our own."""
         if self.scheduler is None:
             return None
-        return {"address": self.scheduler, "ca": None, "cert": None, "key": None}
+        files = {"ca": self.scheduler_ca, "cert": self.scheduler_cert, "key": self.scheduler_key}
+        given = {name: str(path.resolve()) for name, path in files.items() if path}
+        return Access(self.scheduler, **given).to_dict()
+
+    @property
+    def keys_asked(self) -> bool:
+        """Whether callers need a key: by where we listen, never by where they seem to come from.
+
+        Behind a proxy on this machine every caller comes from 127.0.0.1.
+        """
+        host = self.published or self.host
+        address = address_of(host)
+        local = address.is_loopback if address else host == "localhost"
+        return self.require_keys or not local
+
+
+def chosen(**given: Any) -> Settings:
+    """Return the settings: what is given and not None, the rest from the environment.
+
+    A `StudyError` names the variable that is wrong.
+    """
+    try:
+        return Settings(**{name: each for name, each in given.items() if each is not None})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = f"RESIDUA_{first['loc'][0]}".upper()
+        raise StudyError(name, first["input"], first["msg"]) from None
+
+
+def address_of(host: str) -> IPv4Address | IPv6Address | None:
+    """Return the address that a host is given by; nothing for a name."""
+    try:
+        return ip_address(host)
+    except ValueError:
+        return None

@@ -1,5 +1,12 @@
 """The resources, a module each."""
 
-from service.routes import health, metrics, runs, scenes, studies
+from service.routes import estimate, health, metrics, runs, scenes, studies
 
-ROUTERS = (studies.router, runs.router, scenes.router, health.router, metrics.router)
+ROUTERS = (
+    studies.router,
+    estimate.router,
+    runs.router,
+    scenes.router,
+    health.router,
+    metrics.router,
+)

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import tempfile
 from http import HTTPStatus
+from typing import Literal
 
 from fastapi import APIRouter, Response
 
-from service.dependencies import TheJobs, TheRunner, TheSettings
+from service.dependencies import TheCaller, TheJobs, TheRunner, TheSettings
 from service.errors import QueueLost
 from service.schemas import Health
 
 router = APIRouter(tags=["health"])
 
 
-@router.get("/health", responses={503: {"model": Health}})
-def health(settings: TheSettings, runner: TheRunner, jobs: TheJobs, response: Response) -> Health:
-    """Tell whether studies can be stored and computed; 503 when they cannot."""
+@router.get("/health", responses={503: {"model": Health}}, response_model_exclude_unset=True)
+def health(
+    settings: TheSettings, runner: TheRunner, jobs: TheJobs, caller: TheCaller, response: Response
+) -> Health:
+    """Tell whether studies can be stored and computed; 503 when they cannot.
+
+    A caller without a key, where keys are asked, is told the status alone.
+    """
     writable = readable = True
     try:
         with tempfile.TemporaryFile(dir=settings.data) as probe:
@@ -31,8 +37,13 @@ def health(settings: TheSettings, runner: TheRunner, jobs: TheJobs, response: Re
     ready = writable and readable and runner.alive
     if not ready:
         response.status_code = HTTPStatus.SERVICE_UNAVAILABLE
+    status: Literal["ready", "waiting", "failing"] = "waiting" if waiting else "ready"
+    if not ready:
+        status = "failing"
+    if caller is None:
+        return Health(status=status)
     return Health(
-        status="failing" if not ready else "waiting" if waiting else "ready",
+        status=status,
         data_writable=writable,
         queue_readable=readable,
         executor_alive=runner.alive,

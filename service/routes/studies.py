@@ -66,7 +66,8 @@ async def submit(
     found = await examiner.examine(content)
     study = found.study
     job, new = await asyncio.to_thread(jobs.accept, study.id, study.to_dict(), found.runs, priority)
-    await asyncio.to_thread(store.save_study, study)
+    if new:
+        await asyncio.to_thread(store.save_study, study)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path

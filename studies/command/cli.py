@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.command import commands
+from studies.command import commands, keys
 from studies.command.commands import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError
 from studies.execution.limits import Limits
@@ -107,22 +107,48 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
 
     one = add("serve", commands.serve)
-    one.add_argument("--host", default="127.0.0.1")
-    one.add_argument("--port", type=_integer(0, 65535), default=8000)
-    one.add_argument("--data", type=Path, default=Path("out"), metavar="DIR")
+    one.add_argument("--host", help="default: 127.0.0.1; elsewhere callers need API keys")
+    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
+    one.add_argument("--data", type=Path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
+    _add_access(add)
+    _add_remote(add)
+    return parser
+
+
+def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
+    actions = add("keys", keys.keys).add_subparsers(required=True, metavar="ACTION")
+    for act in (keys.add, keys.list_, keys.remove):
+        name = act.__name__.strip("_")
+        one = actions.add_parser(name, help=act.__doc__, description=act.__doc__)
+        one.set_defaults(act=act)
+        one.add_argument("--data", type=Path, metavar="DIR", help="of the service; default: out")
+        if name != "list":
+            one.add_argument("name", metavar="NAME")
+        if name == "add":
+            one.add_argument("--scope", choices=["read", "submit", "admin"], required=True)
+
+    one = add("certificates", keys.certificates)
+    one.add_argument("--out", type=Path, required=True, metavar="DIR")
+
+
+def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
     for talk in (commands.submit, commands.status, commands.cancel, commands.fetch):
         name = talk.__name__
         one = add(name, commands.remote, talk=talk)
         one.add_argument("--url", default="http://127.0.0.1:8000")
+        one.add_argument(
+            "--api-key-file", type=Path, metavar="FILE",
+            help="holds the API key (default: environment variable RESIDUA_API_KEY); an argument "
+            "would show the key to everybody on this machine",
+        )  # fmt: skip
         if name == "submit":
             one.add_argument("study", type=Path, metavar="STUDY.toml")
         else:
             one.add_argument("id")
         if name == "fetch":
             one.add_argument("--out", type=Path, metavar="FILE")
-    return parser
 
 
 if __name__ == "__main__":

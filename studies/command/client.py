@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -25,10 +27,16 @@ class Service:
     Parameters
     ----------
     url : its root, such as ``http://localhost:8000``
+    key : API key, where the service asks for one
     """
 
-    def __init__(self, url: str) -> None:
-        self._client = httpx.Client(base_url=url, timeout=_WAIT)
+    def __init__(self, url: str, key: str | None = None) -> None:
+        headers = {"authorization": f"Bearer {key}"} if key else {}
+        self._client = httpx.Client(base_url=url, timeout=_WAIT, headers=headers)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._client.close()
 
     def submit(self, path: Path) -> dict[str, Any]:
         """Send a study file; the service checks it."""
@@ -60,6 +68,26 @@ class Service:
         answer = self._client.request(method, path, **content)
         _accept(answer)
         return answer
+
+
+def api_key(path: Path | None) -> str | None:
+    """Return the key in the file ``path``, or in the environment; no error shows any of it."""
+    if path is None:
+        return _plain("RESIDUA_API_KEY", os.environ.get("RESIDUA_API_KEY", "")) or None
+    try:
+        text = path.read_text(encoding="ascii", errors="replace")
+    except OSError as error:  # whoever took the option for the key itself has typed it here
+        allowed = f"must be a file that holds the key: {error.strerror}"
+        raise StudyError("--api-key-file", "…", allowed) from None
+    return _plain("--api-key-file", text)
+
+
+def _plain(source: str, text: str) -> str:
+    """Return a key that a header can carry: what else it holds may end up in an error."""
+    key = text.strip()
+    if not re.fullmatch(r"[\w-]*", key, re.ASCII):
+        raise StudyError(source, "…", "must hold one key: letters, digits, '-' and '_'")
+    return key
 
 
 def _accept(answer: httpx.Response) -> None:

@@ -7,7 +7,7 @@ import importlib
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -146,11 +146,11 @@ def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
     import httpx
 
-    from studies.command.client import Refused, Service
+    from studies.command.client import Refused, Service, api_key
 
     try:
-        service = Service(options.url)
-        print(options.talk(service, options))
+        with closing(Service(options.url, api_key(options.api_key_file))) as service:
+            print(options.talk(service, options))
     except Refused as error:
         return complain(error, BAD_INPUT)
     except (httpx.HTTPError, httpx.InvalidURL) as error:

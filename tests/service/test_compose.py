@@ -16,6 +16,7 @@ import httpx
 import pytest
 import yaml
 
+from service.settings import Settings
 from studies import open_netcdf
 from tests.architecture.sources import ROOT
 from tests.service.servers import end, environment, fake_study, free_port, wait_until
@@ -23,6 +24,7 @@ from tests.service.servers import end, environment, fake_study, free_port, wait_
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())
 SERVICES: dict[str, Any] = COMPOSE["services"]
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
+ENTRYPOINT = json.loads(re.findall(r"^ENTRYPOINT (.*)$", DOCKERFILE, re.MULTILINE)[0])
 
 PROGRAMS = {
     "residua": [
@@ -37,24 +39,62 @@ PROGRAMS = {
 
 KEYS = {
     "image", "build", "restart", "init", "command", "healthcheck", "volumes", "depends_on",
-    "ports", "stop_grace_period", "environment",
+    "ports", "stop_grace_period", "environment", "read_only", "tmpfs", "security_opt", "cap_drop",
+    "pids_limit", "mem_limit", "cpus", "logging", "entrypoint",
 }  # fmt: skip
 DURATION = re.compile(r"\d+s")
+SIZE = re.compile(r"\d+[mg]")
+LASTING = ["scheduler", "worker", "service"]
+
+
+def interpolated(text: str) -> str:
+    """Return a text of the file as the engine reads it when no variable is set."""
+    return re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", text)
 
 
 def test_the_file_keeps_to_the_compose_specification() -> None:
-    assert set(COMPOSE) == {"name", "x-residua", "services", "volumes"}
-    for service in SERVICES.values():
+    assert set(COMPOSE) == {"name", "x-residua", "x-check", "services", "volumes"}
+    assert set(SERVICES) == {"certificates", *LASTING}
+    for name, service in SERVICES.items():
         assert set(service) <= KEYS
-        assert all(isinstance(word, str) for word in service["command"])
+        words = service["command"] + service.get("entrypoint", [])
+        assert all(isinstance(word, str) for word in words)
         check = service["healthcheck"]
+        if name == "certificates":
+            assert check == {"disable": True}
+            continue
         assert set(check) == {"test", "interval", "timeout", "start_period", "retries"}
         assert isinstance(check["retries"], int)
         spans = [check["interval"], check["timeout"], check["start_period"]]
         assert all(DURATION.fullmatch(span) for span in spans)
 
 
-@pytest.mark.parametrize("name", ["scheduler", "worker", "service"])
+@pytest.mark.parametrize("name", SERVICES)
+def test_no_container_can_do_more_than_it_needs(name: str) -> None:
+    service = SERVICES[name]
+    assert service["read_only"] is True and service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert "privileged" not in service and "cap_add" not in service
+    (tmpfs,) = service["tmpfs"]
+    assert re.fullmatch(r"/tmp:size=\d+m", tmpfs)
+    assert SIZE.fullmatch(interpolated(service["mem_limit"]))
+    assert service["cpus"] > 0 and service["pids_limit"] <= 512
+    assert service["logging"]["driver"] == "json-file"
+    assert SIZE.fullmatch(service["logging"]["options"]["max-size"])
+    assert int(service["logging"]["options"]["max-file"]) > 1
+
+
+@pytest.mark.parametrize("name", LASTING)
+def test_what_answers_no_more_is_ended_and_so_restarted(name: str) -> None:
+    """The watch asks where the health check asks; `test_watched` shows what it does."""
+    watch, script, url = SERVICES[name].get("entrypoint", ENTRYPOINT)
+    assert (watch, script) == ("python", "/usr/local/lib/watched.py")
+    assert f"urlopen('{url}'" in SERVICES[name]["healthcheck"]["test"][-1]
+    assert f"COPY docker/watched.py {script}\n" in DOCKERFILE
+    assert SERVICES[name]["restart"] == "always"
+
+
+@pytest.mark.parametrize("name", LASTING)
 def test_every_service_restarts_and_is_watched(name: str) -> None:
     service = SERVICES[name]
     assert service["restart"] == "always"
@@ -65,14 +105,47 @@ def test_every_service_restarts_and_is_watched(name: str) -> None:
 
 def test_only_the_service_is_reachable_from_outside() -> None:
     assert {name for name, service in SERVICES.items() if "ports" in service} == {"service"}
-    assert SERVICES["service"]["ports"] == ["8000:8000"]
+    (port,) = SERVICES["service"]["ports"]
+    assert interpolated(port) == "127.0.0.1:8000:8000"
     assert not [name for name, service in SERVICES.items() if "network_mode" in service]
 
 
+def test_the_service_is_opened_to_others_only_with_keys(tmp_path: Path) -> None:
+    """One variable says where the port is published and, by that, whether keys are asked."""
+    service = SERVICES["service"]
+    given = service["environment"]["RESIDUA_PUBLISHED"]
+    assert service["ports"] == [f"{given}:8000:8000"]
+    host = service["command"][service["command"].index("--host") + 1]
+    for published, asked in ((interpolated(given), False), ("0.0.0.0", True), ("10.1.2.3", True)):
+        assert Settings(data=tmp_path, host=host, published=published).keys_asked is asked
+
+
+def test_only_who_has_the_certificate_reaches_the_scheduler() -> None:
+    command = SERVICES["certificates"]["command"]
+    folder = command[command.index("--out") + 1]
+    files = [f"{folder}/{name}.pem" for name in ("ca", "cert", "key")]
+    for name in ("scheduler", "worker"):
+        words = SERVICES[name]["command"]
+        options = [words[words.index(o) + 1] for o in ("--tls-ca-file", "--tls-cert", "--tls-key")]
+        assert options == files
+    assert "--protocol tls" in " ".join(SERVICES["scheduler"]["command"])
+    settings = SERVICES["service"]["environment"]
+    assert [settings[f"RESIDUA_SCHEDULER_{each}"] for each in ("CA", "CERT", "KEY")] == files
+    mounted = {name: service["volumes"][-1] for name, service in SERVICES.items()}
+    assert mounted.pop("certificates") == f"certificates:{folder}"
+    assert set(mounted.values()) == {f"certificates:{folder}:ro"}
+
+
+def test_no_page_of_dask_is_reachable_from_other_containers() -> None:
+    for name in ("scheduler", "worker"):
+        words = SERVICES[name]["command"]
+        assert words[words.index("--dashboard-address") + 1].startswith("127.0.0.1:")
+
+
 def test_workers_and_service_see_the_data_under_the_same_path() -> None:
-    (volume,) = COMPOSE["volumes"]
-    mounted = {name: service.get("volumes") for name, service in SERVICES.items()}
-    assert mounted["worker"] == mounted["service"] == [f"{volume}:/data"]
+    mounted = {name: service["volumes"] for name, service in SERVICES.items()}
+    assert mounted["worker"] == mounted["service"] and mounted["service"][0] == "data:/data"
+    assert set(COMPOSE["volumes"]) == {"data", "certificates"}
     command = SERVICES["service"]["command"]
     assert command[command.index("--data") + 1] == "/data"
 
@@ -84,9 +157,9 @@ def test_workers_can_be_multiplied() -> None:
 def test_who_needs_the_scheduler_waits_for_its_health() -> None:
     for name in ("worker", "service"):
         assert SERVICES[name]["depends_on"] == {"scheduler": {"condition": "service_healthy"}}
-        (address,) = [word for word in SERVICES[name]["command"] if word.startswith("tcp:")]
+        (address,) = [word for word in SERVICES[name]["command"] if "://" in word]
         scheduler = SERVICES["scheduler"]["command"]
-        assert address == f"tcp://scheduler:{scheduler[scheduler.index('--port') + 1]}"
+        assert address == f"tls://scheduler:{scheduler[scheduler.index('--port') + 1]}"
 
 
 CONFIGURATION = """
@@ -119,11 +192,14 @@ def test_the_scheduler_is_configured_like_that_of_the_services_own_workers() -> 
 
 def test_the_image_runs_as_an_ordinary_user_with_pinned_packages() -> None:
     steps = re.findall(r"^([A-Z]+) (.*)$", DOCKERFILE, re.MULTILINE)
-    assert steps[0] == ("FROM", "python:3.11-slim")
+    assert steps[0][0] == "FROM"
+    assert re.fullmatch(r"python:3\.11-slim@sha256:[0-9a-f]{64}", steps[0][1])
     users = [argument for step, argument in steps if step == "USER"]
     assert users == ["residua"]
     assert "--constraint constraints.txt" in DOCKERFILE
     assert "HEALTHCHECK" in DOCKERFILE
+    for folder in ("/data", "/certificates"):  # a new volume takes its owner from the image
+        assert re.search(f"install --directory --owner residua .*{folder}\\b", DOCKERFILE)
 
 
 class Stage:
@@ -133,27 +209,32 @@ class Stage:
         self.home = home
         self.stack = stack
         self.ports = {port: str(free_port()) for port in ("8786", "8787", "8790", "8000")}
-        self.folders = {"/data": str(home / "data"), "/tmp": str(home / "scratch")}
+        self.folders = {"/data": "data", "/tmp": "scratch", "/certificates": "certificates"}
         self.environment = environment(home / "computed.log")
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def translated(self, words: list[str]) -> list[str]:
         """Return a command of a container as a command of this machine."""
 
-        def word(text: str) -> str:
-            text = self.folders.get(text, text)
-            text = text.replace("scheduler:", "127.0.0.1:").replace("0.0.0.0", "127.0.0.1")
-            return re.sub(r"\b\d{4}\b", lambda port: self.ports.get(port[0], port[0]), text)
+        return PROGRAMS[words[0]] + [self.word(text) for text in words[1:]]
 
-        return PROGRAMS[words[0]] + [word(text) for text in words[1:]]
+    def word(self, text: str) -> str:
+        """Return a word of the file with the ports and folders of this machine."""
+        top, _, rest = text[1:].partition("/")
+        if text.startswith("/") and f"/{top}" in self.folders:
+            return str(self.home / self.folders[f"/{top}"] / rest)
+        text = interpolated(text)
+        text = text.replace("scheduler:", "127.0.0.1:").replace("0.0.0.0", "127.0.0.1")
+        return re.sub(r"\b\d{4}\b", lambda port: self.ports.get(port[0], port[0]), text)
 
     def start(self, name: str) -> None:
         """Start a service of the compose file; it ends with the stage."""
         log = self.stack.enter_context((self.home / f"{name}.log").open("ab"))
+        given = SERVICES[name].get("environment", {})
         process = subprocess.Popen(
             self.translated(SERVICES[name]["command"]),
             cwd=self.home,
-            env=self.environment | SERVICES[name].get("environment", {}),
+            env=self.environment | {key: self.word(value) for key, value in given.items()},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -173,9 +254,11 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     """The three services, healthy."""
     with ExitStack() as stack:
         stage = Stage(tmp_path_factory.mktemp("stage"), stack)
-        for name in ("scheduler", "worker", "service"):
+        stage.start("certificates")
+        assert stage.processes["certificates"].wait(timeout=60.0) == 0
+        for name in LASTING:
             stage.start(name)
-        for name in ("scheduler", "worker", "service"):
+        for name in LASTING:
             wait_until(lambda name=name: stage.healthy(name))
         yield stage
 

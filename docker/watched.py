@@ -1,0 +1,63 @@
+"""Run a command, and end it when it answers no more: the engine starts again what has ended.
+
+``python watched.py [--every SECONDS] [--failures NUMBER] URL COMMAND …``
+
+An engine marks a container as unhealthy, and leaves it as it is. Any answer is a sign of life, also
+503: the service then says what it lacks, still hands out results, and a restart brings no room on a
+disk. The exit status is that of the command, or 1 when it was ended.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+ANSWER_SECONDS = 5.0
+GRACE_SECONDS = 20.0
+
+
+def answers(url: str) -> bool:
+    """Tell whether anything comes back from ``url``."""
+    try:
+        urllib.request.urlopen(url, timeout=ANSWER_SECONDS).close()
+    except urllib.error.HTTPError as error:
+        error.close()
+    except OSError:
+        return False
+    return True
+
+
+def watch(command: list[str], url: str, every: float, failures: int) -> int:
+    """Run ``command`` until it ends, or has left ``failures`` questions in a row unanswered."""
+    process = subprocess.Popen(command)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda received, _: process.send_signal(received))
+    silent = 0
+    while silent < failures:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            status = process.wait(timeout=every)
+            return status if status >= 0 else 128 - status
+        silent = 0 if answers(url) else silent + 1
+    print(f"{url}: no answer {failures} times in a row; ending the process", file=sys.stderr)
+    process.terminate()
+    try:
+        process.wait(timeout=GRACE_SECONDS)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    return 1
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="Run a command as long as it answers.")
+    parser.add_argument("--every", type=float, default=15.0, help="seconds")
+    parser.add_argument("--failures", type=int, default=20, help="five minutes, start included")
+    parser.add_argument("url")
+    parser.add_argument("command", nargs=argparse.REMAINDER)
+    given = parser.parse_args()
+    sys.exit(watch(given.command, given.url, given.every, given.failures))

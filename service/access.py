@@ -1,0 +1,133 @@
+"""Who gets in: under a name of ours, from no foreign page, with a key that allows it."""
+
+from __future__ import annotations
+
+import re
+from http import HTTPStatus
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.types import ASGIApp, Receive, Send
+from starlette.types import Scope as Connection
+
+from service.errors import on_http_error
+from service.keys import Keys, KeysError, Scope
+from service.settings import Settings, address_of
+
+SAFE = ("GET", "HEAD", "OPTIONS")
+
+NEEDED = [
+    (re.compile(pattern, re.DOTALL), scope)
+    for pattern, scope in (
+        # A browser sends no key with the address of a page; these tell what is no secret.
+        (r"(GET|HEAD) /(health|docs(/.*)?|openapi\.json)", None),
+        (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
+        (r"POST /(studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
+        (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),
+        (r".*", Scope.ADMIN),
+    )
+]
+"""The scope that a request needs: the first that fits, so that what is new is for admin."""
+
+HOST = re.compile(r"(?:\[([\da-f:.]+)\]|([^\s:/@\[\]]+))(?::\d*)?", re.IGNORECASE)
+JSON = re.compile(r"application/(?:[\w.-]+\+)?json\s*(?:;.*)?", re.IGNORECASE)
+
+
+def needed(request: Request) -> Scope | None:
+    """Return the scope a request needs; nothing where strangers are welcome."""
+    path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
+    deletes = "?purge" if "purge" in request.query_params else ""
+    words = f"{request.method} {path}{deletes}"
+    return next(scope for pattern, scope in NEEDED if pattern.fullmatch(words))
+
+
+class Gate:
+    """Middleware that turns away before anything of a request is looked at or read.
+
+    What the caller may do is left in ``request.state.caller``: a `Scope`, or None for a stranger.
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings, keys: Keys) -> None:
+        self.app = app
+        self.asked = settings.keys_asked
+        self.keys = keys
+        self.names = {"localhost", settings.host, *settings.allowed_hosts}
+
+    async def __call__(self, connection: Connection, receive: Receive, send: Send) -> None:
+        """Answer with a problem document, or hand the request on."""
+        answer = self.app
+        if connection["type"] == "http":
+            request = Request(connection)
+            try:
+                self.check_host(request.headers.getlist("host"))
+                check_page(request)
+                request.state.caller = self.caller(request) if self.asked else Scope.ADMIN
+                check_content(request)
+            except HTTPException as refusal:
+                answer = on_http_error(request, refusal)
+        await answer(connection, receive, send)
+
+    def check_host(self, given: list[str]) -> None:
+        """Refuse names that are not ours: a foreign page may give its own name our address.
+
+        An address cannot be given another meaning.
+        """
+        found = HOST.fullmatch(given[0]) if len(given) == 1 else None
+        name = (found[1] or found[2]).lower().removesuffix(".") if found else ""
+        if not (found and (address_of(name) or {name, "*"} & self.names)):
+            raise HTTPException(
+                HTTPStatus.MISDIRECTED_REQUEST,
+                "the service has another host name than this; RESIDUA_ALLOWED_HOSTS adds names",
+            )
+
+    def caller(self, request: Request) -> Scope | None:
+        """Return what the caller may do, once that is known to be enough."""
+        wanted, header = needed(request), request.headers.get("authorization", "")
+        if not header and wanted is None:
+            return None
+        kind, _, text = header.partition(" ")
+        try:
+            scope = self.keys.scope_of(text.strip()) if kind.lower() == "bearer" else None
+        except KeysError as error:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from None
+        challenge = 'Bearer realm="residua"'
+        if scope is None:
+            status, detail = HTTPStatus.UNAUTHORIZED, "this needs authorization: Bearer <API key>"
+            if header:
+                detail = "the API key is not known"
+                challenge += ', error="invalid_token"'
+        elif wanted and not scope.covers(wanted):
+            status = HTTPStatus.FORBIDDEN
+            detail = f"this needs an API key of scope {wanted}; the scope of this one is {scope}"
+            challenge += f', error="insufficient_scope", scope="{wanted}"'
+        else:
+            return scope
+        raise HTTPException(status, detail, {"www-authenticate": challenge})
+
+
+def check_page(request: Request) -> None:
+    """Refuse what another site's page sends: browsers say so, other clients say nothing.
+
+    References
+    ----------
+    The rule is that of ``CrossOriginProtection`` in Go's ``net/http``.
+    """
+    site, origin = request.headers.get("sec-fetch-site"), request.headers.get("origin")
+    if site is not None:
+        ours = site in ("same-origin", "none")
+    else:
+        own = request.headers["host"].lower()
+        ours = origin is None or origin.lower().partition("://")[2] == own
+    if not ours and request.method not in SAFE:
+        raise HTTPException(HTTPStatus.FORBIDDEN, "a page of another site may only read")
+
+
+def check_content(request: Request) -> None:
+    """Refuse a body that does not say that it is JSON."""
+    headers = request.headers
+    body = "transfer-encoding" in headers or headers.get("content-length", "0") != "0"
+    if body and request.method not in SAFE and not JSON.fullmatch(headers.get("content-type", "")):
+        raise HTTPException(
+            HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+            "the body must be sent with the header content-type: application/json",
+        )

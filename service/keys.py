@@ -1,0 +1,116 @@
+"""API keys: made by a command, kept as hashes in a file of the data directory.
+
+A key is 256 random bits, so a plain SHA-256 of it is enough: nobody can try all keys. Salts and
+slow hashes protect what people choose, such as passwords.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import hmac
+import os
+import re
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+
+from pydantic import BaseModel, TypeAdapter
+
+from studies.errors import StudyError
+from studies.storage.store import appearing
+
+
+class Scope(StrEnum):
+    """What a caller may do; each includes those before it."""
+
+    READ = "read"
+    SUBMIT = "submit"
+    ADMIN = "admin"
+
+    def covers(self, other: Scope) -> bool:
+        """Tell whether who may do this may do the other."""
+        order = list(Scope)
+        return order.index(self) >= order.index(other)
+
+
+class KeysError(RuntimeError):
+    """No keys: none was made, or their file cannot be read. Nobody gets in until there are."""
+
+
+class Key(BaseModel):
+    """One key as it is stored."""
+
+    scope: Scope
+    sha256: str
+    created: datetime
+
+
+FILE = TypeAdapter(dict[str, Key])
+"""What the file holds: the keys by name, oldest first."""
+
+
+class Keys:
+    """The keys of a data directory, read anew for each question: a change counts at once."""
+
+    def __init__(self, directory: Path) -> None:
+        self.path = directory / "keys.json"
+
+    def all(self) -> dict[str, Key]:
+        """Return the keys by name; raise `KeysError` when the file is there and not readable."""
+        try:
+            return FILE.validate_json(self.path.read_bytes())
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is damaged"
+            raise KeysError(f"{self.path.name} cannot be read: {reason}") from None
+
+    def scope_of(self, text: str) -> Scope | None:
+        """Return what the key ``text`` allows; nothing when it is none of ours.
+
+        Every hash is compared, in a time that does not depend on where it differs.
+        """
+        given, known = _digest(text).encode(), self.all().values()
+        fits = [key for key in known if hmac.compare_digest(key.sha256.encode(), given)]
+        return fits[0].scope if fits else None
+
+    def add(self, name: str, scope: Scope) -> str:
+        """Make a key and return its text, which is stored nowhere; the name must be new."""
+        if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII):
+            raise StudyError("name", name, "must be 1 to 64 letters, digits, '.', '_' or '-'")
+        text = f"residua_{secrets.token_urlsafe(32)}"  # no dash first; known at sight in a leak
+        with self._changing() as keys:
+            if name in keys:
+                raise StudyError("name", name, "must be new: there is a key of this name")
+            keys[name] = Key(scope=scope, sha256=_digest(text), created=datetime.now(UTC))
+        return text
+
+    def remove(self, name: str) -> None:
+        """Forget the key of this name."""
+        with self._changing() as keys:
+            if keys.pop(name, None) is None:
+                names = ", ".join(keys) or "none"
+                raise StudyError("name", name, f"must be the name of a key; there are: {names}")
+
+    @contextmanager
+    def _changing(self) -> Iterator[dict[str, Key]]:
+        """Give the keys to be changed, then replace the file, which only its owner may read."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        lock = os.open(self.path.parent, os.O_RDONLY)  # commands at the same time take turns
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            keys = self.all()
+            yield keys
+            with appearing(self.path) as part:
+                part.touch(mode=0o600)
+                part.write_bytes(FILE.dump_json(keys, indent=2))
+        finally:
+            os.close(lock)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()

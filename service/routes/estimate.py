@@ -1,0 +1,28 @@
+"""What a study costs, before it is submitted."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body
+from pydantic import WithJsonSchema
+
+from service.dependencies import TheExaminer
+from service.routes.studies import SUBMISSION
+from service.strict import StrictRoute
+from studies import Estimate
+
+router = APIRouter(tags=["studies"], route_class=StrictRoute)
+
+
+@router.post("/estimate")
+async def estimate(
+    content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)], examiner: TheExaminer
+) -> Estimate:
+    """Tell what a study asks for beyond the runs that are there; nothing is stored.
+
+    `cpu_seconds` are low, likely and high. A study that asks for more than the service allows is
+    refused as it is when it is submitted.
+    """
+    content.pop("priority", None)
+    return (await examiner.examine(content)).estimate

@@ -1,0 +1,52 @@
+"""Who may talk to whom: API keys of the service, certificates of scheduler and workers."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+OK = 0
+
+
+def keys(options: argparse.Namespace) -> int:
+    """Make, list or remove the API keys of a service."""
+    # By name, since studies must work where the service is not installed.
+    service: Any = importlib.import_module("service.keys")
+    settings: Any = importlib.import_module("service.settings").Settings
+    # The other settings do not matter here, and may name what is not there yet.
+    data = options.data or os.environ.get("RESIDUA_DATA") or settings.model_fields["data"].default
+    try:
+        options.act(service.Keys(Path(data)), options)
+    except service.KeysError as error:
+        raise OSError(str(error)) from None
+    return OK
+
+
+def add(known: Any, options: argparse.Namespace) -> None:
+    """Make a key and print it; a running service knows it at once."""
+    print(known.add(options.name, options.scope))
+    print("residua: keep the key now; it is not stored and not shown again", file=sys.stderr)
+
+
+def list_(known: Any, options: argparse.Namespace) -> None:
+    """Print the name, the scope and the time of each key."""
+    for name, key in known.all().items():
+        print(f"{name}  {key.scope}  {key.created:%Y-%m-%d %H:%M} UTC")
+
+
+def remove(known: Any, options: argparse.Namespace) -> None:
+    """Make a key worthless, at once."""
+    known.remove(options.name)
+
+
+def certificates(options: argparse.Namespace) -> int:
+    """Write certificate and key with which scheduler, workers and service know each other."""
+    from studies.execution.certificates import write_certificates
+
+    for path in write_certificates(options.out):
+        print(f"wrote {path}")
+    return OK

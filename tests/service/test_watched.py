@@ -1,0 +1,70 @@
+"""What keeps a container from living on when it answers no more."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import psutil
+import pytest
+
+from tests.architecture.sources import ROOT
+from tests.service.servers import free_port, wait_until
+
+PORT = free_port()
+# Answers 503 to everything: a sign of life.
+SERVER = f"""
+from http.server import BaseHTTPRequestHandler, HTTPServer
+class Answer(BaseHTTPRequestHandler):
+    def do_GET(self):
+        self.send_error(503)
+HTTPServer(("127.0.0.1", {PORT}), Answer).serve_forever()
+"""
+
+
+def watched(*command: str, failures: int = 100) -> subprocess.Popen[bytes]:
+    """Start a command under the watch."""
+    watch = [str(ROOT / "docker" / "watched.py"), "--every", "0.1", "--failures", str(failures)]
+    return subprocess.Popen(
+        [sys.executable, *watch, f"http://127.0.0.1:{PORT}/", sys.executable, "-c", *command],
+        stderr=subprocess.PIPE,
+    )
+
+
+@pytest.fixture
+def server() -> Iterator[tuple[subprocess.Popen[bytes], psutil.Process]]:
+    """A watch over a server that answers, and the server."""
+    watch = watched(SERVER)
+    with watch:
+        inner = wait_until(lambda: psutil.Process(watch.pid).children())[0]
+        wait_until(inner.net_connections)
+        yield watch, inner
+        if inner.is_running():
+            inner.kill()
+
+
+def test_what_answers_lives_and_is_ended_in_order(
+    server: tuple[subprocess.Popen[bytes], psutil.Process],
+) -> None:
+    watch, inner = server
+    with pytest.raises(subprocess.TimeoutExpired):
+        watch.wait(timeout=1.0)
+    watch.send_signal(signal.SIGTERM)  # as the engine does to stop a container
+    assert watch.wait(timeout=30.0) == 128 + signal.SIGTERM
+    assert not inner.is_running()
+
+
+def test_what_answers_no_more_is_ended() -> None:
+    with watched("import time; time.sleep(600)", failures=3) as watch:
+        inner = wait_until(lambda: psutil.Process(watch.pid).children())[0]
+        assert watch.wait(timeout=60.0) == 1
+        assert not inner.is_running()
+        assert watch.stderr is not None
+        assert b"no answer 3 times in a row" in watch.stderr.read()
+
+
+def test_the_exit_status_is_that_of_the_command() -> None:
+    with watched("raise SystemExit(2)") as watch:
+        assert watch.wait(timeout=30.0) == 2
