@@ -11,14 +11,19 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import uvicorn
+from anyio import CapacityLimiter
 from fastapi import FastAPI
 from pydantic import ValidationError
 
 import solver
 from service import errors, routes
+from service.connections import limited
 from service.jobs import Jobs
-from service.limits import BodyLimit
+from service.limits import body_limit
 from service.lock import DirectoryInUse, lock_directory
+from service.maps import Pictures
+from service.methods import head_is_get
+from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings
 from studies import Store, StoreBusy, StudyError
@@ -29,6 +34,9 @@ A study has a content id: the same study posted twice is the same study."""
 
 OPEN_STREAMS_SECONDS = 2
 """Time that open event streams are given when the service stops."""
+
+WAITING_CONNECTIONS = 256
+"""Connections that are taken in one go, before their number is looked at."""
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -55,15 +63,21 @@ def create_app(settings: Settings) -> FastAPI:
         description=DESCRIPTION,
         lifespan=lifespan,
         responses=errors.ANSWERS,
+        docs_url=None,
+        redoc_url=None,
     )
     app.state.settings = settings
     app.state.store = open_store(settings.data)
     app.state.jobs = Jobs(settings.data / "jobs.sqlite")
     app.state.runner = Runner(settings, app.state.jobs, lock)
-    app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
+    app.state.probe = CapacityLimiter(1)
+    app.add_middleware(body_limit, limit=settings.max_body_bytes)
+    app.add_middleware(head_is_get)
     errors.install(app)
     for router in routes.ROUTERS:
         app.include_router(router)
+    app.mount("/docs", ASSETS, name="docs")
     return app
 
 
@@ -102,6 +116,9 @@ def serve(host: str, port: int, data: Path | str, scheduler: str | None = None) 
         app,
         host=host,
         port=port,
+        http=limited(app.state.settings),
+        ws="none",
+        backlog=WAITING_CONNECTIONS,
         timeout_graceful_shutdown=OPEN_STREAMS_SECONDS,
         server_header=False,
     )

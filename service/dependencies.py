@@ -4,40 +4,44 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
 from service.errors import NotFound
 from service.jobs import Job, Jobs
+from service.maps import Pictures
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
 from studies import Store
 
 
-def get_jobs(request: Request) -> Jobs:
-    """Return the queue."""
-    jobs: Jobs = request.app.state.jobs
-    return jobs
+def at_hand(name: str) -> Any:
+    """Return the dependency on a part of the application.
+
+    It is a coroutine: plain functions wait for a thread of a pool, behind all requests.
+    """
+
+    async def part(request: Request) -> Any:
+        return getattr(request.app.state, name)
+
+    return Depends(part)
 
 
-def get_store(request: Request) -> Store:
-    """Return the store of runs and studies."""
-    store: Store = request.app.state.store
-    return store
+TheJobs = Annotated[Jobs, at_hand("jobs")]
+ThePictures = Annotated[Pictures, at_hand("pictures")]
+TheProbe = Annotated[CapacityLimiter, at_hand("probe")]
+TheRunner = Annotated[Runner, at_hand("runner")]
+TheSettings = Annotated[Settings, at_hand("settings")]
+TheStore = Annotated[Store, at_hand("store")]
 
 
-def get_runner(request: Request) -> Runner:
-    """Return the consumer of the queue."""
-    runner: Runner = request.app.state.runner
-    return runner
-
-
-def get_job(study_id: ContentId, jobs: Annotated[Jobs, Depends(get_jobs)]) -> Job:
+def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
     """Return the study named in the path."""
     return jobs.get(study_id)
 
 
-def get_run(run_id: ContentId, store: Annotated[Store, Depends(get_store)]) -> dict[str, Any]:
+def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
     """Return the catalogue's row of the run named in the path."""
     row = store.catalogue.run(run_id)
     if row is None or not store.run_path(run_id).is_file():
@@ -45,15 +49,5 @@ def get_run(run_id: ContentId, store: Annotated[Store, Depends(get_store)]) -> d
     return row
 
 
-def get_settings(request: Request) -> Settings:
-    """Return the settings of this service."""
-    settings: Settings = request.app.state.settings
-    return settings
-
-
-TheJobs = Annotated[Jobs, Depends(get_jobs)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]
-TheStore = Annotated[Store, Depends(get_store)]
-TheRunner = Annotated[Runner, Depends(get_runner)]
-TheSettings = Annotated[Settings, Depends(get_settings)]

@@ -13,6 +13,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.methods import offered
 from studies import StudyError
 
 LONGEST_VALUE = 200
@@ -27,13 +28,20 @@ class Conflict(RuntimeError):
     """The resource is in a state that does not allow this."""
 
 
+class Busy(RuntimeError):
+    """As much of this kind is being done as the service can do at a time."""
+
+
 STATUS: dict[type[Exception], HTTPStatus] = {
     StudyError: HTTPStatus.UNPROCESSABLE_ENTITY,
     RequestValidationError: HTTPStatus.UNPROCESSABLE_ENTITY,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
+    Busy: HTTPStatus.SERVICE_UNAVAILABLE,
 }
 
+LATER = {"retry-after": "10"}
+"""Header that tells when to ask again what may succeed then [s]."""
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -49,14 +57,20 @@ class ProblemDocument(BaseModel):
     errors: list[dict[str, Any]] = Field(description="for each bad input: field, value, allowed")
 
 
+CONTENT = {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}}
 ANSWERS: dict[int | str, dict[str, Any]] = {
-    code: {
-        "description": "Problem",
-        "content": {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}},
-    }
-    for code in ("4XX", "5XX")
+    code: {"description": "Problem", "content": CONTENT} for code in ("4XX", "5XX")
 }
 """How the description of the service announces its errors."""
+
+REFUSED: dict[int | str, dict[str, Any]] = {
+    422: {
+        "description": "Of the right form, but the scene or the run has no such parameter, value "
+        "or field; or of the wrong form. The answer tells field, value and what is allowed.",
+        "content": CONTENT,
+    }
+}
+"""How it announces that what is valid depends on more than the form of a request."""
 
 
 class Problem(Response):
@@ -70,18 +84,18 @@ class Problem(Response):
 
 
 def problem(
-    request: Request,
+    request: Request | None,
     status: HTTPStatus,
     detail: str,
     errors: Sequence[dict[str, Any]] = (),
     headers: dict[str, str] | None = None,
 ) -> Problem:
-    """Return the problem document for one failed request."""
+    """Return the problem document for one failed request, None for one that never arrived."""
     document = ProblemDocument(
         title=status.phrase,
         status=status.value,
         detail=detail,
-        instance=request.url.path,
+        instance=request.url.path if request else "",
         errors=list(errors),
     )
     return Problem(document, status_code=status.value, headers=headers)
@@ -139,17 +153,23 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
     return problem(request, status, detail, errors)
 
 
-def on_plain_error(request: Request, exc: NotFound | Conflict) -> Problem:
+def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
-    return problem(request, status_of(exc), str(exc))
+    status = status_of(exc)
+    later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
+    return problem(request, status, str(exc), headers=later)
 
 
-def on_http_error(request: Request, exc: HTTPException) -> Problem:
+def on_http_error(request: Request, exc: HTTPException) -> Response:
     """Answer what the framework refuses itself: unknown paths, methods, large bodies."""
     if isinstance(exc.__cause__, StudyError):  # from within the framework's reading of the body
         return on_field_error(request, exc.__cause__)
-    headers = dict(exc.headers) if exc.headers else None
+    headers = dict(exc.headers or {})
     status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
+    if status is HTTPStatus.METHOD_NOT_ALLOWED:
+        headers["allow"] = offered(request, headers.pop("Allow"))
+        if request.method == "OPTIONS":
+            return Response(status_code=HTTPStatus.NO_CONTENT, headers=headers)
     if status is HTTPStatus.BAD_REQUEST:  # a body that Python's JSON reader gave up
         allowed = f"JSON that can be read ({exc.__cause__ or exc.detail})"
         detail, errors = f"body: {allowed}", [{"field": "body", "value": None, "allowed": allowed}]
@@ -161,11 +181,12 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
     return problem(request, HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log")
 
 
-HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {
+HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     StudyError: on_field_error,
     RequestValidationError: on_validation_error,
     NotFound: on_plain_error,
     Conflict: on_plain_error,
+    Busy: on_plain_error,
     HTTPException: on_http_error,
     Exception: on_unexpected,
 }

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import tempfile
 from http import HTTPStatus
+from pathlib import Path
 
+from anyio import move_on_after
+from anyio.to_thread import run_sync
 from fastapi import APIRouter, Response
 
-from service.dependencies import TheRunner, TheSettings
+from service.dependencies import TheProbe, TheRunner, TheSettings
 from service.schemas import Health
 
 router = APIRouter(tags=["health"])
 
+PROBE_SECONDS = 5.0
+"""Time in which the data directory must answer."""
+
 
 @router.get("/health", responses={503: {"model": Health}})
-def health(settings: TheSettings, runner: TheRunner, response: Response) -> Health:
+async def health(
+    settings: TheSettings, runner: TheRunner, probe: TheProbe, response: Response
+) -> Health:
     """Tell whether studies can be stored and computed; 503 when they cannot."""
-    try:
-        with tempfile.TemporaryFile(dir=settings.data) as probe:
-            probe.write(b"1")
-        writable = True
-    except OSError:
-        writable = False
+    writable = False
+    with move_on_after(PROBE_SECONDS):  # a file system that hangs would hold more than this up
+        writable = await run_sync(takes_files, settings.data, limiter=probe, abandon_on_cancel=True)
     ready = writable and runner.alive
     if not ready:
         response.status_code = HTTPStatus.SERVICE_UNAVAILABLE
@@ -30,3 +35,13 @@ def health(settings: TheSettings, runner: TheRunner, response: Response) -> Heal
         data_writable=writable,
         executor_alive=runner.alive,
     )
+
+
+def takes_files(directory: Path) -> bool:
+    """Tell whether a file can be written in a directory."""
+    try:
+        with tempfile.TemporaryFile(dir=directory) as probe:
+            probe.write(b"1")
+    except OSError:
+        return False
+    return True

@@ -14,7 +14,7 @@ from pydantic import WithJsonSchema
 
 from service import overview
 from service.dependencies import TheJob, TheJobs, TheRunner, TheSettings, TheStore
-from service.errors import NotFound
+from service.errors import REFUSED, NotFound
 from service.files import NETCDF, netcdf
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
 from service.strict import StrictRoute
@@ -32,7 +32,9 @@ EXAMPLE = {
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
 
 
-@router.post("", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}})
+@router.post(
+    "", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}, **REFUSED}
+)
 def submit(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
     jobs: TheJobs,
@@ -66,7 +68,7 @@ def get_study(
 
 @router.delete("/{study_id}")
 def dismiss(study_id: ContentId, jobs: TheJobs) -> StudySummary:
-    """Stop the work on a study; the runs it has finished are kept."""
+    """Stop the work on a study: it stays, as `dismissed`, and so do the runs it has finished."""
     return overview.summary(jobs.dismiss(study_id))
 
 
@@ -92,10 +94,9 @@ async def events(
         await asyncio.sleep(settings.poll_seconds)
 
 
-@router.head("/{study_id}/dataset.nc", include_in_schema=False)
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
 def dataset(job: TheJob, store: TheStore) -> FileResponse:
-    """Return the combined data set of a study that has come to an end."""
+    """Return the combined data set of a study that has come to an end; 404 until then."""
     path = store.dataset_path(job.id)
     if not job.state.final or not path.is_file():
         raise NotFound(
