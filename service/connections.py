@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import resource
 from http import HTTPStatus
 from typing import ClassVar
@@ -94,19 +95,25 @@ class Connection(H11Protocol):
             self.refuse(HTTPStatus.REQUEST_TIMEOUT, f"the request took more than {seconds} s")
 
     def _make_room(self) -> None:
-        others = [each for each in self.connections if not each.transport.is_closing()]
-        if len(others) <= self.settings.connections:
-            return
-        deadlines = {
-            each: timer.when()
-            for each in others
-            if isinstance(each, Connection)
-            and (timer := each.arrival or each.timeout_keep_alive_task) is not None
+        """End the connection that is longest without a whole request, or else this one."""
+        idle = {
+            each: ends
+            for each in self.connections
+            if isinstance(each, Connection) and (ends := each._ends()) is not None
         }
-        if deadlines:
-            min(deadlines, key=deadlines.__getitem__).transport.abort()
+        if idle:
+            longest = min(idle, key=idle.__getitem__)
+            self.connections.discard(longest)
+            longest.transport.abort()
         else:
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too many requests at a time")
+
+    def _ends(self) -> float | None:
+        """Time at which this connection ends, None while it is at work."""
+        if self.transport.is_closing():  # and has not been read to its end
+            return 0.0
+        deadline = self.arrival or self.timeout_keep_alive_task
+        return None if deadline is None else deadline.when()
 
 
 def limited(settings: Settings) -> type[Connection]:
@@ -114,10 +121,11 @@ def limited(settings: Settings) -> type[Connection]:
 
     Each connection may send a file; the number of connections is limited to what that leaves.
     """
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    room = settings.connections
-    if most != resource.RLIM_INFINITY:
-        room = max(1, min(room, (most - OTHER_FILES) // 2))
-    settings = settings.model_copy(update={"connections": room})
+    files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with contextlib.suppress(ValueError):  # some systems allow less than they say
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+        files = most
+    if files != resource.RLIM_INFINITY:
+        room = max(1, min(settings.connections, (files - OTHER_FILES) // 2))
+        settings = settings.model_copy(update={"connections": room})
     return type("Connection", (Connection,), {"settings": settings})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import resource
 import socket
 import threading
 import time
@@ -14,11 +15,13 @@ from typing import Any
 
 import anyio.to_thread
 import httpx
+import psutil
 import pytest
 from fastapi import FastAPI
 
 from service import maps
 from service.app import create_app
+from service.connections import limited
 from service.errors import Busy
 from service.maps import Pictures
 from service.routes import health
@@ -49,7 +52,11 @@ def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         "RESIDUA_ANSWER_SECONDS": str(SECONDS),
         "RESIDUA_MAP_QUEUE": "3",
     }
-    server = Server(tmp_path_factory.mktemp("load"), settings=limits).start()
+    server = Server(tmp_path_factory.mktemp("load"), settings=limits)
+    files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(files, most // 2), most))
+    server.start()
+    resource.setrlimit(resource.RLIMIT_NOFILE, (files, most))
     yield server
     server.close()
 
@@ -83,6 +90,19 @@ def test_half_open_connections_keep_nobody_out_and_are_closed(strict: Server) ->
         connection.close()
     assert set(ends) == {b"", b"HTTP/1.1 408"}
     assert ends[b"HTTP/1.1 408"] >= CONNECTIONS // 2, "those that began and were not pushed out"
+
+
+def test_the_service_may_open_as_many_files_as_the_system_allows(strict: Server) -> None:
+    assert strict.process is not None
+    now, most = psutil.Process(strict.process.pid).rlimit(psutil.RLIMIT_NOFILE)
+    assert now == most
+
+
+def test_connections_leave_files_for_all_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (256, 1024))
+    monkeypatch.setattr(resource, "setrlimit", lambda which, limits: None)
+    for wanted, given in ((500, 384), (10, 10)):
+        assert limited(Settings(connections=wanted)).settings.connections == given
 
 
 @pytest.mark.parametrize("begun", UNFINISHED[1:], ids=["head", "body"])
