@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import resource
 from http import HTTPStatus
 from typing import ClassVar
@@ -24,7 +25,8 @@ class Connection(H11Protocol):
     A request, head and body, must arrive within ``arrival_seconds``; who is late is answered 408.
     A client that stops reading its answer for ``answer_seconds`` is cut off. Where all
     ``connections`` are taken, the one that has sent no whole request for the longest time makes
-    room for the new one, so that half-open connections keep nobody out.
+    room for the new one, or else one that is being answered: neither half-open connections nor
+    streams of events keep others out.
     """
 
     settings: ClassVar[Settings]
@@ -95,25 +97,27 @@ class Connection(H11Protocol):
             self.refuse(HTTPStatus.REQUEST_TIMEOUT, f"the request took more than {seconds} s")
 
     def _make_room(self) -> None:
-        """End the connection that is longest without a whole request, or else this one."""
-        idle = {
+        """End the connection that can best be spared, or else this one."""
+        spare = {
             each: ends
-            for each in self.connections
+            for each in self.connections - {self}
             if isinstance(each, Connection) and (ends := each._ends()) is not None
         }
-        if idle:
-            longest = min(idle, key=idle.__getitem__)
-            self.connections.discard(longest)
-            longest.transport.abort()
+        if spare:
+            first = min(spare, key=spare.__getitem__)
+            self.connections.discard(first)
+            first.transport.abort()
         else:
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too many requests at a time")
 
     def _ends(self) -> float | None:
-        """Time at which this connection ends, None while it is at work."""
+        """Time at which this connection ends; None while the service works for it."""
         if self.transport.is_closing():  # and has not been read to its end
             return 0.0
-        deadline = self.arrival or self.timeout_keep_alive_task
-        return None if deadline is None else deadline.when()
+        if deadline := self.arrival or self.timeout_keep_alive_task:
+            return deadline.when()
+        # Who follows events asks for them again, and files can be fetched in parts.
+        return math.inf if self.cycle.response_started else None
 
 
 def limited(settings: Settings) -> type[Connection]:

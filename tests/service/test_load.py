@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import resource
 import socket
 import threading
@@ -10,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,7 @@ def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         "RESIDUA_ARRIVAL_SECONDS": str(SECONDS),
         "RESIDUA_ANSWER_SECONDS": str(SECONDS),
         "RESIDUA_MAP_QUEUE": "3",
+        "RESIDUA_POLL_SECONDS": "1",
     }
     server = Server(tmp_path_factory.mktemp("load"), settings=limits)
     files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -67,6 +70,17 @@ def study(strict: Server) -> dict[str, Any]:
     return strict.finished(strict.post(fake_study("load")))
 
 
+def connected(server: Server) -> socket.socket:
+    """Return a connection of its own."""
+    return socket.create_connection(("127.0.0.1", server.port), timeout=15.0)
+
+
+def healthy(server: Server) -> bool:
+    """Return whether a stranger is told so in time."""
+    answer = httpx.get(f"http://127.0.0.1:{server.port}/health", timeout=5.0)
+    return answer.status_code == 200
+
+
 def rest(connection: socket.socket) -> bytes:
     """Return what the service still sends before it closes a connection."""
     received = b""
@@ -79,17 +93,28 @@ def rest(connection: socket.socket) -> bytes:
 
 
 def test_half_open_connections_keep_nobody_out_and_are_closed(strict: Server) -> None:
-    opened = []
-    for position in range(2 * CONNECTIONS):
-        connection = socket.create_connection(("127.0.0.1", strict.port), timeout=15.0)
-        connection.sendall(UNFINISHED[position % 3])
-        opened.append(connection)
-    assert httpx.get(f"http://127.0.0.1:{strict.port}/health", timeout=5.0).status_code == 200
-    ends = Counter(rest(connection)[:12] for connection in opened)
-    for connection in opened:
-        connection.close()
+    with ExitStack() as opened:
+        connections = [opened.enter_context(connected(strict)) for _ in range(2 * CONNECTIONS)]
+        for position, connection in enumerate(connections):
+            with contextlib.suppress(ConnectionError):
+                connection.sendall(UNFINISHED[position % 3])
+        assert healthy(strict)
+        ends = Counter(rest(connection)[:12] for connection in connections)
     assert set(ends) == {b"", b"HTTP/1.1 408"}
     assert ends[b"HTTP/1.1 408"] >= CONNECTIONS // 2, "those that began and were not pushed out"
+
+
+def test_streams_of_events_keep_nobody_out(strict: Server) -> None:
+    study_id = strict.post(fake_study("followed", seconds=30.0))
+    asked = f"GET /studies/{study_id}/events HTTP/1.1\r\nHost: here\r\n\r\n".encode()
+    with ExitStack() as opened:
+        for _ in range(CONNECTIONS):
+            connection = opened.enter_context(connected(strict))
+            connection.sendall(asked)
+            assert connection.recv(12) == b"HTTP/1.1 200"
+        for _ in range(3):
+            assert healthy(strict)
+    strict.client.delete(f"/studies/{study_id}")
 
 
 def test_the_service_may_open_as_many_files_as_the_system_allows(strict: Server) -> None:
@@ -107,7 +132,7 @@ def test_connections_leave_files_for_all_else(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize("begun", UNFINISHED[1:], ids=["head", "body"])
 def test_a_request_that_trickles_in_is_ended_with_a_problem(strict: Server, begun: bytes) -> None:
-    with socket.create_connection(("127.0.0.1", strict.port), timeout=15.0) as connection:
+    with connected(strict) as connection:
         connection.sendall(begun)
         start = time.monotonic()
         connection.settimeout(0.1)
