@@ -16,24 +16,25 @@ from service.settings import Settings
 from studies import Store
 
 
-def at_hand(name: str) -> Any:
-    """Return the dependency on a part of the application.
+def held(name: str) -> Any:
+    """Return a dependency on what the application holds under a name.
 
-    It is a coroutine: plain functions wait for a thread of a pool, behind all requests.
+    It is a coroutine: the framework runs functions in a thread of its pool, where they wait for
+    all that is slow.
     """
 
-    async def part(request: Request) -> Any:
+    async def get(request: Request) -> Any:
         return getattr(request.app.state, name)
 
-    return Depends(part)
+    return Depends(get)
 
 
-TheJobs = Annotated[Jobs, at_hand("jobs")]
-ThePictures = Annotated[Pictures, at_hand("pictures")]
-TheProbe = Annotated[CapacityLimiter, at_hand("probe")]
-TheRunner = Annotated[Runner, at_hand("runner")]
-TheSettings = Annotated[Settings, at_hand("settings")]
-TheStore = Annotated[Store, at_hand("store")]
+TheJobs = Annotated[Jobs, held("jobs")]
+ThePictures = Annotated[Pictures, held("pictures")]
+TheProbe = Annotated[CapacityLimiter, held("probe")]
+TheRunner = Annotated[Runner, held("runner")]
+TheSettings = Annotated[Settings, held("settings")]
+TheStore = Annotated[Store, held("store")]
 
 
 def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
