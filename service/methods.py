@@ -27,7 +27,11 @@ def head_is_get(app: ASGIApp) -> ASGIApp:
                 complete = True
                 await send({"type": "http.response.body"})
 
-        return await app({**scope, "method": "GET"}, receive, head_only)
+        scope["method"] = "GET"
+        try:
+            await app(scope, receive, head_only)
+        finally:
+            scope["method"] = "HEAD"  # for those outside, who find the route in the same scope
 
     return answer
 

@@ -26,7 +26,7 @@ async def health(
     """Tell whether studies can be stored and computed; 503 when they cannot."""
     writable = False
     with move_on_after(PROBE_SECONDS):  # a file system that hangs would hold more than this up
-        writable = await run_sync(takes_files, settings.data, limiter=probe, abandon_on_cancel=True)
+        writable = await run_sync(look, settings.data, limiter=probe, abandon_on_cancel=True)
     ready = writable and runner.alive
     if not ready:
         response.status_code = HTTPStatus.SERVICE_UNAVAILABLE
@@ -37,7 +37,7 @@ async def health(
     )
 
 
-def takes_files(directory: Path) -> bool:
+def look(directory: Path) -> bool:
     """Tell whether a file can be written in a directory."""
     try:
         with tempfile.TemporaryFile(dir=directory) as probe:

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
+from starlette.convertors import StringConvertor, register_url_convertor
 from starlette.datastructures import Headers
 from starlette.staticfiles import NotModifiedResponse
 
@@ -18,6 +19,15 @@ from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
 
 router = APIRouter(prefix="/runs", tags=["runs"])
+
+
+class Stem(StringConvertor):
+    """A name without a suffix: what a run offers is not what its file offers."""
+
+    regex = "[^/.]+"
+
+
+register_url_convertor("stem", Stem())
 
 
 @router.get("", responses=REFUSED)
@@ -36,7 +46,7 @@ def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
 
 
-@router.get("/{run_id}")
+@router.get("/{run_id:stem}")
 def get_run(run: TheRun) -> Run:
     """Return the outcome and the figures of a run."""
     return Run(**run)

@@ -267,7 +267,7 @@ def test_health_needs_no_thread_that_others_use(app: FastAPI) -> None:
 def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
     hanging = threading.Event()
     monkeypatch.setattr(health, "PROBE_SECONDS", 0.2)
-    monkeypatch.setattr(health, "takes_files", lambda directory: hanging.wait(20.0))
+    monkeypatch.setattr(health, "look", lambda *given: hanging.wait(20.0))
 
     async def twice() -> list[bool]:
         answers = [await told(app), await told(app)]
