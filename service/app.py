@@ -12,21 +12,26 @@ from pathlib import Path
 from typing import NoReturn
 
 import uvicorn
+from anyio import CapacityLimiter
 from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
 import solver
 from service import errors, logs, routes
 from service.access import Gate
+from service.connections import limited
 from service.examiner import Examiner
 from service.headers import SecurityHeaders
 from service.keys import Keys, KeysError
-from service.limits import BodyLimit
+from service.limits import body_limit
 from service.lock import DirectoryInUse, lock_directory
+from service.maps import Pictures
+from service.methods import head_is_get
 from service.metrics import Metrics
 from service.pool import Pool
 from service.recovery import open_queue
 from service.retention import Keeper
+from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings, chosen
 from studies import Store, StoreBusy, StudyError
@@ -40,6 +45,9 @@ A study has a content id: the same study posted twice is the same study."""
 
 OPEN_STREAMS_SECONDS = 2
 """Time that open event streams are given when the service stops."""
+
+WAITING_CONNECTIONS = 256
+"""Connections that are taken in one go, before their number is looked at."""
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -81,6 +89,8 @@ def create_app(settings: Settings) -> FastAPI:
         description=DESCRIPTION,
         lifespan=lifespan,
         responses=errors.ANSWERS,
+        docs_url=None,
+        redoc_url=None,
     )
     app.state.settings = settings
     app.state.store = store
@@ -89,15 +99,19 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.examiner = examiner
     app.state.keeper = keeper
     app.state.metrics = metrics
-    app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
+    app.state.probe = CapacityLimiter(1)
+    # Each is outside of those before it: what the others refuse is measured and logged too.
+    app.add_middleware(body_limit, limit=settings.max_body_bytes)
     app.add_middleware(Gate, settings=settings, keys=keys)
+    app.add_middleware(head_is_get)
     app.add_middleware(SecurityHeaders)
-    # Added last, it is the outermost: what the others refuse is measured and logged too.
     app.add_middleware(logs.Observed, observe=metrics.observe)
     errors.install(app)
     for router in routes.ROUTERS:
         needs_key = settings.keys_asked and "health" not in router.tags
         app.include_router(router, dependencies=[Security(BEARER)] if needs_key else [])
+    app.mount("/docs", ASSETS, name="docs")
     return app
 
 
@@ -139,6 +153,9 @@ def serve(
         host=settings.host,
         port=settings.port,
         root_path=settings.root_path,
+        http=limited(settings),
+        ws="none",
+        backlog=WAITING_CONNECTIONS,
         timeout_graceful_shutdown=OPEN_STREAMS_SECONDS,
         server_header=False,
         log_config=None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
 from service.errors import NotFound
@@ -11,6 +12,7 @@ from service.examiner import Examiner
 from service.job import Job
 from service.jobs import Jobs
 from service.keys import Scope
+from service.maps import Pictures
 from service.metrics import Metrics
 from service.retention import Keeper
 from service.runner import Runner
@@ -36,6 +38,8 @@ TheExaminer = Annotated[Examiner, held("examiner")]
 TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
 TheMetrics = Annotated[Metrics, held("metrics")]
+ThePictures = Annotated[Pictures, held("pictures")]
+TheProbe = Annotated[CapacityLimiter, held("probe")]
 TheRunner = Annotated[Runner, held("runner")]
 TheSettings = Annotated[Settings, held("settings")]
 TheStore = Annotated[Store, held("store")]

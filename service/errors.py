@@ -16,6 +16,7 @@ from starlette.exceptions import HTTPException
 
 from service.headers import HEADERS
 from service.logs import REQUEST
+from service.methods import offered
 from studies import StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 
@@ -33,8 +34,8 @@ class Conflict(RuntimeError):
     """The resource is in a state that does not allow this."""
 
 
-class QueueFull(RuntimeError):
-    """As many studies wait as may."""
+class Busy(RuntimeError):
+    """As much of this kind is being done, or waits, as the service allows."""
 
 
 class QueueLost(RuntimeError):
@@ -46,7 +47,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     RequestValidationError: HTTPStatus.UNPROCESSABLE_ENTITY,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
-    QueueFull: HTTPStatus.SERVICE_UNAVAILABLE,
+    Busy: HTTPStatus.SERVICE_UNAVAILABLE,
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
@@ -55,6 +56,8 @@ STATUS: dict[type[Exception], HTTPStatus] = {
 
 NO_ROOM = "no room is left on the disk of the data directory"
 
+LATER = {"retry-after": "10"}
+"""Header that tells when to ask again what may succeed then [s]."""
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -70,14 +73,20 @@ class ProblemDocument(BaseModel):
     errors: list[dict[str, Any]] = Field(description="for each bad input: field, value, allowed")
 
 
+CONTENT = {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}}
 ANSWERS: dict[int | str, dict[str, Any]] = {
-    code: {
-        "description": "Problem",
-        "content": {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}},
-    }
-    for code in ("4XX", "5XX")
+    code: {"description": "Problem", "content": CONTENT} for code in ("4XX", "5XX")
 }
 """How the description of the service announces its errors."""
+
+REFUSED: dict[int | str, dict[str, Any]] = {
+    422: {
+        "description": "Of the right form, but the scene or the run has no such parameter, value "
+        "or field; or of the wrong form. The answer tells field, value and what is allowed.",
+        "content": CONTENT,
+    }
+}
+"""How it announces that what is valid depends on more than the form of a request."""
 
 
 class Problem(Response):
@@ -91,18 +100,18 @@ class Problem(Response):
 
 
 def problem(
-    request: Request,
+    request: Request | None,
     status: HTTPStatus,
     detail: str,
     errors: Sequence[dict[str, Any]] = (),
     headers: dict[str, str] | None = None,
 ) -> Problem:
-    """Return the problem document for one failed request."""
+    """Return the problem document for one failed request, None for one that never arrived."""
     document = ProblemDocument(
         title=status.phrase,
         status=status.value,
         detail=detail,
-        instance=request.url.path,
+        instance=request.url.path if request else "",
         errors=list(errors),
     )
     return Problem(document, status_code=status.value, headers=headers)
@@ -163,7 +172,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
     status = status_of(exc)
-    later = {"retry-after": "10"} if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
+    later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
     said = NO_ROOM if isinstance(exc, StoreFull) else str(exc)
     return problem(request, status, said, headers=later)
 
@@ -175,12 +184,16 @@ def on_system_error(request: Request, exc: OSError) -> Problem:
     return problem(request, status_of(exc), detail)
 
 
-def on_http_error(request: Request, exc: HTTPException) -> Problem:
+def on_http_error(request: Request, exc: HTTPException) -> Response:
     """Answer what the framework refuses itself: unknown paths, methods, large bodies."""
     if isinstance(exc.__cause__, StudyError):  # from within the framework's reading of the body
         return on_field_error(request, exc.__cause__)
-    headers = dict(exc.headers) if exc.headers else None
+    headers = dict(exc.headers or {})
     status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
+    if status is HTTPStatus.METHOD_NOT_ALLOWED:
+        headers["allow"] = offered(request, headers.pop("Allow"))
+        if request.method == "OPTIONS":
+            return Response(status_code=HTTPStatus.NO_CONTENT, headers=headers)
     if status is HTTPStatus.BAD_REQUEST:  # a body that Python's JSON reader gave up
         allowed = f"JSON that can be read ({exc.__cause__ or exc.detail})"
         detail, errors = f"body: {allowed}", [{"field": "body", "value": None, "allowed": allowed}]
@@ -195,11 +208,11 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
     return problem(request, status, detail, headers=known)
 
 
-HANDLERS: dict[type[Exception], Callable[[Request, Any], Problem]] = {
+HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     StudyError: on_field_error,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
-        (NotFound, Conflict, QueueFull, QueueLost, StoreFull, CatalogueDamaged), on_plain_error
+        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged), on_plain_error
     ),
     OSError: on_system_error,
     HTTPException: on_http_error,

@@ -6,26 +6,49 @@ import re
 from pathlib import Path
 from typing import Any
 
+from fastapi import HTTPException
 from fastapi.responses import FileResponse
-from starlette.types import Receive, Scope, Send
+from starlette.datastructures import Headers
+from starlette.staticfiles import NotModifiedResponse, StaticFiles
+from starlette.types import Message, Receive, Scope, Send
 
 MEDIA_TYPE = "application/netcdf"
-NETCDF: dict[int | str, dict[str, Any]] = {200: {"content": {MEDIA_TYPE: {}}}}
+UNCHANGED: dict[int | str, dict[str, Any]] = {
+    304: {"description": "Not modified: what the client has is up to date"}
+}
+NETCDF: dict[int | str, dict[str, Any]] = {
+    200: {"content": {MEDIA_TYPE: {}}},
+    206: {"description": "The part that was asked for", "content": {MEDIA_TYPE: {}}},
+    **UNCHANGED,
+}
+
+TAGS = StaticFiles()
+"""Knows when a client has what would be answered: by tags, weak or listed, or else by dates."""
 
 RANGE = re.compile(rb"bytes=(?:(?P<first>\d{1,18})-(?P<last>\d{0,18})|-\d{1,18})")
 
 
 class PartlyFile(FileResponse):
-    """A file of which one part may be asked for.
+    """A file of which one part may be asked for, or only whether it has changed.
 
     A range that is malformed, or of several parts, is ignored as HTTP permits (RFC 9110, 14.2):
     the framework's own answer to it would be no problem document.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the file, or the part."""
+        """Send the file, the part, or that it is unchanged."""
+        if TAGS.is_not_modified(self.headers, Headers(scope=scope)):
+            return await NotModifiedResponse(self.headers)(scope, receive, send)
+
+        async def checked(message: Message) -> None:
+            if message.get("status") == 416:  # sent by the framework as plain text
+                head = Headers(raw=message["headers"])
+                beyond = {"content-range": head["content-range"]}
+                raise HTTPException(416, "the part begins beyond the end of the file", beyond)
+            await send(message)
+
         headers = [(k, v) for k, v in scope["headers"] if k != b"range" or sensible(v)]
-        await super().__call__({**scope, "headers": headers}, receive, send)
+        return await super().__call__({**scope, "headers": headers}, receive, checked)
 
 
 def sensible(header: bytes) -> bool:
@@ -35,5 +58,11 @@ def sensible(header: bytes) -> bool:
 
 
 def netcdf(path: Path, name: str) -> FileResponse:
-    """Return a netCDF file for download under ``name``."""
-    return PartlyFile(path, media_type=MEDIA_TYPE, filename=name)
+    """Return a netCDF file for download under ``name``.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    return PartlyFile(path, media_type=MEDIA_TYPE, filename=name, stat_result=path.stat())

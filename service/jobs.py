@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from service import schema
-from service.errors import Conflict, NotFound, QueueFull, QueueLost
+from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import COLUMNS, UNREADABLE, Job, State, job_of
 from studies.errors import StoreFull
 
@@ -54,7 +54,7 @@ class Jobs:
 
         Raises
         ------
-        QueueFull
+        Busy
             If as many studies wait as may.
         """
         with self.transaction() as connection:
@@ -64,7 +64,7 @@ class Jobs:
                 "SELECT COUNT(*) FROM job WHERE state = ?", (State.ACCEPTED,)
             ).fetchone()
             if self.longest is not None and waiting >= self.longest:
-                raise QueueFull(f"{waiting} studies wait already, and no more may: post it later")
+                raise Busy(f"{waiting} studies wait already, and no more may: post it later")
             connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # a row unreadable
             connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
             connection.executemany(

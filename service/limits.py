@@ -12,26 +12,25 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
-class BodyLimit:
-    """Middleware that refuses to hand over more than ``limit`` bytes of a body."""
+def body_limit(app: ASGIApp, limit: int) -> ASGIApp:
+    """Return a middleware that hands over no more than ``limit`` bytes of a body, declared or not.
 
-    def __init__(self, app: ASGIApp, limit: int) -> None:
-        self.app = app
-        self.limit = limit
+    How long the body may take is `service.connections`' concern.
+    """
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Count the bytes of the body, declared or not, as the application reads it."""
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         received = 0
 
         async def counted() -> Message:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
-            if received > self.limit:
+            if received > limit:
                 raise HTTPException(
-                    HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-                    f"the body is larger than {self.limit} bytes",
+                    HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the body is larger than {limit} bytes"
                 )
             return message
 
-        await self.app(scope, counted if scope["type"] == "http" else receive, send)
+        await app(scope, counted if scope["type"] == "http" else receive, send)
+
+    return answer

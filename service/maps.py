@@ -2,23 +2,75 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import io
-import threading
+from collections import OrderedDict
 from pathlib import Path
 
+from anyio import CapacityLimiter
+from anyio.to_thread import run_sync
+
 import solver
+from service.errors import Busy
 from service.schemas import MapQuery
 from studies import open_netcdf
 
-DRAWING = threading.Lock()
-"""Matplotlib shares fonts and the text cache among figures: one is drawn at a time."""
+
+class Pictures:
+    """The pictures that are drawn, one at a time, and those last drawn.
+
+    Matplotlib shares fonts and the text cache among figures, so that two cannot be drawn at once.
+
+    Parameters
+    ----------
+    queue : pictures that may wait to be drawn
+    memory : size of the pictures that are kept [bytes]
+    """
+
+    def __init__(self, queue: int, memory: int) -> None:
+        self.queue = queue
+        self.memory = memory
+        self.size = 0
+        self.pencil = CapacityLimiter(1)
+        self.kept: OrderedDict[str, bytes] = OrderedDict()
+        self.underway: dict[str, asyncio.Task[bytes]] = {}
+
+    async def get(self, tag: str, path: Path, query: MapQuery) -> bytes:
+        """Return the picture with this tag, drawn unless it is kept or underway.
+
+        Raises
+        ------
+        Busy
+            If too many others wait.
+        StudyError
+            If the run has no such field, or the field no such component.
+        """
+        if tag in self.kept:
+            self.kept.move_to_end(tag)
+            return self.kept[tag]
+        if tag not in self.underway:
+            if len(self.underway) > self.queue:
+                raise Busy(f"{self.queue} pictures wait to be drawn already")
+            self.underway[tag] = asyncio.create_task(self._draw(tag, path, query))
+        return await asyncio.shield(self.underway[tag])
+
+    async def _draw(self, tag: str, path: Path, query: MapQuery) -> bytes:
+        try:
+            picture = await run_sync(draw, path, query, limiter=self.pencil)
+        finally:
+            del self.underway[tag]
+        self.kept[tag] = picture
+        self.size += len(picture)
+        while self.size > self.memory:
+            self.size -= len(self.kept.popitem(last=False)[1])
+        return picture
 
 
 def tag(path: Path, query: MapQuery) -> str:
     """Return an entity tag that changes with the run's file, the query and the version."""
     state = path.stat()
-    content = f"{solver.__version__} {state.st_mtime_ns} {state.st_size} {query!r}"
+    content = f"{path.name} {solver.__version__} {state.st_mtime_ns} {state.st_size} {query!r}"
     return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
 
 
@@ -33,6 +85,6 @@ def draw(path: Path, query: MapQuery) -> bytes:
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
 
     picture = io.BytesIO()
-    with DRAWING, open_netcdf(path) as run:
+    with open_netcdf(path) as run:
         map_figure(run, **query.model_dump()).savefig(picture, format="png")
     return picture.getvalue()

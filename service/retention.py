@@ -168,7 +168,7 @@ class Keeper:
                 if path.parent.name not in known:
                     study = Study.known(json.loads(path.read_text(encoding="utf-8")))
                     if study.id == path.parent.name:
-                        needed.updatestudy.run_ids()
+                        needed.update(study.run_ids())
         return needed
 
 

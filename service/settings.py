@@ -61,6 +61,15 @@ class Settings(BaseSettings):
         default=None, ge=1, description="worker processes when there is no scheduler"
     )
     max_body_bytes: int = Field(default=1_000_000, ge=1, description="largest request body")
+    connections: int = Field(default=500, ge=1, description="most connections at a time")
+    arrival_seconds: float = Field(
+        default=20.0, gt=0, description="time in which a request, head and body, must arrive"
+    )
+    answer_seconds: float = Field(
+        default=60.0, gt=0, description="time a client may take no part of its answer"
+    )
+    map_queue: int = Field(default=8, ge=0, description="pictures that may wait to be drawn")
+    map_bytes: int = Field(default=32_000_000, ge=0, description="size of the pictures kept")
     attempts: int = Field(
         default=5, ge=1, description="starts of a study that bring no new run before it fails"
     )

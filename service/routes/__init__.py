@@ -1,6 +1,6 @@
 """The resources, a module each."""
 
-from service.routes import estimate, health, metrics, runs, scenes, studies
+from service.routes import estimate, health, manual, metrics, runs, scenes, studies
 
 ROUTERS = (
     studies.router,
@@ -9,4 +9,5 @@ ROUTERS = (
     scenes.router,
     health.router,
     metrics.router,
+    manual.router,
 )

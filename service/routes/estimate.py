@@ -8,6 +8,7 @@ from fastapi import APIRouter, Body
 from pydantic import WithJsonSchema
 
 from service.dependencies import TheExaminer
+from service.errors import REFUSED
 from service.routes.studies import SUBMISSION
 from service.strict import StrictRoute
 from studies import Estimate
@@ -15,7 +16,7 @@ from studies import Estimate
 router = APIRouter(tags=["studies"], route_class=StrictRoute)
 
 
-@router.post("/estimate")
+@router.post("/estimate", responses=REFUSED)
 async def estimate(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)], examiner: TheExaminer
 ) -> Estimate:

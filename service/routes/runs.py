@@ -6,18 +6,32 @@ from http import HTTPStatus
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
+from starlette.convertors import StringConvertor, register_url_convertor
+from starlette.datastructures import Headers
+from starlette.staticfiles import NotModifiedResponse
 
 from service import maps
-from service.dependencies import TheKeeper, TheRun, TheStore
-from service.files import NETCDF, netcdf
+from service.dependencies import TheKeeper, ThePictures, TheRun, TheStore
+from service.errors import REFUSED
+from service.files import NETCDF, TAGS, UNCHANGED, netcdf
 from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
 
-@router.get("")
+class Stem(StringConvertor):
+    """A name without a suffix: what a run offers is not what its file offers."""
+
+    regex = "[^/.]+"
+
+
+register_url_convertor("stem", Stem())
+
+
+@router.get("", responses=REFUSED)
 def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
     """List the runs that match, in order of creation, whichever study asked for them.
 
@@ -27,33 +41,39 @@ def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
     return RunPage(total=total, items=[Run(**row) for row in rows])
 
 
-@router.head("/{run_id}.nc", include_in_schema=False)
 @router.get("/{run_id}.nc", responses=NETCDF)
 def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     """Return the data set of a run."""
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
 
 
-@router.get("/{run_id}")
+@router.get("/{run_id:stem}")
 def get_run(run: TheRun) -> Run:
     """Return the outcome and the figures of a run."""
     return Run(**run)
 
 
-@router.delete("/{run_id}", status_code=HTTPStatus.NO_CONTENT)
+@router.delete("/{run_id:stem}", status_code=HTTPStatus.NO_CONTENT)
 def delete_run(run: TheRun, keeper: TheKeeper) -> None:
     """Delete a run that no study waits for or computes; data sets that hold it stay."""
     keeper.delete_run(run["id"])
 
 
-@router.get("/{run_id}/map.png", responses={200: {"content": {"image/png": {}}}})
-def draw_map(
-    run: TheRun, query: Annotated[MapQuery, Query()], store: TheStore, request: Request
+@router.get(
+    "/{run_id}/map.png",
+    responses={200: {"content": {"image/png": {}}}, **UNCHANGED, **REFUSED},
+)
+async def draw_map(
+    run: TheRun,
+    query: Annotated[MapQuery, Query()],
+    store: TheStore,
+    pictures: ThePictures,
+    request: Request,
 ) -> Response:
     """Draw a field of a run around the contact."""
-    tag = maps.tag(store.run_path(run["id"]), query)
-    headers = {"etag": tag, "cache-control": "no-cache"}
-    if request.headers.get("if-none-match") == tag:
-        return Response(status_code=304, headers=headers)
-    picture = maps.draw(store.run_path(run["id"]), query)
-    return Response(picture, media_type="image/png", headers=headers)
+    path = store.run_path(run["id"])
+    tag = await run_in_threadpool(maps.tag, path, query)
+    headers = Headers({"etag": tag, "cache-control": "no-cache"})
+    if TAGS.is_not_modified(headers, request.headers):
+        return NotModifiedResponse(headers)
+    return Response(await pictures.get(tag, path, query), media_type="image/png", headers=headers)

@@ -22,7 +22,7 @@ from service.dependencies import (
     TheSettings,
     TheStore,
 )
-from service.errors import NotFound
+from service.errors import REFUSED, NotFound
 from service.files import NETCDF, netcdf
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
 from service.strict import StrictRoute
@@ -50,7 +50,9 @@ SUBMISSION["properties"]["priority"] = {
 }
 
 
-@router.post("", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}})
+@router.post(
+    "", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}, **REFUSED}
+)
 async def submit(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
     jobs: TheJobs,
@@ -95,7 +97,7 @@ def get_study(
 def dismiss(
     study_id: ContentId, jobs: TheJobs, keeper: TheKeeper, purge: bool = False
 ) -> StudySummary | Response:
-    """Stop the work on a study; the runs it has finished are kept.
+    """Stop the work on a study: it stays, as `dismissed`, and so do the runs it has finished.
 
     With `purge`, delete a study that has ended, its data set, and its runs that no other needs.
     """
@@ -130,7 +132,6 @@ async def events(
         await asyncio.sleep(settings.poll_seconds)
 
 
-@router.head("/{study_id}/dataset.nc", include_in_schema=False)
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
 def dataset(job: TheJob, store: TheStore) -> FileResponse:
     """Return the combined data set of a study, as its last end left it."""

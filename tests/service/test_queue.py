@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from service.errors import Conflict, NotFound, QueueFull, QueueLost
+from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import State
 from service.jobs import Jobs
 from service.lock import DirectoryInUse, lock_directory
@@ -84,7 +84,7 @@ def test_no_more_studies_wait_than_may(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path / "jobs.sqlite", longest=2)
     for name in "ab":
         jobs.accept(name, STUDY, ["run"])
-    with pytest.raises(QueueFull, match="2 studies wait already"):
+    with pytest.raises(Busy, match="2 studies wait already"):
         jobs.accept("c", STUDY, ["run"])
     assert jobs.accept("a", STUDY, ["run"])[1] is False
     jobs.take()

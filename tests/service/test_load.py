@@ -1,0 +1,277 @@
+"""Many at a time, and clients that never end: nobody else has to wait for them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import resource
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import anyio.to_thread
+import httpx
+import psutil
+import pytest
+from fastapi import FastAPI
+
+from service import maps
+from service.app import create_app
+from service.connections import limited
+from service.errors import Busy
+from service.maps import Pictures
+from service.routes import health
+from service.schemas import MapQuery
+from service.settings import Settings
+from tests.service.servers import Server, fake_study
+from tests.service.test_errors import problem
+
+CONNECTIONS = 120
+SECONDS = 1.0
+"""Time that the service gives a request to arrive, and a client to read."""
+
+UNFINISHED = (
+    b"",
+    b"GET /health HTTP/1.1\r\nHost: here\r\n",
+    b"POST /studies HTTP/1.1\r\nHost: here\r\nContent-Type: application/json\r\n"
+    b"Content-Length: 100\r\n\r\n{",
+)
+"""Beginnings of requests."""
+
+
+@pytest.fixture(scope="module")
+def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A service with tight limits."""
+    limits = {
+        "RESIDUA_CONNECTIONS": str(CONNECTIONS),
+        "RESIDUA_ARRIVAL_SECONDS": str(SECONDS),
+        "RESIDUA_ANSWER_SECONDS": str(SECONDS),
+        "RESIDUA_MAP_QUEUE": "3",
+        "RESIDUA_POLL_SECONDS": "1",
+    }
+    server = Server(tmp_path_factory.mktemp("load"), settings=limits)
+    files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(files, most // 2), most))
+    server.start()
+    resource.setrlimit(resource.RLIMIT_NOFILE, (files, most))
+    yield server
+    server.close()
+
+
+@pytest.fixture(scope="module")
+def study(strict: Server) -> dict[str, Any]:
+    """A study that was computed there."""
+    return strict.finished(strict.post(fake_study("load")))
+
+
+def connected(server: Server) -> socket.socket:
+    """Return a connection of its own."""
+    return socket.create_connection(("127.0.0.1", server.port), timeout=15.0)
+
+
+def healthy(server: Server) -> bool:
+    """Return whether a stranger is told so in time."""
+    answer = httpx.get(f"http://127.0.0.1:{server.port}/health", timeout=5.0)
+    return answer.status_code == 200
+
+
+def rest(connection: socket.socket) -> bytes:
+    """Return what the service still sends before it closes a connection."""
+    received = b""
+    try:
+        while part := connection.recv(65536):
+            received += part
+    except ConnectionResetError:
+        pass
+    return received
+
+
+def test_half_open_connections_keep_nobody_out_and_are_closed(strict: Server) -> None:
+    with ExitStack() as opened:
+        connections = [opened.enter_context(connected(strict)) for _ in range(2 * CONNECTIONS)]
+        for position, connection in enumerate(connections):
+            with contextlib.suppress(ConnectionError):
+                connection.sendall(UNFINISHED[position % 3])
+        assert healthy(strict)
+        ends = Counter(rest(connection)[:12] for connection in connections)
+    assert set(ends) == {b"", b"HTTP/1.1 408"}
+    assert ends[b"HTTP/1.1 408"] >= CONNECTIONS // 2, "those that began and were not pushed out"
+
+
+def test_streams_of_events_keep_nobody_out(strict: Server) -> None:
+    study_id = strict.post(fake_study("followed", seconds=30.0))
+    asked = f"GET /studies/{study_id}/events HTTP/1.1\r\nHost: here\r\n\r\n".encode()
+    with ExitStack() as opened:
+        for _ in range(CONNECTIONS):
+            connection = opened.enter_context(connected(strict))
+            connection.sendall(asked)
+            assert connection.recv(12) == b"HTTP/1.1 200"
+        for _ in range(3):
+            assert healthy(strict)
+    strict.client.delete(f"/studies/{study_id}")
+
+
+def test_the_service_may_open_as_many_files_as_the_system_allows(strict: Server) -> None:
+    assert strict.process is not None
+    now, most = psutil.Process(strict.process.pid).rlimit(psutil.RLIMIT_NOFILE)
+    assert now == most
+
+
+def test_connections_leave_files_for_all_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (256, 1024))
+    monkeypatch.setattr(resource, "setrlimit", lambda which, limits: None)
+    for wanted, given in ((500, 384), (10, 10)):
+        assert limited(Settings(connections=wanted)).settings.connections == given
+
+
+@pytest.mark.parametrize("begun", UNFINISHED[1:], ids=["head", "body"])
+def test_a_request_that_trickles_in_is_ended_with_a_problem(strict: Server, begun: bytes) -> None:
+    with connected(strict) as connection:
+        connection.sendall(begun)
+        start = time.monotonic()
+        connection.settimeout(0.1)
+        while time.monotonic() < start + 10 * SECONDS:
+            try:
+                answer = connection.recv(65536)
+                break
+            except TimeoutError:
+                connection.sendall(b"x")
+        took = time.monotonic() - start
+        connection.settimeout(15.0)
+        answer += rest(connection)
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 408 ") and b"application/problem+json" in head
+    assert b"the request took more than 1.0 s" in body
+    assert 0.5 * SECONDS < took < 8 * SECONDS
+
+
+def test_a_client_that_stops_reading_is_cut_off(strict: Server) -> None:
+    asked = b"GET /docs/swagger-ui-bundle.js HTTP/1.1\r\nHost: here\r\n\r\n"
+    with socket.socket() as connection:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        connection.settimeout(15.0)
+        connection.connect(("127.0.0.1", strict.port))
+        connection.sendall(20 * asked)
+        time.sleep(4 * SECONDS)
+        size = len(rest(connection))
+    one = len(strict.client.get("/docs/swagger-ui-bundle.js").content)
+    assert 0 < size < 20 * one
+
+
+def test_a_long_answer_and_a_quiet_client_are_no_offence(strict: Server) -> None:
+    study_id = strict.post(fake_study("long", seconds=3 * SECONDS) | {"sweep": {}})
+    with strict.client.stream("GET", f"/studies/{study_id}/events") as stream:
+        story = [line for line in stream.iter_lines() if line.startswith("data:")]
+    assert "successful" in story[-1]
+    time.sleep(1.5 * SECONDS)
+    assert strict.client.get("/health").status_code == 200
+
+
+def test_health_does_not_wait_for_pictures_and_too_many_are_refused(
+    strict: Server, study: dict[str, Any]
+) -> None:
+    url = f"http://127.0.0.1:{strict.port}/runs/{study['runs'][0]['id']}/map.png"
+
+    def draw(zoom: int) -> httpx.Response:
+        return httpx.get(url, params={"zoom": zoom}, timeout=60.0)
+
+    with ThreadPoolExecutor(80) as pool:
+        asked = [pool.submit(draw, zoom) for zoom in range(1, 81)]
+        waited = []
+        while not all(each.done() for each in asked):
+            start = time.monotonic()
+            assert strict.client.get("/health").status_code == 200
+            waited.append(time.monotonic() - start)
+            time.sleep(0.05)
+        answers = [each.result() for each in asked]
+    assert max(waited) < 5.0
+    counts = Counter(answer.status_code for answer in answers)
+    assert set(counts) == {200, 503} and counts[200] >= 4
+    for answer in answers:
+        if answer.status_code == 503:
+            problem(answer, 503)
+            assert int(answer.headers["retry-after"]) > 0
+
+
+class Drawer:
+    """Stands in for what draws: counts, and waits until it may go on."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.drawn: list[float | None] = []
+        self.go = threading.Event()
+
+    def __call__(self, path: Path, query: MapQuery) -> bytes:
+        self.go.wait(10.0)
+        self.drawn.append(query.zoom)
+        return bytes(self.size)
+
+
+def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawer = Drawer(size=10)
+    monkeypatch.setattr(maps, "draw", drawer)
+
+    async def ask() -> None:
+        pictures = Pictures(queue=2, memory=25)
+
+        def get(zoom: int) -> asyncio.Task[bytes]:
+            return asyncio.create_task(pictures.get(str(zoom), Path(), MapQuery(zoom=zoom)))
+
+        tasks = [get(zoom) for zoom in (1, 2, 3, 1, 2, 3)]
+        await asyncio.sleep(0.01)
+        with pytest.raises(Busy):
+            await get(4)
+        drawer.go.set()
+        await asyncio.gather(*tasks)
+        assert sorted(drawer.drawn) == [1, 2, 3]
+        assert list(pictures.kept) == ["2", "3"], "the bytes are bounded"
+        await asyncio.gather(get(2), get(3))
+        assert len(drawer.drawn) == 3
+        await asyncio.gather(get(1), get(3))
+        assert len(drawer.drawn) == 4 and not pictures.underway
+
+    asyncio.run(ask())
+
+
+@pytest.fixture
+def app(tmp_path: Path) -> FastAPI:
+    """An application that has not been started."""
+    return create_app(Settings(data=tmp_path / "data"))
+
+
+async def told(app: FastAPI) -> bool:
+    """Return whether the data directory is said to take files."""
+    transport = httpx.ASGITransport(app)
+    async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+        answer = await asyncio.wait_for(client.get("/health"), 5.0)
+    writable: bool = answer.json()["data_writable"]
+    return writable
+
+
+def test_health_needs_no_thread_that_others_use(app: FastAPI) -> None:
+    async def crowded() -> bool:
+        threads = anyio.to_thread.current_default_thread_limiter()
+        for position in range(int(threads.total_tokens)):
+            await threads.acquire_on_behalf_of(position)
+        return await told(app)
+
+    assert asyncio.run(crowded())
+
+
+def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
+    hanging = threading.Event()
+    monkeypatch.setattr(health, "PROBE_SECONDS", 0.2)
+    monkeypatch.setattr(health, "look", lambda *given: hanging.wait(20.0))
+
+    async def twice() -> list[bool]:
+        answers = [await told(app), await told(app)]
+        hanging.set()
+        return answers
+
+    assert asyncio.run(twice()) == [False, False]
