@@ -14,7 +14,7 @@ from typing import Any
 
 from service.processes import Outlet, claim_stdout, read_order, watch_stdin
 from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
-from studies.errors import StoreFull
+from studies.errors import CatalogueDamaged, StoreFull
 from studies.execution.cluster import Access
 from studies.execution.limits import Limits
 
@@ -58,7 +58,7 @@ def main() -> None:
         compute(order, outlet, watch_stdin(order["grace"]))
     except StudyError as error:
         outlet.send("refused", {"reason": str(error)})
-    except (GridLost, StoreFull) as error:
+    except (CatalogueDamaged, GridLost, StoreFull) as error:
         outlet.send("wait", {"reason": str(error)})
     except Exception as error:
         outlet.send("error", {"reason": f"{type(error).__name__}: {error}"})

@@ -19,6 +19,7 @@ from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
 from studies import Store
+from studies.storage.runfile import verify
 
 
 def held(name: str) -> Any:
@@ -51,10 +52,11 @@ def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
 
 
 def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
-    """Return the catalogue's row of the run named in the path."""
+    """Return the catalogue's row of the run named in the path, whose file is as it was written."""
     row = store.catalogue.run(run_id)
     if row is None or not store.run_path(run_id).is_file():
         raise NotFound(f"no run has the id {run_id}")
+    verify(store.run_path(run_id))
     return row
 
 

@@ -18,7 +18,7 @@ from service.headers import HEADERS
 from service.logs import REQUEST
 from service.methods import offered
 from studies import StudyError
-from studies.errors import CatalogueDamaged, StoreFull
+from studies.errors import CatalogueDamaged, RunUnreadable, StoreFull
 
 log = logging.getLogger(__name__)
 
@@ -51,6 +51,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
+    RunUnreadable: HTTPStatus.NOT_FOUND,
     OSError: HTTPStatus.SERVICE_UNAVAILABLE,
 }
 
@@ -212,7 +213,8 @@ HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     StudyError: on_field_error,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
-        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged), on_plain_error
+        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged, RunUnreadable),
+        on_plain_error,
     ),
     OSError: on_system_error,
     HTTPException: on_http_error,

@@ -286,6 +286,8 @@ def test_a_defect_shows_nothing_of_its_inside(app: FastAPI) -> None:
 def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> None:
     description = json.loads(ask(app, "/openapi.json").text)
     assert {
+        "/estimate",
+        "/metrics",
         "/studies",
         "/studies/{study_id}",
         "/studies/{study_id}/retry",
