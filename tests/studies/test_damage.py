@@ -21,6 +21,8 @@ from studies import (
     open_study,
     run_study,
 )
+from studies.definition.identity import solver_hash
+from studies.execution.task import PathTask, walk
 from studies.storage.combine import combine
 from studies.storage.dataset import run_dataset
 from tests.studies.conftest import compute_here, fake_study
@@ -47,8 +49,6 @@ def repeat(study: Study, store: Store, monkeypatch: pytest.MonkeyPatch) -> list[
         for path in map(work._rest, study.paths()):
             if path.cases:
                 work._keep(path.id, walk(work._task(FAKE, path), lambda _: None, lambda: False))
-
-    from studies.execution.task import walk
 
     monkeypatch.setattr("studies.execution.run._Work.compute", compute)
     outcome = run_study(study, store)
@@ -298,3 +298,18 @@ def test_a_repeat_that_stops_leaves_failed_runs_and_the_data_set_as_they_were(
     assert set(seen) == {before}
     assert outcome.counts == {"ok": 1, "limit_load": 1}, outcome.failed
     assert [message for *_, message in outcome.failed] == ["flows at 0.75"]
+
+
+def test_a_worker_that_is_cut_off_in_mid_path_stores_no_run_as_failed(store: Store) -> None:
+    """A worker that closes finds its connections gone; the scene has not failed."""
+    (path, *_) = fake_study().paths()
+    told: list[dict[str, object]] = []
+
+    def report(content: dict[str, object]) -> None:
+        told.append(content)
+        if len(told) > 3:
+            raise RuntimeError("ConnectionPool is closed")
+
+    rows = walk(PathTask(FAKE, path, store.directory, solver_hash()), report, lambda: False)
+    assert rows == []
+    assert not (store.directory / "runs").exists()
