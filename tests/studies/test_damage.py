@@ -254,6 +254,19 @@ def test_a_damaged_catalogue_is_named_and_made_anew_from_the_files(
     assert kept.exists() == (damage is a_directory)
 
 
+def test_a_study_under_a_lock_held_elsewhere_makes_a_damaged_catalogue_anew(
+    damaged: ComputedStudy,
+) -> None:
+    study, store = damaged
+    before = store.catalogue.runs()
+    with store.writing():
+        half(store.catalogue.path)
+        outcome = run_study(study, Store(store.directory, held=True))
+    assert outcome.ok
+    assert outcome.computed == []
+    assert store.catalogue.runs() == before
+
+
 @pytest.mark.parametrize("name", ["dataset.nc", "study.json"])
 @pytest.mark.parametrize("in_its_place", [b"", b"neither netCDF nor JSON", None])
 def test_a_damaged_file_of_a_study_is_written_anew(
