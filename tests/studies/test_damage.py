@@ -326,3 +326,18 @@ def test_a_worker_that_is_cut_off_in_mid_path_stores_no_run_as_failed(store: Sto
     rows = walk(PathTask(FAKE, path, store.directory, solver_hash()), report, lambda: False)
     assert rows == []
     assert not (store.directory / "runs").exists()
+
+
+def test_a_repeat_replaces_old_files_once_though_a_worker_dies_in_between(store: Store) -> None:
+    study = fake_study(sweep={"load_ratio": [0.3, 0.9]})
+    compute_here(study, store)
+    (path,) = study.paths()
+    ids = [case.id for case in study.cases()]
+    before = store.modified(ids)
+    task = PathTask(FAKE, path, store.directory, solver_hash(), before)
+    walk(task, lambda _: None, lambda: False)
+    after = store.modified(ids)
+    assert all(after[run_id] != before[run_id] for run_id in ids)
+    rows = walk(task, lambda _: None, lambda: False)  # the worker that takes the task over
+    assert [row["id"] for row in rows] == ids
+    assert store.modified(ids) == after
