@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -76,11 +77,16 @@ def walk(
     store = Store(task.directory)
 
     def keep(row: dict[str, Any]) -> None:
-        report({"path": task.path.id, "row": row})
+        with contextlib.suppress(Exception):  # the file tells it too
+            report({"path": task.path.id, "row": row})
 
     def monitor(fraction: float) -> None:
-        report({"path": task.path.id, "fraction": float(fraction)})
-        if should_stop():
+        try:
+            report({"path": task.path.id, "fraction": float(fraction)})
+            stop = should_stop()
+        except Exception as error:  # nobody listens: the worker is closing, which is no run's fault
+            raise StopAsked from error
+        if stop:
             raise StopAsked
 
     stored = task.stored(store)

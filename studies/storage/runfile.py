@@ -45,11 +45,13 @@ def _packed(run: xr.Dataset) -> bytes:
 
     xarray would lock the file across all workers, although nobody else can see it.
     """
+    stored = layout.encoding(run)
+    for name, variable in run.variables.items():
+        if variable.ndim and variable.dtype.kind in "fi":
+            stored.setdefault(str(name), {})["fletcher32"] = True
     memory = io.BytesIO()
     with h5netcdf.File(memory, "w") as file:
-        run.assign_attrs(SEALED).dump_to_store(
-            H5NetCDFStore(file, lock=False), encoding=layout.encoding(run)
-        )
+        run.assign_attrs(SEALED).dump_to_store(H5NetCDFStore(file, lock=False), encoding=stored)
     return memory.getvalue()
 
 

@@ -107,9 +107,18 @@ class Store:
         """
         return runfile.row(self.run_path(run_id))
 
-    def found(self, run_id: str) -> Row | None:
-        """Return the row of a run as its file has it; a file that cannot be read is set aside."""
+    def found(self, run_id: str, known: Row | None = None) -> Row | None:
+        """Return the row of a run as its file has it; a file that cannot be read is set aside.
+
+        Parameters
+        ----------
+        run_id : of the run
+        known : its row in the catalogue, which saves opening a sound file that has not changed
+        """
+        path = self.run_path(run_id)
         try:
+            if known and runfile.verify(path) and known | runfile.stamp(path) == known:
+                return known
             return self.read_row(run_id)
         except RunUnreadable as error:
             self.set_aside(error)
@@ -121,25 +130,18 @@ class Store:
         Every file is verified in full; the others are set aside. The catalogue follows the files.
         """
         wanted = list(run_ids)
-        known = self.catalogue.rows(wanted)
-        found = {run_id: self._verified(run_id, known.get(run_id)) for run_id in wanted}
-        rows = {run_id: row for run_id, row in found.items() if row is not None}
+        try:
+            known = self.catalogue.rows(wanted)
+        except CatalogueDamaged:
+            self.reconcile()
+            known = self.catalogue.rows(wanted)
+        found = {run_id: self.found(run_id, known.get(run_id)) for run_id in wanted}
+        rows = {run_id: row for run_id, row in found.items() if row}
         if gone := known.keys() - rows.keys():
             self.catalogue.remove(gone)
-        if fresh := [row for run_id, row in rows.items() if row is not known.get(run_id)]:
+        if fresh := [row for run_id, row in rows.items() if row != known.get(run_id)]:
             self.catalogue.put(fresh)
         return rows
-
-    def _verified(self, run_id: str, row: Row | None) -> Row | None:
-        """Return the row of a run, the one given where the file is still that one."""
-        path = self.run_path(run_id)
-        try:
-            sealed = runfile.verify(path)
-        except RunUnreadable as error:
-            self.set_aside(error)
-            return None
-        same = row is not None and row | runfile.stamp(path) == row
-        return row if sealed and same else self.found(run_id)
 
     def set_aside(self, error: RunUnreadable) -> None:
         """Move a file that cannot be read out of the way, so that the run is computed again."""
@@ -153,7 +155,7 @@ class Store:
         return {run_id: path.stat().st_mtime_ns for run_id, path in paths.items() if path.exists()}
 
     def discard(self, run_ids: Collection[str]) -> None:
-        """Delete runs that shall be computed again."""
+        """Delete runs: their files, then their rows."""
         for run_id in run_ids:
             self.run_path(run_id).unlink(missing_ok=True)
         self.catalogue.remove(run_ids)

@@ -21,6 +21,8 @@ from studies import (
     open_study,
     run_study,
 )
+from studies.definition.identity import solver_hash
+from studies.execution.task import PathTask, walk
 from studies.storage.combine import combine
 from studies.storage.dataset import run_dataset
 from tests.studies.conftest import compute_here, fake_study
@@ -47,8 +49,6 @@ def repeat(study: Study, store: Store, monkeypatch: pytest.MonkeyPatch) -> list[
         for path in map(work._rest, study.paths()):
             if path.cases:
                 work._keep(path.id, walk(work._task(FAKE, path), lambda _: None, lambda: False))
-
-    from studies.execution.task import walk
 
     monkeypatch.setattr("studies.execution.run._Work.compute", compute)
     outcome = run_study(study, store)
@@ -254,6 +254,19 @@ def test_a_damaged_catalogue_is_named_and_made_anew_from_the_files(
     assert kept.exists() == (damage is a_directory)
 
 
+def test_a_study_under_a_lock_held_elsewhere_makes_a_damaged_catalogue_anew(
+    damaged: ComputedStudy,
+) -> None:
+    study, store = damaged
+    before = store.catalogue.runs()
+    with store.writing():
+        half(store.catalogue.path)
+        outcome = run_study(study, Store(store.directory, held=True))
+    assert outcome.ok
+    assert outcome.computed == []
+    assert store.catalogue.runs() == before
+
+
 @pytest.mark.parametrize("name", ["dataset.nc", "study.json"])
 @pytest.mark.parametrize("in_its_place", [b"", b"neither netCDF nor JSON", None])
 def test_a_damaged_file_of_a_study_is_written_anew(
@@ -298,3 +311,33 @@ def test_a_repeat_that_stops_leaves_failed_runs_and_the_data_set_as_they_were(
     assert set(seen) == {before}
     assert outcome.counts == {"ok": 1, "limit_load": 1}, outcome.failed
     assert [message for *_, message in outcome.failed] == ["flows at 0.75"]
+
+
+def test_a_worker_that_is_cut_off_in_mid_path_stores_no_run_as_failed(store: Store) -> None:
+    """A worker that closes finds its connections gone; the scene has not failed."""
+    (path, *_) = fake_study().paths()
+    told: list[dict[str, object]] = []
+
+    def report(content: dict[str, object]) -> None:
+        told.append(content)
+        if len(told) > 3:
+            raise RuntimeError("ConnectionPool is closed")
+
+    rows = walk(PathTask(FAKE, path, store.directory, solver_hash()), report, lambda: False)
+    assert rows == []
+    assert not (store.directory / "runs").exists()
+
+
+def test_a_repeat_replaces_old_files_once_though_a_worker_dies_in_between(store: Store) -> None:
+    study = fake_study(sweep={"load_ratio": [0.3, 0.9]})
+    compute_here(study, store)
+    (path,) = study.paths()
+    ids = [case.id for case in study.cases()]
+    before = store.modified(ids)
+    task = PathTask(FAKE, path, store.directory, solver_hash(), before)
+    walk(task, lambda _: None, lambda: False)
+    after = store.modified(ids)
+    assert all(after[run_id] != before[run_id] for run_id in ids)
+    rows = walk(task, lambda _: None, lambda: False)  # the worker that takes the task over
+    assert [row["id"] for row in rows] == ids
+    assert store.modified(ids) == after
