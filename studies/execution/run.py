@@ -21,6 +21,7 @@ from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
 from studies.execution.task import PathTask, walk
+from studies.execution.watch import Waiting
 from studies.storage import dataset as layout
 from studies.storage.combine import combine
 from studies.storage.store import Store
@@ -182,7 +183,7 @@ class _Work:
 
     def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run one task for each path that lacks runs."""
-        from studies.execution.grid import Finished, Grid, Waiting  # dask takes a second to import
+        from studies.execution.grid import Finished, Grid  # dask takes a second to import
 
         with ExitStack() as opening:
             tasks = self._tasks(opening.enter_context(proof_of(self.store, self.study.id)))

@@ -17,7 +17,8 @@ import pytest
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
 from studies.execution.cluster import connect
-from studies.execution.grid import Finished, Grid, Message, Waiting
+from studies.execution.grid import Finished, Grid, Message
+from studies.execution.watch import Waiting
 from tests.studies.chores import chatter, freeze, nap, need
 
 
@@ -202,7 +203,7 @@ def test_stopping_does_not_wait_for_a_frozen_worker(two: Access) -> None:
 def test_no_worker_is_told_and_ends_by_a_setting(
     nobody: Access, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._QUIET", 1.0)
+    monkeypatch.setattr("studies.execution.watch._QUIET", 1.0)
     began = time.monotonic()
     told = []
     with Grid(nobody) as grid, pytest.raises(GridLost, match="no worker is connected"):
@@ -218,11 +219,12 @@ def test_no_worker_is_told_and_ends_by_a_setting(
 def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._QUIET", 4.0)
+    monkeypatch.setattr("studies.execution.watch._QUIET", 4.0)
+    monkeypatch.setattr("studies.execution.cluster._ABSENT", 12.0)
     spared = threading.Event()
 
     def killer() -> None:
-        while not spared.wait(0.3):
+        while not spared.wait(0.05):
             for child in psutil.Process().children():
                 if "spawn_main" in " ".join(child.cmdline()) and child.pid not in others:
                     child.kill()
@@ -232,14 +234,14 @@ def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
         thread = threading.Thread(target=killer)
         thread.start()
         items = []
-        for item in grid.run(nap, [0.5, 0.5], never, Limits(patience=60.0)):
+        for item in grid.run(nap, [0.5, 0.5], never, Limits(patience=120.0)):
             items.append(item)
             if isinstance(item, Waiting) and item.reason:
                 spared.set()
         thread.join()
     waits = [item.reason for item in items if isinstance(item, Waiting)]
-    assert len(waits) == 2
-    assert waits[1] == ""
+    assert waits[0].startswith("no worker is connected to the scheduler")
+    assert waits[-1] == ""
     assert [item.error for item in items if isinstance(item, Finished)] == [None, None]
 
 
@@ -256,3 +258,17 @@ def test_a_worker_that_is_not_fit_is_told_and_its_task_is_kept(two: Access, tmp_
     assert [type(item) for item in items][-3:] == [Waiting, Message, Finished]
     assert items[-1].error is None
     assert items[-3].reason == ""
+
+
+def test_time_for_which_the_caller_was_held_up_is_not_the_tasks(
+    two: Access, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.execution.grid._HELD_UP", 1.5)
+    with Grid(two) as grid:
+        limits = Limits(stall_seconds=2.5, patience=2.5)
+        items = []
+        for item in grid.run(nap, [1.5] * 6, never, limits):
+            if not items:
+                time.sleep(4.0)
+            items.append(item)
+    assert [item.error for item in items if isinstance(item, Finished)] == [None] * 6
