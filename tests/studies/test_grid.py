@@ -73,7 +73,7 @@ def test_all_ports_are_on_the_loopback_and_show_no_pages(two: Access) -> None:
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
 
 
-def test_credentials_are_in_no_argument_environment_or_file(two: Access, tmp_path: Path) -> None:
+def test_credentials_are_in_no_argument_environment_or_file(two: Access) -> None:
     assert two.key
     secret = two.key.splitlines()[5]
     assert secret not in repr(two)
@@ -82,6 +82,12 @@ def test_credentials_are_in_no_argument_environment_or_file(two: Access, tmp_pat
         assert secret not in " ".join(process.environ().values())
         names = [Path(each.path) for each in process.open_files()]
         assert not [name for name in names if secret.encode() in name.read_bytes()]
+
+
+def test_workers_of_our_own_get_the_memory_that_is_set() -> None:
+    with own_workers(1, "700MB") as access, connect(access) as client:
+        (worker,) = client.scheduler_info()["workers"].values()
+    assert worker["memory_limit"] == 700_000_000
 
 
 def test_certificates_that_are_missing_or_bad_are_told(tmp_path: Path) -> None:
