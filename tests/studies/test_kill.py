@@ -115,11 +115,11 @@ def test_a_frozen_worker_costs_only_the_path_it_was_on(
             os.kill(frozen[0], signal.SIGSTOP)
 
     outcome = run_study(
-        study, store, workers=2, limits=Limits(stall_seconds=10.0), on_event=freeze_one_worker
+        study, store, workers=2, limits=Limits(stall_seconds=6.0), on_event=freeze_one_worker
     )
     assert outcome.counts == {"ok": RUNS - 1, "error": 1}
     ((_, _, message),) = outcome.failed
-    assert message.startswith("the loading path made no progress for 10 s (limit stall_seconds)")
+    assert message.startswith("the loading path made no progress for 6 s (limit stall_seconds)")
     assert len(list(marks.iterdir())) == RUNS
     assert not psutil.pid_exists(frozen[0])
 
