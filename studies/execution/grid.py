@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -90,7 +90,7 @@ class Grid:
         should_stop: StopCheck,
         limits: Limits | None = None,
         priority: int = 0,
-    ) -> Iterator[Message | Waiting | Finished]:
+    ) -> Generator[Message | Waiting | Finished, None, None]:
         """Run ``function(task, report, should_stop)`` for every task; yield what happens.
 
         Only so many tasks as there are workers, and a few more, are at the scheduler at a time:

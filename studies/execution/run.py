@@ -6,7 +6,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
@@ -192,7 +192,8 @@ class _Work:
                 access = opening.enter_context(own_workers(len(first), self.limits.memory))
                 tasks = chain(first, tasks)
             grid = opening.enter_context(Grid(access))
-            for item in grid.run(walk, tasks, stop, self.limits, self.priority):
+            items = grid.run(walk, tasks, stop, self.limits, self.priority)
+            for item in opening.enter_context(closing(items)):
                 if isinstance(item, Finished):
                     self._close(item.task, item.error)
                 elif isinstance(item, Waiting):
