@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import tempfile
+import threading
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -12,10 +14,13 @@ from typing import TYPE_CHECKING, Any, Self
 from studies.errors import GridLost, StudyError
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 _CONNECT = 10.0
 """Seconds within which a scheduler must answer."""
+
+_ABSENT = 30.0
+"""Seconds without a sign of a worker of our own until it is replaced."""
 
 CONFIGURATION: Mapping[str, Any] = {
     # A task whose worker died is tried once more; a second death is the task's own doing.
@@ -122,13 +127,40 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
                 "worker processes did not start; they import the calling script anew, so it must "
                 "do its work under: if __name__ == '__main__':"
             ) from error
-        with cluster:
+        with cluster, _kept(cluster, workers):
             yield Access(
                 cluster.scheduler_address,
                 security.tls_ca_file,
                 security.tls_client_cert,
                 security.tls_client_key,
             )
+
+
+@contextmanager
+def _kept(cluster: LocalCluster, workers: int) -> Iterator[None]:
+    """Replace workers that stay away: dask does not revive one that is killed while it starts."""
+    scheduler: Any = cluster.scheduler
+    closing = threading.Event()
+    away: dict[Any, float] = {}
+
+    def keep() -> None:
+        while not closing.wait(_ABSENT / 10):
+            present = {each.name for each in list(scheduler.workers.values())}
+            for name in list(cluster.worker_spec):
+                if name in present:
+                    away.pop(name, None)
+                elif time.monotonic() - away.setdefault(name, time.monotonic()) > _ABSENT:
+                    del cluster.worker_spec[name], away[name]
+            if len(cluster.worker_spec) < workers:
+                cluster.scale(workers)
+
+    keeper = threading.Thread(target=keep, name="keeper of the workers", daemon=True)
+    keeper.start()
+    try:
+        yield
+    finally:
+        closing.set()
+        keeper.join()
 
 
 def connect(access: Access) -> Client:

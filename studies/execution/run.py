@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
@@ -21,6 +21,7 @@ from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
 from studies.execution.task import PathTask, walk
+from studies.execution.watch import Waiting
 from studies.storage import dataset as layout
 from studies.storage.combine import combine
 from studies.storage.store import Store
@@ -176,7 +177,7 @@ class _Work:
 
     def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run one task for each path that lacks runs."""
-        from studies.execution.grid import Finished, Grid, Message, Waiting  # takes a second
+        from studies.execution.grid import Finished, Grid, Message  # dask takes a second to import
 
         unwritable: list[StoreFull | StudyError] = []
         with ExitStack() as opening:
@@ -190,7 +191,8 @@ class _Work:
             def leave() -> bool:
                 return bool(unwritable) or stop()
 
-            for item in grid.run(walk, tasks, leave, self.limits, self.priority):
+            items = grid.run(walk, tasks, leave, self.limits, self.priority)
+            for item in opening.enter_context(closing(items)):
                 match item:
                     case Waiting(reason):
                         self._tell("waiting", message=reason)

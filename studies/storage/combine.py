@@ -49,16 +49,13 @@ class Combined:
 def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
     """Write the combined data set of `study`, and return what it holds.
 
-    Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is
-    no dimension but a coordinate over the labels of that axis. Runs are matched by
-    *label* along labelled dimensions (``component``, ``stage``, ``body``), which get the union
-    of the labels. Along numeric dimensions (``x``, ``depth``) they are matched by label too
-    where all runs have the same grid, or the beginning of the longest one. Where grids differ,
-    as they do when a length is swept, runs are matched by position, and the coordinate becomes a
-    variable over the sweep, so that ``x`` of each run stays with the run. Shorter grids are
-    filled up with NaN. Runs without a record are NaN, and `status` says why. The attributes
-    tell what ran to compute the runs, which may have been elsewhere, and whether all runs are one
-    half of symmetric bodies.
+    Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is a
+    coordinate over its labels. Runs are matched by *label* along labelled dimensions
+    (``component``, ``stage``, ``body``), which get the union of the labels; along numeric ones
+    (``x``, ``depth``) too where all runs have the same grid, or the beginning of the longest. Where
+    grids differ, as when a length is swept, runs are matched by position, and ``x`` becomes a
+    variable over the sweep. Shorter grids are filled up with NaN. Runs without a record are NaN,
+    and `status` says why. The attributes tell what ran, and whether all runs are one half.
     """
     places = {case.id: case.index for case in cases}
     while True:

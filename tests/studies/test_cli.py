@@ -298,6 +298,15 @@ def test_the_bar_stays_on_one_line_and_counts_failures() -> None:
     assert "100 %  4 runs, 1 failed" in drawn.split("\r")[-1]
 
 
+@pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
+def test_what_a_study_waits_for_is_said_once(screen: io.StringIO) -> None:
+    progress = Progress(fake_study(), screen)
+    for message in ("no worker", "", "no worker", "", "no directory"):
+        progress(StudyEvent(kind="waiting", progress=0.0, message=message))
+    lines = [line for line in screen.getvalue().splitlines() if line.startswith("waiting")]
+    assert lines == ["waiting: no worker", "waiting: no directory"]
+
+
 class FakeService(BaseHTTPRequestHandler):
     """Answers as the service does."""
 

@@ -7,6 +7,7 @@ import random
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 import numpy as np
@@ -46,9 +47,9 @@ def repeat(study: Study, store: Store, monkeypatch: pytest.MonkeyPatch) -> list[
     """Run a study again with the tasks done in this process; return what was computed."""
 
     def compute(work: object, workers: int, scheduler: object, stop: object) -> None:
-        for path in map(work._rest, study.paths()):
-            if path.cases:
-                work._keep(path.id, walk(work._task(FAKE, path), lambda _: None, lambda: False))
+        for task in work._tasks(None):
+            walk(task, work._hear, lambda: False)
+            work._close(task, None)
 
     monkeypatch.setattr("studies.execution.run._Work.compute", compute)
     outcome = run_study(study, store)
@@ -323,8 +324,8 @@ def test_a_worker_that_is_cut_off_in_mid_path_stores_no_run_as_failed(store: Sto
         if len(told) > 3:
             raise RuntimeError("ConnectionPool is closed")
 
-    rows = walk(PathTask(FAKE, path, store.directory, solver_hash()), report, lambda: False)
-    assert rows == []
+    walk(PathTask(FAKE, path, store.directory, solver_hash()), report, lambda: False)
+    assert not [content for content in told if "row" in content]
     assert not (store.directory / "runs").exists()
 
 
@@ -334,10 +335,11 @@ def test_a_repeat_replaces_old_files_once_though_a_worker_dies_in_between(store:
     (path,) = study.paths()
     ids = [case.id for case in study.cases()]
     before = store.modified(ids)
-    task = PathTask(FAKE, path, store.directory, solver_hash(), before)
+    task = PathTask(FAKE, path, store.directory, solver_hash(), stale=before)
     walk(task, lambda _: None, lambda: False)
     after = store.modified(ids)
     assert all(after[run_id] != before[run_id] for run_id in ids)
-    rows = walk(task, lambda _: None, lambda: False)  # the worker that takes the task over
-    assert [row["id"] for row in rows] == ids
+    told: list[dict[str, Any]] = []
+    walk(task, told.append, lambda: False)  # the worker that takes the task over
+    assert [content["row"]["id"] for content in told] == ids
     assert store.modified(ids) == after

@@ -17,7 +17,8 @@ import pytest
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
 from studies.execution.cluster import connect
-from studies.execution.grid import Finished, Grid, Message, Waiting
+from studies.execution.grid import Finished, Grid, Message
+from studies.execution.watch import Waiting
 from tests.studies.chores import chatter, freeze, nap, need
 
 
@@ -72,7 +73,7 @@ def test_all_ports_are_on_the_loopback_and_show_no_pages(two: Access) -> None:
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
 
 
-def test_credentials_are_in_no_argument_environment_or_file(two: Access, tmp_path: Path) -> None:
+def test_credentials_are_in_no_argument_environment_or_file(two: Access) -> None:
     assert two.key
     secret = two.key.splitlines()[5]
     assert secret not in repr(two)
@@ -81,6 +82,12 @@ def test_credentials_are_in_no_argument_environment_or_file(two: Access, tmp_pat
         assert secret not in " ".join(process.environ().values())
         names = [Path(each.path) for each in process.open_files()]
         assert not [name for name in names if secret.encode() in name.read_bytes()]
+
+
+def test_workers_of_our_own_get_the_memory_that_is_set() -> None:
+    with own_workers(1, "700MB") as access, connect(access) as client:
+        (worker,) = client.scheduler_info()["workers"].values()
+    assert worker["memory_limit"] == 700_000_000
 
 
 def test_certificates_that_are_missing_or_bad_are_told(tmp_path: Path) -> None:
@@ -147,7 +154,7 @@ def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> N
     with Grid(two) as grid:
         began = time.monotonic()
         for item in grid.run(freeze, tasks, never, Limits(stall_seconds=2.0)):
-            if isinstance(item, Message) and not frozen:
+            if isinstance(item, Message) and "seconds" not in item.content:
                 frozen.append(item.content["pid"])
             elif isinstance(item, Finished):
                 ends[item.task] = item
@@ -202,7 +209,7 @@ def test_stopping_does_not_wait_for_a_frozen_worker(two: Access) -> None:
 def test_no_worker_is_told_and_ends_by_a_setting(
     nobody: Access, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._QUIET", 1.0)
+    monkeypatch.setattr("studies.execution.watch._QUIET", 1.0)
     began = time.monotonic()
     told = []
     with Grid(nobody) as grid, pytest.raises(GridLost, match="no worker is connected"):
@@ -218,11 +225,12 @@ def test_no_worker_is_told_and_ends_by_a_setting(
 def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._QUIET", 4.0)
+    monkeypatch.setattr("studies.execution.watch._QUIET", 4.0)
+    monkeypatch.setattr("studies.execution.cluster._ABSENT", 12.0)
     spared = threading.Event()
 
     def killer() -> None:
-        while not spared.wait(0.3):
+        while not spared.wait(0.05):
             for child in psutil.Process().children():
                 if "spawn_main" in " ".join(child.cmdline()) and child.pid not in others:
                     child.kill()
@@ -232,14 +240,14 @@ def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
         thread = threading.Thread(target=killer)
         thread.start()
         items = []
-        for item in grid.run(nap, [0.5, 0.5], never, Limits(patience=60.0)):
+        for item in grid.run(nap, [0.5, 0.5], never, Limits(patience=120.0)):
             items.append(item)
             if isinstance(item, Waiting) and item.reason:
                 spared.set()
         thread.join()
     waits = [item.reason for item in items if isinstance(item, Waiting)]
-    assert len(waits) == 2
-    assert waits[1] == ""
+    assert waits[0].startswith("no worker is connected to the scheduler")
+    assert waits[-1] == ""
     assert [item.error for item in items if isinstance(item, Finished)] == [None, None]
 
 
@@ -256,3 +264,17 @@ def test_a_worker_that_is_not_fit_is_told_and_its_task_is_kept(two: Access, tmp_
     assert [type(item) for item in items][-3:] == [Waiting, Message, Finished]
     assert items[-1].error is None
     assert items[-3].reason == ""
+
+
+def test_time_for_which_the_caller_was_held_up_is_not_the_tasks(
+    two: Access, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.execution.grid._HELD_UP", 1.5)
+    with Grid(two) as grid:
+        limits = Limits(stall_seconds=2.5, patience=2.5)
+        items = []
+        for item in grid.run(nap, [1.5] * 6, never, limits):
+            if not items:
+                time.sleep(4.0)
+            items.append(item)
+    assert [item.error for item in items if isinstance(item, Finished)] == [None] * 6

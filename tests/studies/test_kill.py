@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from studies import Limits, Store, Study, open_netcdf, run_study
+from studies import Limits, Store, Study, StudyEvent, open_netcdf, run_study
 from tests.studies.conftest import fake_study
 
 ROOT = Path(__file__).parents[2]
@@ -104,19 +104,22 @@ def test_a_frozen_worker_costs_only_the_path_it_was_on(
     slow: tuple[Study, Store, Path],
 ) -> None:
     study, store, marks = slow
+    frictions = {path.id: path.parameters.friction for path in study.paths()}
     frozen: list[int] = []
 
-    def freeze_one_worker(event: object) -> None:
-        if not frozen and len(finished(store)) >= 2:
-            frozen.append(max(int(mark.name.split("-")[-1]) for mark in marks.iterdir()))
+    def freeze_one_worker(event: StudyEvent) -> None:
+        amid = event.kind == "path" and 0.0 < event.fraction < 0.5
+        if amid and not frozen and len(finished(store)) >= 2:
+            (mark,) = marks.glob(f"{frictions[event.path]}-*")
+            frozen.append(int(mark.name.split("-")[-1]))
             os.kill(frozen[0], signal.SIGSTOP)
 
     outcome = run_study(
-        study, store, workers=2, limits=Limits(stall_seconds=10.0), on_event=freeze_one_worker
+        study, store, workers=2, limits=Limits(stall_seconds=6.0), on_event=freeze_one_worker
     )
     assert outcome.counts == {"ok": RUNS - 1, "error": 1}
     ((_, _, message),) = outcome.failed
-    assert message.startswith("the loading path made no progress for 10 s (limit stall_seconds)")
+    assert message.startswith("the loading path made no progress for 6 s (limit stall_seconds)")
     assert len(list(marks.iterdir())) == RUNS
     assert not psutil.pid_exists(frozen[0])
 

@@ -193,7 +193,7 @@ def test_a_worker_that_does_not_see_the_directory_computes_nothing(
 def test_a_scheduler_without_workers_is_waited_for_aloud(
     stage: Stage, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.execution.grid._QUIET", 2.0)
+    monkeypatch.setattr("studies.execution.watch._QUIET", 2.0)
     stage.scheduler()
     told: list[str] = []
 

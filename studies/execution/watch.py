@@ -1,0 +1,143 @@
+"""What is known of tasks that were handed out, and whether workers take the work at all."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from studies.errors import GridLost
+from studies.execution.limits import Limits
+
+_QUIET = 10.0
+"""Seconds without a worker that takes the work until this is told."""
+_BEGIN = 60.0
+"""Seconds that a worker may take to load what it needs for its first task."""
+
+_NO_WORKER = "no worker is connected to the scheduler: start one, or wait while they start again"
+_NOT_TAKEN = "of the workers that are connected ({}) none takes the work: see their logs"
+_SILENT = "the scheduler does not answer"
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """No worker takes the work, for this `reason`; an empty one says that it goes on."""
+
+    reason: str
+
+
+@dataclass(slots=True)
+class Ticket:
+    """A task that was handed out.
+
+    Attributes
+    ----------
+    task, future : what was handed out
+    worker : where it runs; empty while it waits for a worker
+    begun, heard : when it began there, and when it last reported [s]
+    computing : whether it has reported anything there
+    starts, rounds : how often a worker began it, and how often dask gave it up
+    """
+
+    task: Any
+    future: Any = None
+    worker: str = ""
+    begun: float = 0.0
+    heard: float = 0.0
+    computing: bool = False
+    starts: int = 0
+    rounds: int = 0
+
+    def overdue(self, limits: Limits) -> str:
+        """Return which limit the task has passed, in words; nothing when none."""
+        now = time.monotonic()
+        if not self.worker:
+            return ""
+        if limits.stall_seconds is not None and now - self.heard > limits.stall_seconds:
+            passed = f"made no progress for {limits.stall_seconds:g} s (limit stall_seconds)"
+        elif limits.path_seconds is not None and now - self.begun > limits.path_seconds:
+            passed = f"took longer than {limits.path_seconds:g} s (limit path_seconds)"
+        else:
+            return ""
+        return f"the loading path {passed}; its worker was replaced"
+
+
+class Watch:
+    """Tells when no worker takes the work, and gives up when that lasts.
+
+    Parameters
+    ----------
+    patience : seconds to wait; None waits without end
+    """
+
+    def __init__(self, patience: float | None) -> None:
+        self._patience = patience
+        self._reason = ""
+        self._refusals: set[str] = set()
+        self._since: dict[str, float] = {}
+        self._worked = self._quiet = time.monotonic()
+
+    def goes_on(self) -> Iterator[Waiting]:
+        """Take in that a task computes."""
+        self._worked = self._quiet = time.monotonic()
+        if self._reason:
+            self._reason = ""
+            yield Waiting("")
+
+    def refused(self, reason: str, others: Iterable[Ticket]) -> Iterator[Waiting]:
+        """Tell that a worker refused: once for each, and when none of the `others` computes."""
+        idle = not any(other.computing for other in others)
+        if reason not in self._refusals or (idle and not self._reason):
+            self._refusals.add(reason)
+            self._reason = reason
+            yield Waiting(reason)
+
+    def look(
+        self,
+        at_workers: Mapping[str, Iterable[str]] | None,
+        tickets: Mapping[str, Ticket],
+        held_up: float = 0.0,
+    ) -> Iterator[Waiting]:
+        """Judge the keys that are at each worker; there are none when the scheduler is silent.
+
+        Time for which this process was `held_up` does not count [s].
+
+        Raises
+        ------
+        GridLost
+            when patience is at its end
+        """
+        reason = _NOT_TAKEN.format(len(at_workers)) if at_workers else _NO_WORKER
+        if at_workers is None:
+            reason = _SILENT
+        now = time.monotonic()
+        self._worked, self._quiet = self._worked + held_up, self._quiet + held_up
+        if self._taken(at_workers or {}, tickets, now):
+            self._quiet = now
+        lasted = now - self._quiet
+        if lasted > _QUIET and not self._reason:
+            self._reason = reason
+            yield Waiting(reason)
+        if self._patience is not None and lasted > self._patience:
+            raise GridLost(f"{self._reason or reason} (waited {lasted:.0f} s)")
+
+    def _taken(
+        self, at_workers: Mapping[str, Iterable[str]], tickets: Mapping[str, Ticket], now: float
+    ) -> bool:
+        """Tell whether a worker computes, for us or for others, or is about to begin."""
+        self._since = {worker: self._since.get(worker, now) for worker in at_workers}
+        others = any(key not in tickets for keys in at_workers.values() for key in keys)
+        if others or not tickets or any(ticket.computing for ticket in tickets.values()):
+            self._worked = now
+            return True
+        # A worker that has just come may be killed again; one that stays is loading the program.
+        queued = {key for key, ticket in tickets.items() if not ticket.worker}
+        return (
+            now - self._worked < _BEGIN
+            and not self._refusals
+            and any(
+                now - self._since[worker] > _QUIET / 2 and not queued.isdisjoint(keys)
+                for worker, keys in at_workers.items()
+            )
+        )
