@@ -54,8 +54,7 @@ def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
     (``component``, ``stage``, ``body``), which get the union of the labels; along numeric ones
     (``x``, ``depth``) too where all runs have the same grid, or the beginning of the longest. Where
     grids differ, as when a length is swept, runs are matched by position, and ``x`` becomes a
-    variable over the sweep. Shorter grids are filled up with NaN. Runs without a record are NaN,
-    and `status` says why. The attributes tell what ran, and whether all runs are one half.
+    variable over the sweep. Shorter grids are filled up with NaN. Runs without a record are NaN.
     """
     places = {case.id: case.index for case in cases}
     while True:

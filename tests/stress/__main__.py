@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tests.service.servers import Server
-from tests.stress.crowds import half_open, pictures
+from tests.stress.crowds import description, half_open, pictures
 from tests.stress.deaths import deaths, full_disk
 from tests.stress.measure import Figure
 from tests.stress.polling import pollers
@@ -27,6 +27,7 @@ SCENARIOS: Mapping[str, Callable[[Server], list[Figure]]] = {
     "pictures": pictures,
     "deaths": deaths,
     "full-disk": full_disk,
+    "description": description,
     "pollers": pollers,
 }
 

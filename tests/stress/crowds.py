@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx
 
 from tests.service.servers import Server, fake_study
+from tests.service.test_description import explore
 from tests.stress.measure import Figure, quantile
 
 SOCKETS = 940
@@ -40,6 +41,15 @@ def half_open(server: Server) -> list[Figure]:
             one.sendall(b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n")
         times = health_seconds(server, 20)
     return [Figure("health answers within", max(times), "s", most=1.0)]
+
+
+def description(server: Server) -> list[Figure]:
+    """Requests that schemathesis makes from the description of the service."""
+    server.finished(server.post(fake_study("computed")))
+    found = explore(server, ["--max-examples", "60", "--max-time", "80"], seed=7)
+    if found.returncode:
+        print(found.stdout[-3000:])
+    return [Figure("schemathesis finds something", found.returncode, most=0)]
 
 
 def pictures(server: Server) -> list[Figure]:

@@ -39,8 +39,8 @@ def large_study(server: Server) -> list[Figure]:
     before, done, cpu = megabytes(process), len(server.computed()), cpu_seconds(process)
     study = fake_study("large", seconds=0.05)
     study["sweep"] = {
-        "load_ratio": [0.01 * i for i in range(1, 101)],
-        "friction": [i / 1000 for i in range(RUNS // 100)],
+        "load_ratio": [0.1 * i for i in range(1, 11)],
+        "friction": [i / (RUNS // 10) for i in range(RUNS // 10)],
     }
     began = time.monotonic()
     study_id = server.post(study)
