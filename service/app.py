@@ -28,6 +28,7 @@ from service.lock import DirectoryInUse, lock_directory
 from service.maps import Pictures
 from service.methods import head_is_get
 from service.metrics import Metrics
+from service.overview import Details
 from service.pool import Pool
 from service.recovery import open_queue
 from service.retention import Keeper
@@ -97,6 +98,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.jobs = jobs
     app.state.runner = runner
     app.state.examiner = examiner
+    app.state.details = Details(jobs, store)
     app.state.keeper = keeper
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)

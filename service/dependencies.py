@@ -14,6 +14,7 @@ from service.jobs import Jobs
 from service.keys import Scope
 from service.maps import Pictures
 from service.metrics import Metrics
+from service.overview import Details
 from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
@@ -35,6 +36,7 @@ def held(name: str) -> Any:
     return Depends(get)
 
 
+TheDetails = Annotated[Details, held("details")]
 TheExaminer = Annotated[Examiner, held("examiner")]
 TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
@@ -60,7 +62,7 @@ def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
     return row
 
 
-def get_caller(request: Request) -> Scope | None:
+async def get_caller(request: Request) -> Scope | None:
     """Return what the caller may do; None for a stranger, who may ask for little."""
     scope: Scope | None = request.state.caller
     return scope

@@ -58,7 +58,7 @@ class Examiner:
         try:
             yield
         finally:
-            self._process.shutdown(wait=False, cancel_futures=True)
+            await asyncio.to_thread(self._process.shutdown, cancel_futures=True)
 
     async def examine(self, content: Mapping[str, Any]) -> Examined:
         """Return the study that ``content`` describes.

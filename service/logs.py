@@ -28,6 +28,8 @@ logged at the very end of it.
 
 access = logging.getLogger("service.access")
 
+LINE = "%(client)s %(method)s %(path)s %(status)s %(milliseconds)s ms"
+
 
 class About(logging.Filter):
     """Lets every line pass, and adds the ids it is about: those it came with, or the process's."""
@@ -109,6 +111,7 @@ class Observed:
             seconds = time.perf_counter() - start
             self.observe(scope, status, seconds)
             told = {
+                "client": (scope.get("client") or ("-",))[0],
                 "method": scope["method"],
                 "path": quote(scope["path"])[:200],
                 "status": status,
@@ -117,4 +120,4 @@ class Observed:
             for name, value in scope.get("path_params", {}).items():
                 if name in ("study_id", "run_id") and is_id(value):  # not any text of a path
                     told[name.removesuffix("_id")] = value
-            access.info("%(method)s %(path)s %(status)s %(milliseconds)s ms", told, extra=told)
+            access.info(LINE, told, extra=told)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from typing import Any
 
 from service.job import Job
 from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
+
+KEPT = 100
+"""Most answers that are kept."""
 
 PENDING = "pending"
 """Status of a run that is not in the catalogue."""
@@ -18,31 +22,51 @@ def summary(job: Job) -> StudySummary:
     return StudySummary(**_columns(job))
 
 
-def detail(job: Job, jobs: Jobs, store: Store, window: Window) -> StudyDetail:
-    """Return a study with the states of its runs, those in ``window`` one by one."""
-    study = jobs.study(job.id)
-    ids = jobs.runs(job.id)
-    counts = store.catalogue.counts(ids)
-    if pending := len(ids) - sum(counts.values()):
-        counts[PENDING] = pending
-    axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of a table, its labels
-    page = ids[window.offset : window.offset + window.limit]
-    rows = store.catalogue.rows(page)
-    return StudyDetail(
-        **_columns(job),
-        parameters=study["parameters"],
-        sweep=study["sweep"],
-        counts=counts,
-        runs=[
-            StudyRun(
-                id=run_id,
-                status=rows[run_id]["status"] if run_id in rows else PENDING,
-                message=rows[run_id]["message"] if run_id in rows else "",
-                at=point(axes, position),
-            )
-            for position, run_id in enumerate(page, window.offset)
-        ],
-    )
+class Details:
+    """Studies with the states of their runs, as JSON; what has not changed is not looked up again.
+
+    Many may follow one study: each change is then looked up once for all of them.
+    """
+
+    def __init__(self, jobs: Jobs, store: Store) -> None:
+        self.jobs = jobs
+        self.store = store
+        self.kept: OrderedDict[tuple[str, int, int], tuple[object, bytes]] = OrderedDict()
+
+    def get(self, job: Job, window: Window) -> bytes:
+        """Return a study, and one by one those of its runs that are in ``window``."""
+        key, state = (job.id, window.limit, window.offset), (job, self.store.catalogue.changes())
+        known = self.kept.get(key)
+        if known is None or known[0] != state:
+            known = state, self._look_up(job, window).model_dump_json().encode()
+            self.kept[key] = known
+            if len(self.kept) > KEPT:
+                self.kept.popitem(last=False)
+        return known[1]
+
+    def _look_up(self, job: Job, window: Window) -> StudyDetail:
+        study = self.jobs.study(job.id)
+        counts = self.store.catalogue.counts(self.jobs.runs(job.id))
+        if pending := job.size - sum(counts.values()):
+            counts[PENDING] = pending
+        axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of a table, its labels
+        page = self.jobs.runs(job.id, window.limit, window.offset)
+        rows = self.store.catalogue.rows(page)
+        return StudyDetail(
+            **_columns(job),
+            parameters=study["parameters"],
+            sweep=study["sweep"],
+            counts=counts,
+            runs=[
+                StudyRun(
+                    id=run_id,
+                    status=rows[run_id]["status"] if run_id in rows else PENDING,
+                    message=rows[run_id]["message"] if run_id in rows else "",
+                    at=point(axes, position),
+                )
+                for position, run_id in enumerate(page, window.offset)
+            ],
+        )
 
 
 def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from pydantic import WithJsonSchema
 
 from service import overview
 from service.dependencies import (
+    TheDetails,
     TheExaminer,
     TheJob,
     TheJobs,
@@ -70,7 +71,7 @@ async def submit(
     job, new = await asyncio.to_thread(jobs.accept, study.id, study.to_dict(), found.runs, priority)
     if new:
         await asyncio.to_thread(store.save_study, study)
-    if not new:
+    else:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
     return overview.summary(job)
@@ -83,12 +84,10 @@ def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> Study
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 
-@router.get("/{study_id}")
-def get_study(
-    job: TheJob, window: Annotated[Window, Query()], jobs: TheJobs, store: TheStore
-) -> StudyDetail:
+@router.get("/{study_id}", response_model=StudyDetail)
+def get_study(job: TheJob, window: Annotated[Window, Query()], details: TheDetails) -> Response:
     """Return where a study stands, and a page of its runs in the order of the sweep."""
-    return overview.detail(job, jobs, store, window)
+    return Response(details.get(job, window), media_type="application/json")
 
 
 @router.delete(

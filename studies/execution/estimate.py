@@ -49,7 +49,7 @@ class Estimate:
     unknowns: int | None
     increments: int | None
     longest: int | None
-    cpu_seconds: tuple[float, float, float] | None
+    cpu_seconds: tuple[float, ...] | None
     bytes: int
     basis: str
 

@@ -10,6 +10,7 @@ volume. SQLite has no checksums: each row carries its own.
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -130,6 +131,19 @@ class Catalogue:
                 "ORDER BY rowid DESC LIMIT ?",
                 [*(f"$.{name}" for name in names), scene, status, limit],
             ).fetchall()
+
+    def changes(self) -> tuple[int, int]:
+        """Return what every change of the catalogue changes: its file, and how often it changed.
+
+        SQLite counts the transactions in the head of its file: https://sqlite.org/fileformat.html,
+        section 1.3.7.
+        """
+        try:
+            with self.path.open("rb") as file:
+                file.seek(24)
+                return os.fstat(file.fileno()).st_ino, int.from_bytes(file.read(4))
+        except OSError:
+            return 0, 0
 
     def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Insert or replace rows in one transaction."""

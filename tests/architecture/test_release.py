@@ -12,7 +12,7 @@ import solver
 from tests.architecture.sources import PROJECT, ROOT, tracked
 
 CODE = re.compile(r"```.*?```|`[^`\n]+`", re.DOTALL)
-TARGET = re.compile(r"^([a-z]+):", re.MULTILINE)
+TARGET = re.compile(r"^([a-z-]+):", re.MULTILINE)
 
 
 def test_changelog_knows_the_version() -> None:
@@ -46,7 +46,7 @@ def test_constraints_pin_every_dependency() -> None:
 def test_make_targets_named_in_a_page_exist(page: Path) -> None:
     targets = set(TARGET.findall((ROOT / "Makefile").read_text()))
     code = "\n".join(CODE.findall((ROOT / page).read_text()))
-    named = set(re.findall(r"\bmake ([a-z]+)", code))
+    named = set(re.findall(r"\bmake ([a-z-]+)", code))
     assert named <= targets
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+import pytest
 
 from service.app import create_app
 from service.jobs import Jobs
@@ -210,12 +211,16 @@ def test_bad_settings_are_refused_by_name(tmp_path: Path) -> None:
     assert str(file) in refusal(file)
 
 
-def test_a_damaged_queue_is_named_and_left_alone(tmp_path: Path) -> None:
+def test_a_damaged_queue_is_named_kept_and_made_anew(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     queue = tmp_path / "jobs.sqlite"
     queue.write_text("no queue" * 1000)
-    line = refusal(tmp_path)
-    assert str(tmp_path) in line and "jobs.sqlite" in line and "not a database" in line
-    assert queue.read_text() == "no queue" * 1000
+    create_app(Settings(data=tmp_path))
+    (line,) = [record.getMessage() for record in caplog.records if record.levelname == "ERROR"]
+    assert "jobs.sqlite is gone or damaged" in line and "kept as jobs.sqlite.damaged" in line
+    assert (tmp_path / "jobs.sqlite.damaged").read_text() == "no queue" * 1000
+    assert Jobs(queue).page(limit=1, offset=0) == ([], 0)
 
 
 def test_a_damaged_catalogue_is_made_anew_from_the_runs(tmp_path: Path) -> None:

@@ -311,7 +311,7 @@ def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> 
 def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
     post = json.loads(ask(app, "/openapi.json").text)["paths"]["/studies"]["post"]
     schema = post["requestBody"]["content"]["application/json"]["schema"]
-    assert set(schema["properties"]) == {"name", "scene", "parameters", "sweep"}
+    assert set(schema["properties"]) == {"name", "scene", "parameters", "sweep", "priority"}
     (example,) = schema["examples"]
     assert Study.from_dict(example).size == 4
 
@@ -319,7 +319,13 @@ def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
 def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI) -> None:
     answer = ask(app, "/health")
     assert answer.status_code == 503
-    assert answer.json() == {"status": "failing", "data_writable": True, "executor_alive": False}
+    assert answer.json() == {
+        "status": "failing",
+        "data_writable": True,
+        "queue_readable": True,
+        "executor_alive": False,
+        "waiting": {},
+    }
     data = app.state.settings.data
     data.rename(data.with_name("elsewhere"))
     assert ask(app, "/health").json()["data_writable"] is False

@@ -38,8 +38,8 @@ SECONDS = 1.0
 
 UNFINISHED = (
     b"",
-    b"GET /health HTTP/1.1\r\nHost: here\r\n",
-    b"POST /studies HTTP/1.1\r\nHost: here\r\nContent-Type: application/json\r\n"
+    b"GET /health HTTP/1.1\r\nHost: localhost\r\n",
+    b"POST /studies HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
     b"Content-Length: 100\r\n\r\n{",
 )
 """Beginnings of requests."""
@@ -106,7 +106,7 @@ def test_half_open_connections_keep_nobody_out_and_are_closed(strict: Server) ->
 
 def test_streams_of_events_keep_nobody_out(strict: Server) -> None:
     study_id = strict.post(fake_study("followed", seconds=30.0))
-    asked = f"GET /studies/{study_id}/events HTTP/1.1\r\nHost: here\r\n\r\n".encode()
+    asked = f"GET /studies/{study_id}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
     with ExitStack() as opened:
         for _ in range(CONNECTIONS):
             connection = opened.enter_context(connected(strict))
@@ -152,7 +152,7 @@ def test_a_request_that_trickles_in_is_ended_with_a_problem(strict: Server, begu
 
 
 def test_a_client_that_stops_reading_is_cut_off(strict: Server) -> None:
-    asked = b"GET /docs/swagger-ui-bundle.js HTTP/1.1\r\nHost: here\r\n\r\n"
+    asked = b"GET /docs/swagger-ui-bundle.js HTTP/1.1\r\nHost: localhost\r\n\r\n"
     with socket.socket() as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.settimeout(15.0)
@@ -248,7 +248,7 @@ def app(tmp_path: Path) -> FastAPI:
 async def told(app: FastAPI) -> bool:
     """Return whether the data directory is said to take files."""
     transport = httpx.ASGITransport(app)
-    async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+    async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
         answer = await asyncio.wait_for(client.get("/health"), 5.0)
     writable: bool = answer.json()["data_writable"]
     return writable
@@ -267,7 +267,7 @@ def test_health_needs_no_thread_that_others_use(app: FastAPI) -> None:
 def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
     hanging = threading.Event()
     monkeypatch.setattr(health, "PROBE_SECONDS", 0.2)
-    monkeypatch.setattr(health, "look", lambda *given: hanging.wait(20.0))
+    monkeypatch.setattr(health, "look", lambda *given: (hanging.wait(20.0), {}))
 
     async def twice() -> list[bool]:
         answers = [await told(app), await told(app)]

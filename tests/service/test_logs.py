@@ -24,7 +24,9 @@ ID = "0" * 32
 @pytest.fixture
 def client(tmp_path: Path) -> TestClient:
     """A service whose runner does not work."""
-    return TestClient(create_app(Settings(data=tmp_path)), raise_server_exceptions=False)
+    return TestClient(
+        create_app(Settings(data=tmp_path)), "http://localhost", raise_server_exceptions=False
+    )
 
 
 def lines(text: str) -> list[dict[str, Any]]:

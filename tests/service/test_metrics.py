@@ -19,7 +19,9 @@ STUDY = {"name": "a", "scene": "punch", "sweep": {"friction": [0.1, 0.2]}}
 @pytest.fixture
 def client(tmp_path: Path) -> TestClient:
     """A service whose runner does not work."""
-    return TestClient(create_app(Settings(data=tmp_path)), raise_server_exceptions=False)
+    return TestClient(
+        create_app(Settings(data=tmp_path)), "http://localhost", raise_server_exceptions=False
+    )
 
 
 def figures(client: TestClient) -> dict[tuple[str, frozenset[tuple[str, str]]], float]:
@@ -87,7 +89,7 @@ def test_a_defect_counts_as_500(client: TestClient, monkeypatch: pytest.MonkeyPa
 
 
 def test_two_services_in_a_process_count_apart(client: TestClient, tmp_path: Path) -> None:
-    other = TestClient(create_app(Settings(data=tmp_path / "other")))
+    other = TestClient(create_app(Settings(data=tmp_path / "other")), "http://localhost")
     client.post("/studies", json=STUDY)
     assert figures(other)[named("residua_studies", status="accepted")] == 0
 

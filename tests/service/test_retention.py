@@ -232,7 +232,7 @@ def test_a_sweep_that_fails_is_told_and_tried_again(
 def test_deletion_over_http(place: Place) -> None:
     study = place.computed("remote", [0.1, 0.2])
     app = create_app(Settings(data=place.store.directory))
-    client = TestClient(app)  # without its context: the runner does not work
+    client = TestClient(app, "http://localhost")  # without its context: the runner does not work
     run, url = f"/runs/{ids(study)[0]}", f"/studies/{study.id}"
     client.post(f"{url}/retry")
     assert client.delete(run).status_code == 409

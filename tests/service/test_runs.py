@@ -113,4 +113,6 @@ def test_a_scene_describes_its_parameters(service: Server) -> None:
 def test_health_is_ready_while_work_is_done(service: Server) -> None:
     answer = service.client.get("/health")
     assert answer.status_code == 200
-    assert answer.json() == {"status": "ready", "data_writable": True, "executor_alive": True}
+    told = answer.json()
+    assert told["status"] in ("ready", "waiting")
+    assert told["data_writable"] and told["queue_readable"] and told["executor_alive"]

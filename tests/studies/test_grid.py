@@ -41,7 +41,9 @@ def never() -> bool:
 
 def listening() -> list[Any]:
     """Ports that this process and its workers listen on."""
-    family = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    here = psutil.Process()  # which may be the parent of other tests' services too
+    spawned = [each for each in here.children() if "spawn_main" in " ".join(each.cmdline())]
+    family = [here, *spawned]
     return [
         each.laddr
         for process in family
