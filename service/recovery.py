@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 import logging
 import shutil
-from collections import Counter
-from contextlib import suppress
 from pathlib import Path
 
 from service.errors import QueueLost
 from service.job import State, verdict
 from service.jobs import Jobs
-from studies import Store, Study, StudyError, open_netcdf
-from studies.definition.vocabulary import STATUSES
+from studies import Store, Study
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +50,5 @@ def _find(file: Path, jobs: Jobs, store: Store) -> None:
     if study.id != file.parent.name:
         return
     jobs.accept(study.id, study.to_dict(), study.run_ids())
-    with suppress(StudyError), open_netcdf(store.dataset_path(study.id)) as dataset:
-        codes = dataset["status"].to_numpy().ravel().tolist()
-        counts = Counter(STATUSES[code] for code in codes)
+    if counts := store.outcomes(study.id):
         jobs.finish(study.id, *verdict(counts), standing=State.ACCEPTED)

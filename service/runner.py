@@ -12,12 +12,11 @@ import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from typing import Any
 
 from service import processes
 from service.errors import NotFound, QueueLost
-from service.job import Job, State, verdict
+from service.job import UNREADABLE, Job, State, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
 from service.settings import Settings
@@ -103,7 +102,7 @@ class Runner:
             await self._task
 
     async def _work(self) -> None:
-        idle = 0.0
+        idle, trouble = 0.0, ""
         while not self._stopping.is_set():
             pause = self.settings.poll_seconds
             try:
@@ -112,12 +111,15 @@ class Runner:
                 idle = 0.0 if self._studies else idle + pause
                 if idle >= self.settings.idle_seconds:
                     await self.pool.close()
-            except QueueLost as error:
-                log.error("%s", error)
-                await asyncio.to_thread(self.restore)
-                await asyncio.to_thread(self.jobs.resume, list(self._studies))
+                trouble = ""
+            except (QueueLost, StoreFull, OSError) as error:
+                if trouble != (trouble := str(error)):  # once, however long it lasts
+                    log.error("no study can be begun: %s", trouble)
+                if isinstance(error, QueueLost):
+                    await self._restore()
+                pause *= 10
             except Exception:
-                log.exception("the queue could not be read or written; trying again")
+                log.exception("no study can be begun; trying again")
                 pause *= 10
             await self._pause(pause)
         await asyncio.gather(*self._studies.values(), return_exceptions=True)
@@ -136,15 +138,28 @@ class Runner:
         job = await asyncio.to_thread(self.jobs.take, list(self._studies), largest)
         if job is None:
             return False
-        task = asyncio.create_task(self._compute(job))
-        self._studies[job.id] = task
-        task.add_done_callback(partial(self._ended, job.id))
+        self._studies[job.id] = asyncio.create_task(self._carry_out(job))
         return True
 
-    def _ended(self, job_id: str, task: asyncio.Task[None]) -> None:
-        del self._studies[job_id]
-        if not task.cancelled() and (error := task.exception()):
-            log.error("to be taken again", exc_info=error, extra={"study": job_id})
+    async def _restore(self) -> None:
+        try:
+            await asyncio.to_thread(self.restore)
+            await asyncio.to_thread(self.jobs.resume, list(self._studies))
+        except (QueueLost, StoreFull, OSError) as error:
+            log.error("the queue cannot be made anew: %s", error)
+
+    async def _carry_out(self, job: Job) -> None:
+        """Compute a study; one whose end cannot be written is taken again a little later."""
+        try:
+            await self._compute(job)
+        except (QueueLost, StoreFull, OSError) as error:
+            log.error("to be taken again: %s", error, extra={"study": job.id})
+            await self._pause(10 * self.settings.poll_seconds)
+        except Exception:
+            log.exception("to be taken again", extra={"study": job.id})
+            await self._pause(10 * self.settings.poll_seconds)
+        finally:
+            del self._studies[job.id]
 
     async def _compute(self, job: Job) -> None:
         """Start a study until it ends; give up after too many starts in a row without a new run."""
@@ -181,6 +196,8 @@ class Runner:
             return Attempt(progress, reason=str(error), patient=True)
         except OSError as error:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
+        except ValueError:  # the study is no JSON
+            return Attempt(progress, reason=UNREADABLE, hopeless=True)
         attempt, again, told = Attempt(progress), job.again, (progress, "")
         started = time.monotonic()
         events = asyncio.create_task(follow(child, attempt))

@@ -23,7 +23,7 @@ from studies.execution.proof import Proof, proof_of
 from studies.execution.task import PathTask, walk
 from studies.execution.watch import Waiting
 from studies.storage import dataset as layout
-from studies.storage.combine import combine
+from studies.storage.combine import Combined, combine
 from studies.storage.store import Store
 
 DEFAULT = Limits()
@@ -142,7 +142,8 @@ def run_study(
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, access, stop)
-        combined = combine(study, store, study.cases())
+        stopped = asked and bool(wanted - work.computed)
+        combined = _result(study, store, stopped)
         store.catalogue.remove(combined.missing)
     return StudyOutcome(
         study_id=study.id,
@@ -151,8 +152,17 @@ def run_study(
         computed=sorted(work.computed),
         dataset=combined.path,
         wall_seconds=time.monotonic() - started,
-        stopped=asked and bool(wanted - work.computed),
+        stopped=stopped,
     )
+
+
+def _result(study: Study, store: Store, stopped: bool) -> Combined:
+    """Combine the runs, unless a repeat that was stopped has fewer of them than the data set."""
+    held = store.outcomes(study.id)
+    if stopped and held[OK] > store.catalogue.counts(study.run_ids()).get(OK, 0):
+        path = store.dataset_path(study.id)
+        return Combined(path=path, counts=dict(held), failed=(), missing=())
+    return combine(study, store, study.cases())
 
 
 def _answering(access: Access) -> None:

@@ -21,15 +21,18 @@ import logging
 import os
 import tempfile
 import uuid
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
+import h5py
 import xarray as xr
 
 from studies.definition.identity import is_id
 from studies.definition.study import Study
+from studies.definition.vocabulary import STATUSES
 from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, StudyError
 from studies.storage import dataset as layout
 from studies.storage import runfile
@@ -74,6 +77,14 @@ class Store:
     def dataset_path(self, study_id: str) -> Path:
         """Return where the combined data set of a study is or will be."""
         return self.study_directory(study_id) / "dataset.nc"
+
+    def outcomes(self, study_id: str) -> Counter[str]:
+        """Return how many runs the data set of a study holds, by status."""
+        try:
+            with h5py.File(self.dataset_path(study_id), "r") as file:
+                return Counter(STATUSES[code] for code in file["status"][...].ravel())
+        except (OSError, KeyError, IndexError, RuntimeError):
+            return Counter()
 
     def save_study(self, study: Study) -> Path:
         """Keep what the study asks for, and return its directory."""

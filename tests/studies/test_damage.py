@@ -343,3 +343,16 @@ def test_a_repeat_replaces_old_files_once_though_a_worker_dies_in_between(store:
     walk(task, told.append, lambda: False)  # the worker that takes the task over
     assert [content["row"]["id"] for content in told] == ids
     assert store.modified(ids) == after
+
+
+def test_a_repeat_that_is_stopped_keeps_a_data_set_that_holds_more(
+    damaged: ComputedStudy,
+) -> None:
+    study, store = damaged
+    store.delete_run(first(study))
+    stopped = run_study(study, store, workers=1, should_stop=lambda: True)
+    assert stopped.stopped and stopped.counts == {"ok": 4}
+    true_numbers(study, store)
+    again = run_study(study, store, workers=1)
+    assert again.computed == [first(study)]
+    true_numbers(study, store)
