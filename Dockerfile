@@ -8,7 +8,9 @@ ENV PIP_NO_CACHE_DIR=1 \
     OMP_NUM_THREADS=1 \
     MKL_NUM_THREADS=1 \
     NUMBA_CACHE_DIR=/tmp/numba \
-    MPLCONFIGDIR=/tmp/matplotlib
+    MPLCONFIGDIR=/tmp/matplotlib \
+    NO_PROXY=127.0.0.1,localhost \
+    no_proxy=127.0.0.1,localhost
 
 WORKDIR /app
 COPY pyproject.toml setup.py constraints.txt README.md LICENSE ./

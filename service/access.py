@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from http import HTTPStatus
 
+from anyio import CapacityLimiter
+from anyio.to_thread import run_sync
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Send
@@ -20,7 +22,7 @@ NEEDED = [
     (re.compile(pattern, re.DOTALL), scope)
     for pattern, scope in (
         # A browser sends no key with the address of a page; these tell what is no secret.
-        (r"(GET|HEAD) /(health|docs(/.*)?|openapi\.json)", None),
+        (r"(GET|HEAD|OPTIONS) /(health|docs(/.*)?|openapi\.json)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
         (r"POST /(studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
         (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),
@@ -51,7 +53,10 @@ class Gate:
         self.app = app
         self.asked = settings.keys_asked
         self.keys = keys
-        self.names = {"localhost", settings.host, *settings.allowed_hosts}
+        self.one = CapacityLimiter(1)
+        self.names = {
+            name.lower() for name in ("localhost", settings.host, *settings.allowed_hosts)
+        }
 
     async def __call__(self, connection: Connection, receive: Receive, send: Send) -> None:
         """Answer with a problem document, or hand the request on."""
@@ -61,7 +66,9 @@ class Gate:
             try:
                 self.check_host(request.headers.getlist("host"))
                 check_page(request)
-                request.state.caller = self.caller(request) if self.asked else Scope.ADMIN
+                request.state.caller = Scope.ADMIN
+                if self.asked:  # in a thread: the disk may hang
+                    request.state.caller = await run_sync(self.caller, request, limiter=self.one)
                 check_content(request)
             except HTTPException as refusal:
                 answer = on_http_error(request, refusal)

@@ -20,6 +20,7 @@ import solver
 from service import errors, logs, routes
 from service.access import Gate
 from service.connections import limited
+from service.errors import QueueLost
 from service.examiner import Examiner
 from service.headers import SecurityHeaders
 from service.keys import Keys, KeysError
@@ -36,6 +37,7 @@ from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings, chosen
 from studies import Store, StoreBusy, StudyError
+from studies.errors import CatalogueDamaged, StoreFull
 
 BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
 """How the description of the service announces that keys are asked; `Gate` does the asking."""
@@ -79,7 +81,7 @@ def create_app(settings: Settings) -> FastAPI:
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            async with examiner.working(), runner.working(), keeper.working():
+            async with runner.working(), keeper.working():
                 yield
         finally:
             os.close(lock)
@@ -120,8 +122,8 @@ def create_app(settings: Settings) -> FastAPI:
 def open_store(directory: Path) -> Store:
     """Return the store in ``directory``, its catalogue in line with the runs that are there."""
     store = Store(directory)
-    # Whoever computes here without the service has just done the same.
-    with contextlib.suppress(StoreBusy), store.writing():
+    # Whoever computes here without the service has just done the same; the pool does it too.
+    with contextlib.suppress(StoreBusy, StoreFull), store.writing():
         pass
     return store
 
@@ -144,9 +146,12 @@ def serve(
     """
     try:
         settings = chosen(host=host, port=port, data=data, scheduler=scheduler)
-        logs.configure(settings.log_format)
+    except StudyError as error:
+        refuse(str(error))
+    logs.configure(settings.log_format)
+    try:
         app = create_app(settings)
-    except (DirectoryInUse, KeysError, StudyError) as error:
+    except (CatalogueDamaged, DirectoryInUse, KeysError, QueueLost, StoreFull, StudyError) as error:
         refuse(str(error))
     except OSError as error:
         refuse(f"data = {str(settings.data)!r}: must be a directory to write in ({error.strerror})")

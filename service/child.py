@@ -14,7 +14,7 @@ from typing import Any
 
 from service.processes import Outlet, claim_stdout, read_order, watch_stdin
 from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
-from studies.errors import CatalogueDamaged, StoreFull
+from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable
 from studies.execution.cluster import Access
 from studies.execution.limits import Limits
 
@@ -35,7 +35,8 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         scheduler=Access.from_dict(order["access"]),
         limits=Limits(**order["limits"]),
         priority=order["priority"],
-        resume=not order["again"],
+        resume=True,
+        since=order["since"],
         on_event=lambda event: tell(event, outlet),
         should_stop=stop.is_set,
     )
@@ -56,10 +57,10 @@ def main() -> None:
     order = read_order()
     try:
         compute(order, outlet, watch_stdin(order["grace"]))
+    except (CatalogueDamaged, GridLost, StoreBusy, StoreFull, Unusable) as error:
+        outlet.send("wait", {"reason": str(error)})
     except StudyError as error:
         outlet.send("refused", {"reason": str(error)})
-    except (CatalogueDamaged, GridLost, StoreFull) as error:
-        outlet.send("wait", {"reason": str(error)})
     except Exception as error:
         outlet.send("error", {"reason": f"{type(error).__name__}: {error}"})
         raise

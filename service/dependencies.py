@@ -20,7 +20,7 @@ from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
 from studies import Store
-from studies.storage.runfile import verify
+from studies.storage.runfile import stamp, verify
 
 
 def held(name: str) -> Any:
@@ -54,11 +54,12 @@ def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
 
 
 def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
-    """Return the catalogue's row of the run named in the path, whose file is as it was written."""
-    row = store.catalogue.run(run_id)
-    if row is None or not store.run_path(run_id).is_file():
+    """Return the catalogue's row of the run named in the path, if its file is still that one."""
+    row, path = store.catalogue.run(run_id), store.run_path(run_id)
+    if row is None or not path.is_file():
         raise NotFound(f"no run has the id {run_id}")
-    verify(store.run_path(run_id))
+    if row | stamp(path) != row:
+        verify(path)
     return row
 
 

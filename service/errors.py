@@ -18,7 +18,7 @@ from service.headers import HEADERS
 from service.logs import REQUEST
 from service.methods import offered
 from studies import StudyError
-from studies.errors import CatalogueDamaged, RunUnreadable, StoreFull
+from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, StoreFull, Unusable
 
 log = logging.getLogger(__name__)
 
@@ -52,6 +52,8 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
     RunUnreadable: HTTPStatus.NOT_FOUND,
+    StoreBusy: HTTPStatus.SERVICE_UNAVAILABLE,
+    Unusable: HTTPStatus.SERVICE_UNAVAILABLE,
     OSError: HTTPStatus.SERVICE_UNAVAILABLE,
 }
 
@@ -174,15 +176,22 @@ def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer an error that is told in one sentence."""
     status = status_of(exc)
     later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
-    said = NO_ROOM if isinstance(exc, StoreFull) else str(exc)
+    told = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
+    said = told.get(type(exc), str(exc))
     return problem(request, status, said, headers=later)
+
+
+def on_unusable(request: Request, exc: Unusable) -> Problem:
+    """Answer what only the operator can mend, without the path."""
+    log.error("%s", exc)
+    return problem(request, status_of(exc), f"{exc.field}: {exc.allowed}", headers=LATER)
 
 
 def on_system_error(request: Request, exc: OSError) -> Problem:
     """Answer what the system refused, without the path."""
     log.error("%s", exc)
     detail = f"the data directory cannot be used: {exc.strerror or 'see the log of the service'}"
-    return problem(request, status_of(exc), detail)
+    return problem(request, status_of(exc), detail, headers=LATER)
 
 
 def on_http_error(request: Request, exc: HTTPException) -> Response:

@@ -11,7 +11,7 @@ from enum import StrEnum
 log = logging.getLogger(__name__)
 
 COLUMNS = (
-    "id, name, scene, size, state, message, progress, again, priority, submitted, started, finished"
+    "id, name, scene, size, state, message, progress, since, priority, submitted, started, finished"
 )
 UNREADABLE = "its row in the queue cannot be read: post the study again"
 
@@ -42,7 +42,8 @@ class Job:
     size : number of its runs
     state, message : where it stands, and why when that needs a reason
     progress : percentage of the work that is done
-    again : whether runs that failed are to be computed again; over once the work has begun
+    since : time of the last retry [ns since 1970], 0 without one: runs that failed before it are
+        computed again
     priority : of two studies, the one with the greater priority is computed first
     submitted, started, finished : ISO 8601, UTC
     """
@@ -54,7 +55,7 @@ class Job:
     state: State
     message: str
     progress: float
-    again: bool
+    since: int
     priority: int
     submitted: str
     started: str | None
@@ -65,14 +66,14 @@ def job_of(row: sqlite3.Row) -> Job | None:
     """Return the job a row of the table stands for; None when the row makes no sense."""
     found = dict(row)
     try:
-        found |= {key: int(found[key]) for key in ("size", "priority")}
+        found |= {key: int(found[key]) for key in ("size", "since", "priority")}
         found |= {"state": State(found["state"]), "progress": float(found["progress"])}
         if not all(isinstance(found[key], str) for key in ("name", "scene", "message")):
             raise TypeError
     except (ValueError, TypeError):
         log.error("%s: %s", row["id"], UNREADABLE)
         return None
-    return Job(**found | {"again": bool(found["again"])})
+    return Job(**found)
 
 
 def verdict(counts: Mapping[str, int]) -> tuple[State, str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import sys
+import time
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -43,6 +44,9 @@ class Jobs:
         self.longest = longest
         with self.transaction("BEGIN IMMEDIATE", mode="rwc") as connection:
             schema.prepare(connection)
+            for (finding,) in connection.execute("PRAGMA integrity_check(1)"):
+                if finding != "ok":
+                    raise sqlite3.DatabaseError(finding)
 
     def accept(
         self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
@@ -58,11 +62,11 @@ class Jobs:
             If as many studies wait as may.
         """
         with self.transaction() as connection:
-            with suppress(NotFound):
+            with suppress(NotFound, Conflict):
+                self._study(connection, job_id)
                 return self._read(connection, job_id), False
-            (waiting,) = connection.execute(
-                "SELECT COUNT(*) FROM job WHERE state = ?", (State.ACCEPTED,)
-            ).fetchone()
+            count = "SELECT COUNT(*) FROM job WHERE state = ?"
+            (waiting,) = connection.execute(count, (State.ACCEPTED,)).fetchone()
             if self.longest is not None and waiting >= self.longest:
                 raise Busy(f"{waiting} studies wait already, and no more may: post it later")
             connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # a row unreadable
@@ -95,11 +99,7 @@ class Jobs:
     def study(self, job_id: str) -> dict[str, Any]:
         """Return the study of a job as ``Study.to_dict`` gave it."""
         with self.transaction("BEGIN") as connection:
-            row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
-            if row is None:
-                raise unknown(job_id)
-            study: dict[str, Any] = json.loads(row["study"])
-            return study
+            return self._study(connection, job_id)
 
     def runs(self, job_id: str, limit: int = -1, offset: int = 0) -> list[str]:
         """Return the ids of a job's runs in the order of its cases, or one page of them."""
@@ -153,18 +153,16 @@ class Jobs:
                 try:
                     return self._read(connection, row["id"])
                 except NotFound:
-                    connection.execute(
-                        "UPDATE job SET state = ?, message = ? WHERE id = ?",
-                        (State.FAILED, UNREADABLE, row["id"]),
-                    )
+                    end = (State.FAILED, UNREADABLE, row["id"])
+                    connection.execute("UPDATE job SET state = ?, message = ? WHERE id = ?", end)
             return None
 
     def resume(self, busy: Collection[str]) -> None:
         """Mark the jobs that are being computed as running, in a queue made anew."""
         with self.transaction() as connection:
             connection.executemany(
-                "UPDATE job SET state = ?, started = ? WHERE id = ? AND state = ?",
-                [(State.RUNNING, now(), job_id, State.ACCEPTED) for job_id in busy],
+                "UPDATE job SET state = ?, started = ?, finished = NULL WHERE id = ?",
+                [(State.RUNNING, now(), job_id) for job_id in busy],
             )
 
     def waiting(self) -> dict[str, str]:
@@ -193,13 +191,6 @@ class Jobs:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
                 (message, progress, job_id, State.RUNNING),
-            )
-
-    def begun(self, job_id: str) -> None:
-        """Write that a running job has begun: runs that fail now are not tried again."""
-        with self.transaction() as connection:
-            connection.execute(
-                "UPDATE job SET again = 0 WHERE id = ? AND state = ?", (job_id, State.RUNNING)
             )
 
     def dismiss(self, job_id: str) -> Job:
@@ -242,9 +233,9 @@ class Jobs:
             if not job.state.final:
                 raise Conflict(f"the study is {job.state}: wait for its end or dismiss it first")
             connection.execute(
-                "UPDATE job SET stood = state, state = ?, message = '', progress = 0, again = 1,"
+                "UPDATE job SET stood = state, state = ?, message = '', progress = 0, since = ?,"
                 f" started = NULL, finished = NULL, turn = {NEXT_TURN} WHERE id = ?",
-                (State.ACCEPTED, job_id),
+                (State.ACCEPTED, time.time_ns(), job_id),
             )
             return self._read(connection, job_id)
 
@@ -258,6 +249,7 @@ class Jobs:
             address = f"{self.path.resolve().as_uri()}?mode={mode}"
             connection = sqlite3.connect(address, uri=True, timeout=30.0, isolation_level=None)
             connection.row_factory = sqlite3.Row
+            connection.text_factory = lambda text: text.decode(errors="replace")
             try:
                 connection.execute(begin)
                 with connection:
@@ -269,12 +261,24 @@ class Jobs:
 
     def _told(self, error: sqlite3.DatabaseError) -> Exception:
         """Return what an error of SQLite means for the queue."""
-        match getattr(error, "sqlite_errorcode", None):
-            case sqlite3.SQLITE_FULL:
-                return StoreFull(str(self.path.parent))
-            case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_READONLY | sqlite3.SQLITE_IOERR:
-                return OSError(f"{self.path.name} cannot be used now: {error}")
-        return QueueLost(f"{self.path.name} is gone or damaged ({error})")
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
+        if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE):  # the latter past a quota
+            return StoreFull(str(self.path.parent))
+        damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
+        if code & 0xFF in damage or not self.path.is_file():
+            return QueueLost(f"{self.path.name} is gone or damaged ({error})")
+        return OSError(f"{self.path.name} cannot be used now: {error}")
+
+    @staticmethod
+    def _study(connection: sqlite3.Connection, job_id: str) -> dict[str, Any]:
+        row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
+        if row is None:
+            raise unknown(job_id)
+        try:
+            study: dict[str, Any] = json.loads(row["study"])
+        except ValueError:
+            raise Conflict(UNREADABLE) from None
+        return study
 
     @staticmethod
     def _read(connection: sqlite3.Connection, job_id: str) -> Job:

@@ -108,6 +108,9 @@ class Keys:
             with appearing(self.path) as part:
                 part.touch(mode=0o600)
                 part.write_bytes(FILE.dump_json(keys, indent=2))
+                if os.geteuid() == 0:  # the service may be another user: the owner of the directory
+                    owner = self.path.parent.stat()
+                    os.chown(part, owner.st_uid, owner.st_gid)
         finally:
             os.close(lock)
 

@@ -15,6 +15,7 @@ import solver
 from service.errors import Busy
 from service.schemas import MapQuery
 from studies import open_netcdf
+from studies.storage.runfile import verify
 
 
 class Pictures:
@@ -85,6 +86,7 @@ def draw(path: Path, query: MapQuery) -> bytes:
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
 
     picture = io.BytesIO()
+    verify(path)
     with open_netcdf(path) as run:
         map_figure(run, **query.model_dump()).savefig(picture, format="png")
     return picture.getvalue()

@@ -28,6 +28,7 @@ def head_is_get(app: ASGIApp) -> ASGIApp:
                 await send({"type": "http.response.body"})
 
         scope["method"] = "GET"
+        scope["headers"] = [each for each in scope["headers"] if each[0] != b"range"]  # of GET only
         try:
             await app(scope, receive, head_only)
         finally:

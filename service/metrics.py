@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sqlite3
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from http import HTTPMethod
@@ -19,6 +18,7 @@ from service.jobs import Jobs
 from service.runner import Runner
 from service.search import OUTCOMES
 from studies import Store
+from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
 
 OTHER = "other"
 """Label of every method and path that no route has: clients cannot make labels without end."""
@@ -59,7 +59,7 @@ class Metrics(Collector):
             ),
         ):
             family = GaugeMetricFamily(name, meaning, labels=("status",))
-            with suppress(QueueLost, sqlite3.Error, OSError):
+            with suppress(QueueLost, CatalogueDamaged, StoreBusy, StoreFull, OSError):
                 counts = count()
                 for kind in kinds:
                     family.add_metric([kind], counts.get(kind, 0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from typing import Any
 
@@ -31,17 +32,19 @@ class Details:
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs = jobs
         self.store = store
+        self.one = threading.Lock()
         self.kept: OrderedDict[tuple[str, int, int], tuple[object, bytes]] = OrderedDict()
 
     def get(self, job: Job, window: Window) -> bytes:
         """Return a study, and one by one those of its runs that are in ``window``."""
         key, state = (job.id, window.limit, window.offset), (job, self.store.catalogue.changes())
-        known = self.kept.get(key)
-        if known is None or known[0] != state:
-            known = state, self._look_up(job, window).model_dump_json().encode()
-            self.kept[key] = known
-            if len(self.kept) > KEPT:
-                self.kept.popitem(last=False)
+        with self.one:
+            known = self.kept.get(key)
+            if known is None or known[0] != state:
+                known = state, self._look_up(job, window).model_dump_json().encode()
+                self.kept[key] = known
+                if len(self.kept) > KEPT:
+                    self.kept.popitem(last=False)
         return known[1]
 
     def _look_up(self, job: Job, window: Window) -> StudyDetail:

@@ -96,7 +96,7 @@ def main() -> None:
     stop = processes.watch_stdin(order["grace"])
     try:
         with contextlib.ExitStack() as held:
-            held.enter_context(Store(order["data"]).writing())
+            held.enter_context(Store(order["data"]).writing(tidy=False))
             access = order["access"]
             if access is None:
                 own = own_workers(order["workers"] or os.cpu_count() or 1, order["memory"])

@@ -27,10 +27,11 @@ def open_queue(path: Path, store: Store, longest: int | None) -> Jobs:
     except QueueLost as error:
         damaged = path.with_name(f"{path.name}.damaged")
         log.error("%s: kept as %s, and made anew from the studies", error, damaged.name)
-        path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
         if damaged.is_dir():
             shutil.rmtree(damaged)
+        damaged.unlink(missing_ok=True)
         path.replace(damaged)
+    path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)
     jobs = Jobs(part)

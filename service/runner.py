@@ -11,12 +11,12 @@ import sys
 import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from service import processes
-from service.errors import NotFound, QueueLost
-from service.job import UNREADABLE, Job, State, verdict
+from service.errors import Conflict, NotFound, QueueLost
+from service.job import Job, State, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
 from service.settings import Settings
@@ -42,7 +42,6 @@ class Attempt:
     progress : percentage of the study that is done
     heard : whether its process has said anything
     waiting : what the study waits for; empty when it goes on
-    begun : whether the first event came: something was computed
     runs : number of runs that got an outcome
     counts : runs by status when the study ended; None when it did not
     reason : why it did not end
@@ -53,7 +52,6 @@ class Attempt:
     progress: float
     heard: bool = False
     waiting: str = ""
-    begun: bool = False
     runs: int = 0
     counts: dict[str, int] | None = None
     reason: str = "its process ended without a result or an error message; see the service's log"
@@ -145,7 +143,7 @@ class Runner:
         try:
             await asyncio.to_thread(self.restore)
             await asyncio.to_thread(self.jobs.resume, list(self._studies))
-        except (QueueLost, StoreFull, OSError) as error:
+        except Exception as error:  # of the disk, or of what lies there
             log.error("the queue cannot be made anew: %s", error)
 
     async def _carry_out(self, job: Job) -> None:
@@ -174,11 +172,10 @@ class Runner:
                 await asyncio.to_thread(self.jobs.finish, job.id, *verdict(attempt.counts))
                 return
             progress = attempt.progress
-            job = replace(job, again=job.again and not attempt.begun)
             barren = 0 if attempt.runs or attempt.patient else barren + 1
-            message = f"the study stopped: {attempt.reason}"
+            message = f"the study stopped: {self._plain(attempt.reason)}"
             log.error(message, extra={"study": job.id})
-            if not attempt.patient:
+            if attempt.runs or not attempt.patient:
                 patient_since = time.monotonic()
             waited = time.monotonic() - patient_since
             impatient = waited >= (self.settings.patience_seconds or math.inf)
@@ -196,20 +193,17 @@ class Runner:
             return Attempt(progress, reason=str(error), patient=True)
         except OSError as error:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
-        except ValueError:  # the study is no JSON
-            return Attempt(progress, reason=UNREADABLE, hopeless=True)
-        attempt, again, told = Attempt(progress), job.again, (progress, "")
+        except Conflict as error:  # its row is damaged
+            return Attempt(progress, reason=str(error), hopeless=True)
+        attempt, told = Attempt(progress), (progress, "")
         started = time.monotonic()
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
                 await asyncio.wait({events}, timeout=self.settings.poll_seconds)
-                if again and attempt.begun:
-                    again = False
-                    await self._write(self.jobs.begun, job.id)
                 if not attempt.heard and time.monotonic() > started + SILENCE_SECONDS:
                     attempt.waiting = SILENT
-                if told != (now := (attempt.progress, attempt.waiting)):
+                if told != (now := (attempt.progress, self._plain(attempt.waiting))):
                     told = now
                     await self._write(self.jobs.note, job.id, *told)
         finally:
@@ -220,7 +214,6 @@ class Runner:
             log.error("its process sent what cannot be read", exc_info=unread, extra=about)
             return Attempt(
                 attempt.progress,
-                begun=attempt.begun,
                 reason=f"its process sent what cannot be read: {type(unread).__name__}: {unread}",
             )
         return attempt
@@ -233,17 +226,21 @@ class Runner:
             "access": await self.pool.access(),
             "limits": asdict(self.settings.limits),
             "priority": job.priority,
-            "again": job.again,
+            "since": job.since,
             "grace": self.settings.grace_seconds,
         }
         return await processes.start("service.child", order, self.lock)
+
+    def _plain(self, text: str) -> str:
+        """Return what is told of a study without the path of the data directory."""
+        return text.replace(str(self.settings.data.resolve()), "the data directory")
 
     async def _unwanted(self, job: Job) -> bool:
         if self._stopping.is_set():
             return True
         try:
             return (await asyncio.to_thread(self.jobs.get, job.id)).state is not State.RUNNING
-        except QueueLost:  # the work goes on, and is found again in the queue made anew
+        except (QueueLost, StoreFull, OSError):  # the work goes on, and is found again later
             return False
         except NotFound:
             return True
@@ -272,7 +269,7 @@ async def follow(child: Process, attempt: Attempt) -> None:
             case "event" if content["kind"] == "waiting":
                 attempt.waiting = content["message"]
             case "event":
-                attempt.begun, attempt.waiting = True, ""
+                attempt.waiting = ""
                 attempt.progress = 100 * content["progress"]
                 attempt.runs += content["kind"] == "run"
             case "outcome":

@@ -18,7 +18,7 @@ TABLES = (
         state TEXT NOT NULL,
         message TEXT NOT NULL,
         progress REAL NOT NULL,
-        again INTEGER NOT NULL,
+        since INTEGER NOT NULL,
         stood TEXT NOT NULL,
         priority INTEGER NOT NULL,
         submitted TEXT NOT NULL,
@@ -38,7 +38,8 @@ TABLES = (
 
 FIRST_FORM = (
     """INSERT INTO job SELECT id, json_extract(study, '$.name'), json_extract(study, '$.scene'),
-        study, size, state, message, progress, again, '', 0, submitted, started, finished, turn
+        study, size, state, message, progress, again * 1000000000
+        * CAST(strftime('%s', 'now') AS INTEGER), '', 0, submitted, started, finished, turn
         FROM first""",
     """INSERT INTO run SELECT first.id, each.key, each.value
         FROM first, json_each(first.runs) AS each""",

@@ -166,11 +166,16 @@ def chosen(**given: Any) -> Settings:
     A `StudyError` names the variable that is wrong.
     """
     try:
-        return Settings(**{name: each for name, each in given.items() if each is not None})
+        settings = Settings(**{name: each for name, each in given.items() if each is not None})
+    except OSError as error:
+        raise StudyError("RESIDUA_SCHEDULER_CA", error.filename, f"{error.strerror}") from None
     except ValidationError as error:
         first = error.errors()[0]
         name = f"RESIDUA_{first['loc'][0]}".upper()
         raise StudyError(name, first["input"], first["msg"]) from None
+    for part in ("limits", "outside_access", "bounds"):
+        getattr(settings, part)  # what it refuses is refused now, not when a study needs it
+    return settings
 
 
 def address_of(host: str) -> IPv4Address | IPv6Address | None:

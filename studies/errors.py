@@ -26,6 +26,10 @@ class StudyError(ValueError):
         return type(self), (self.field, self.value, self.allowed)
 
 
+class Unusable(StudyError):
+    """What the operator provides cannot be used now, such as a directory; no study is at fault."""
+
+
 class StoreBusy(RuntimeError):
     """Another process is computing into the same directory."""
 

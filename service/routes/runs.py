@@ -18,6 +18,7 @@ from service.errors import REFUSED
 from service.files import NETCDF, TAGS, UNCHANGED, netcdf
 from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
+from studies.storage.runfile import verify
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
@@ -44,6 +45,7 @@ def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
 @router.get("/{run_id}.nc", responses=NETCDF)
 def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     """Return the data set of a run."""
+    verify(store.run_path(run["id"]))
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from http import HTTPStatus
 from typing import Annotated, Any
@@ -23,11 +24,14 @@ from service.dependencies import (
     TheSettings,
     TheStore,
 )
-from service.errors import REFUSED, NotFound
+from service.errors import REFUSED, NotFound, QueueLost
 from service.files import NETCDF, netcdf
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
 from service.strict import StrictRoute
 from studies import Study, StudyError
+from studies.errors import StoreFull
+
+log = logging.getLogger(__name__)
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
 
@@ -68,10 +72,9 @@ async def submit(
         raise StudyError("priority", priority, "must be an integer >= -100 and <= 100")
     found = await examiner.examine(content)
     study = found.study
+    await asyncio.to_thread(store.save_study, study)
     job, new = await asyncio.to_thread(jobs.accept, study.id, study.to_dict(), found.runs, priority)
-    if new:
-        await asyncio.to_thread(store.save_study, study)
-    else:
+    if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
     return overview.summary(job)
@@ -117,16 +120,19 @@ async def events(
     job: TheJob, jobs: TheJobs, runner: TheRunner, settings: TheSettings
 ) -> AsyncIterator[ServerSentEvent]:
     """Send where a study stands at every change, until its end."""
-    shown = None
+    shown: StudySummary | None = None
     while runner.alive:
+        now = shown
         try:
             now = overview.summary(await asyncio.to_thread(jobs.get, job.id))
         except NotFound:  # deleted
             return
-        if now != shown:
+        except (QueueLost, StoreFull, OSError):  # it is found again later
+            log.warning("events are held up: the queue cannot be read", extra={"study": job.id})
+        if now and now != shown:
             yield ServerSentEvent(event="study", data=now.model_dump(mode="json"))
             shown = now
-        if now.status.final:
+        if now and now.status.final:
             return
         await asyncio.sleep(settings.poll_seconds)
 

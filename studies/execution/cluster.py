@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
-from studies.errors import GridLost, StudyError
+from studies.errors import GridLost, StudyError, Unusable
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -31,6 +31,8 @@ CONFIGURATION: Mapping[str, Any] = {
     # each back to the system, and a quarter of the time would go into clearing pages.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
+    # Every study has a topic of events of its own, and dask keeps what was told under each.
+    "distributed.admin.low-level-log-length": 1,
     # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
     "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
 }
@@ -71,6 +73,9 @@ class Access:
                 "needs certificates: name the file of the authority (--tls-ca) and those of "
                 "your own certificate and key (--tls-cert, --tls-key)"
             )
+            raise StudyError("scheduler", self.address, allowed)
+        if not self.address.startswith("tls://") and (self.ca or self.cert or self.key):
+            allowed = "must begin with tls:// where certificates are named"
             raise StudyError("scheduler", self.address, allowed)
 
     def to_dict(self) -> dict[str, str | None]:
@@ -189,7 +194,7 @@ def connect(access: Access) -> Client:
         except (OSError, ValueError) as error:
             names = [each for each in (access.ca, access.cert, access.key) if each]
             files = ", ".join("(in memory)" if "\n" in each else each for each in names)
-            raise StudyError("certificates", files, f"cannot be used: {error}") from None
+            raise Unusable("certificates", files, f"cannot be used: {error}") from None
     try:
         get_address_host_port(access.address)  # a refused client closes badly
         return Client(access.address, security=security, set_as_default=False, timeout=_CONNECT)

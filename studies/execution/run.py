@@ -16,7 +16,7 @@ from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
-from studies.errors import StoreFull, StudyError
+from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
@@ -28,6 +28,10 @@ from studies.storage.store import Store
 
 DEFAULT = Limits()
 """The limits of a study that sets none."""
+
+
+_BATCH = 500
+"""Runs whose rows are held at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +93,7 @@ def run_study(
     workers: int | None = None,
     scheduler: Access | str | None = None,
     resume: bool = False,
+    since: int = 0,
     limits: Limits = DEFAULT,
     priority: int = 0,
     on_event: Callable[[StudyEvent], None] | None = None,
@@ -105,6 +110,7 @@ def run_study(
         under the same path
     resume : compute only the runs that have no outcome; by default failed runs are computed again
         too
+    since : with `resume`, failed runs stored before this time are computed again [ns since 1970]
     limits : on time and memory
     priority : of studies that share a scheduler, the one with the higher number goes first
     on_event : called, in this thread, with everything that happens
@@ -136,9 +142,11 @@ def run_study(
         _answering(access)
     with store.writing():
         store.save_study(study)
-        known = store.sound(study.run_ids())
-        done = {key for key, row in known.items() if resume or row["status"] == OK}
-        wanted = set(study.run_ids()) - done
+        wanted, ids = set(study.run_ids()), study.run_ids()
+        while some := list(islice(ids, _BATCH)):
+            for run_id, row in store.sound(some).items():
+                if row["status"] == OK or (resume and row["modified"] >= since):
+                    wanted.discard(run_id)
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
             work.compute(workers or os.cpu_count() or 1, access, stop)
@@ -216,7 +224,7 @@ class _Work:
             directory = str(self.store.directory)
             if isinstance(error, StoreFull):
                 raise StoreFull(directory)
-            raise StudyError("directory", directory, error.allowed)
+            raise Unusable("directory", directory, error.allowed)
 
     def _tasks(self, proof: Proof) -> Iterator[PathTask]:
         scene, directory = SCENES[self.study.scene], self.store.directory.resolve()

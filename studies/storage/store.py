@@ -22,8 +22,8 @@ import os
 import tempfile
 import uuid
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Literal
 
@@ -33,7 +33,7 @@ import xarray as xr
 from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.definition.vocabulary import STATUSES
-from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, StudyError
+from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, Unusable
 from studies.storage import dataset as layout
 from studies.storage import runfile
 from studies.storage.catalogue import Catalogue, Row
@@ -142,10 +142,13 @@ class Store:
         """
         wanted = list(run_ids)
         try:
-            known = self.catalogue.rows(wanted)
+            return self._sound(wanted)
         except CatalogueDamaged:
             self.reconcile()
-            known = self.catalogue.rows(wanted)
+            return self._sound(wanted)
+
+    def _sound(self, wanted: Sequence[str]) -> dict[str, Row]:
+        known = self.catalogue.rows(wanted)
         found = {run_id: self.found(run_id, known.get(run_id)) for run_id in wanted}
         rows = {run_id: row for run_id, row in found.items() if row}
         if gone := known.keys() - rows.keys():
@@ -162,8 +165,11 @@ class Store:
 
     def modified(self, run_ids: Iterable[str]) -> dict[str, int]:
         """Return, by id, the time of change [ns] of those runs' files that are there."""
-        paths = {run_id: self.run_path(run_id) for run_id in run_ids}
-        return {run_id: path.stat().st_mtime_ns for run_id, path in paths.items() if path.exists()}
+        times = {}
+        for run_id in run_ids:
+            with suppress(FileNotFoundError):
+                times[run_id] = self.run_path(run_id).stat().st_mtime_ns
+        return times
 
     def discard(self, run_ids: Collection[str]) -> None:
         """Delete runs: their files, then their rows."""
@@ -196,8 +202,10 @@ class Store:
             self.sound(batch)
 
     @contextmanager
-    def writing(self) -> Iterator[None]:
-        """Hold the directory as its only writer; delete the unfinished files of killed writers.
+    def writing(self, tidy: bool = True) -> Iterator[None]:
+        """Hold the directory as its only writer.
+
+        With `tidy`, unfinished files of killed writers are deleted: nobody else writes here.
 
         A store whose lock the caller holds (`held`) takes it as it is.
 
@@ -225,7 +233,8 @@ class Store:
                     f"{self.directory}: another process computes here; "
                     "wait until it has ended, or name another directory"
                 ) from None
-            for part in self.directory.rglob("*.part"):
+            parts = self.directory.glob("*/**/*.part") if tidy else ()  # keys are next to them
+            for part in parts:
                 part.unlink(missing_ok=True)
             self.reconcile()
             yield
@@ -238,7 +247,7 @@ class Store:
                 yield
         except OSError as error:
             allowed = f"must be a directory to write in ({error.strerror})"
-            raise StudyError("directory", str(self.directory), allowed) from None
+            raise Unusable("directory", str(self.directory), allowed) from None
 
     def clear_directory(self, path: Path) -> None:
         """Set a directory aside that stands in the place of a file."""

@@ -13,10 +13,12 @@ from typing import Any
 import httpx
 import pytest
 from fastapi import FastAPI
+from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.keys import Keys, KeysError, Scope
-from service.settings import Settings
+from service.settings import Settings, chosen
+from studies import StudyError
 from studies.command.cli import main
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, environment, fake_study, free_port
@@ -318,6 +320,24 @@ def test_a_root_path_is_part_of_every_address_given_out(mortal: Server) -> None:
     assert answer.headers["location"].startswith("/lab/residua/studies/")
     (server,) = mortal.client.get("/openapi.json").json()["servers"]
     assert server == {"url": "/lab/residua"}
+
+
+def test_names_of_hosts_have_no_case(tmp_path: Path) -> None:
+    app = create_app(Settings(data=tmp_path, allowed_hosts=("Residua.Example.org",)))
+    for name in ("residua.example.org", "RESIDUA.example.ORG"):
+        assert TestClient(app, f"http://{name}").get("/scenes").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("WORKER_MEMORY", "4 grams"), ("SCHEDULER", "tls://127.0.0.1:1")],
+)
+def test_what_studies_would_be_refused_for_is_refused_at_the_start(
+    name: str, value: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(f"RESIDUA_{name}", value)
+    with pytest.raises(StudyError):
+        chosen()
 
 
 def test_a_forged_address_does_not_reach_the_log(mortal: Server) -> None:

@@ -234,7 +234,8 @@ class Stage:
         process = subprocess.Popen(
             self.translated(SERVICES[name]["command"]),
             cwd=self.home,
-            env=self.environment | {key: self.word(value) for key, value in given.items()},
+            env=self.environment
+            | {key: self.word(value) for key, value in given.items() if value is not None},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -285,3 +286,10 @@ def test_a_scheduler_that_restarts_costs_no_study(stage: Stage) -> None:
             stage.start(name)  # as the engine does, see test_every_service_restarts_and_is_watched
         wait_until(lambda: client.get(url).json()["status"] == "successful", 60.0)
         assert client.get(url).json()["counts"] == {"ok": 6}
+
+
+def test_every_setting_of_the_service_can_be_given() -> None:
+    fixed = {"data", "host", "port", "scheduler"}  # by the command
+    own = {"workers", "worker_memory"}  # of workers that the service starts itself
+    wanted = {f"RESIDUA_{name}".upper() for name in Settings.model_fields.keys() - fixed - own}
+    assert set(SERVICES["service"]["environment"]) == wanted

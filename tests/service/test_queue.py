@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -15,7 +16,8 @@ from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import State
 from service.jobs import Jobs
 from service.lock import DirectoryInUse, lock_directory
-from studies import StudyError
+from service.recovery import open_queue
+from studies import Store, StudyError
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
 
@@ -98,6 +100,24 @@ def spoil(jobs: Jobs, job_id: str, **values: object) -> None:
             connection.execute(f"UPDATE job SET {column} = ? WHERE id = ?", (value, job_id))
 
 
+def test_a_flipped_byte_in_a_text_hides_only_its_row(jobs: Jobs) -> None:
+    for name in "ab":
+        jobs.accept(name, STUDY, [name])
+    with closing(sqlite3.connect(jobs.path)) as connection, connection:
+        connection.execute("UPDATE job SET state = CAST(x'ff6363' AS TEXT) WHERE id = 'a'")
+    assert [job.id for job in jobs.page(limit=9, offset=0)[0]] == ["b"]
+    assert taken(jobs) == "b"
+
+
+def test_a_study_that_is_no_json_can_be_posted_again(jobs: Jobs) -> None:
+    jobs.accept("a", STUDY, ["x"])
+    spoil(jobs, "a", study="{")
+    with pytest.raises(Conflict, match="post the study again"):
+        jobs.study("a")
+    assert jobs.accept("a", STUDY, ["x"])[1] is True
+    assert jobs.study("a") == STUDY
+
+
 @pytest.mark.parametrize(
     "nonsense",
     [{"size": "many"}, {"progress": b"\xff"}, {"name": b"\xff"}, {"state": "odd"}],
@@ -131,6 +151,18 @@ def test_a_damaged_page_is_told(jobs: Jobs) -> None:
     jobs.path.write_bytes(content)
     with pytest.raises(QueueLost):
         jobs.page(limit=1000, offset=0)
+
+
+def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
+    path = tmp_path / "jobs.sqlite"
+    jobs = Jobs(path)
+    for number in range(200):
+        jobs.accept(f"{number}", STUDY, [f"{number}-{run}" for run in range(20)])
+    content = bytearray(path.read_bytes())
+    content[8 * 4096 : 9 * 4096] = b"\xff" * 4096
+    path.write_bytes(content)
+    assert open_queue(path, Store(tmp_path), None).page(limit=9, offset=0) == ([], 0)
+    assert (tmp_path / "jobs.sqlite.damaged").read_bytes() == content
 
 
 def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> None:
@@ -183,7 +215,9 @@ def test_a_retried_job_waits_behind_the_others(jobs: Jobs) -> None:
     assert taken(jobs) == "a"
     jobs.note("a", 100.0)
     jobs.finish("a", State.FAILED, "reason")
-    assert (jobs.retry("a").again, jobs.get("a").progress) == (True, 0)
+    asked = time.time_ns()
+    assert asked <= jobs.retry("a").since <= time.time_ns()
+    assert jobs.get("a").progress == 0
     assert taken(jobs) == "b"
 
 

@@ -31,11 +31,11 @@ class Scripted(Runner):
     """Starts children that say what the script has for them; the last part holds for the rest."""
 
     script: list[list[Any]] = field(default_factory=list)
-    orders: list[bool] = field(default_factory=list)
+    orders: list[int] = field(default_factory=list)
 
     async def _start(self, job: Job) -> Process:
         said = self.script[min(len(self.orders), len(self.script) - 1)]
-        self.orders.append(job.again)
+        self.orders.append(job.since)
         lines = [line if isinstance(line, str) else json.dumps(line) for line in said]
         path = self.settings.data / "said"
         path.write_text("".join(f"{line}\n" for line in lines))
@@ -46,14 +46,14 @@ class Scripted(Runner):
 
 def carried_out(
     data: Path, *script: list[Any], again: bool = False, **limits: Any
-) -> tuple[Job, list[bool]]:
-    """Return what became of a study, and with which wish to repeat each child was started."""
+) -> tuple[Job, list[int]]:
+    """Return what became of a study, and from when on outcomes counted for each child."""
     jobs = Jobs(data / "jobs.sqlite")
     jobs.accept("a", {"name": "a", "scene": "fake"}, ["b", "c"])
     if again:
         jobs.dismiss("a")
         jobs.retry("a")
-    settings = Settings(data=data, attempts=2, poll_seconds=0.01, **limits)
+    settings = Settings(**{"data": data, "attempts": 2, "poll_seconds": 0.01, **limits})
     pool = Pool(settings, lock=0)
     runner = Scripted(settings, jobs, pool, 0, lambda: jobs, script=list(script))
 
@@ -66,20 +66,15 @@ def carried_out(
     return jobs.get("a"), runner.orders
 
 
-def test_failed_runs_are_repeated_by_the_first_child_of_a_retry_only(tmp_path: Path) -> None:
-    job, orders = carried_out(tmp_path, [RUN], [RUN], [ALL_FAILED], again=True)
-    assert orders == [True, False, False]
-    assert (job.state, job.again) == (State.FAILED, False)
-
-
-def test_a_retry_that_could_not_begin_is_still_a_retry(tmp_path: Path) -> None:
-    _, orders = carried_out(tmp_path, [AWAY], [], [RUN], [ALL_FAILED], again=True)
-    assert orders == [True, True, True, False]
+def test_every_child_of_a_retry_knows_when_it_was_asked_for(tmp_path: Path) -> None:
+    job, orders = carried_out(tmp_path, [AWAY], [RUN], [RUN], [ALL_FAILED], again=True)
+    assert job.since > 0 and orders == [job.since] * 4
+    assert job.state is State.FAILED
 
 
 def test_a_study_that_brings_nothing_new_is_given_up(tmp_path: Path) -> None:
     job, orders = carried_out(tmp_path, [RUN], [], again=True)
-    assert orders == [True, False, False]
+    assert len(orders) == 3
     assert job.state is State.FAILED and "without a result or an error message" in job.message
 
 
@@ -88,6 +83,13 @@ def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line:
     job, orders = carried_out(tmp_path, [RUN, line])
     assert len(orders) == 2
     assert job.state is State.FAILED and "sent what cannot be read" in job.message
+
+
+def test_time_of_work_is_no_time_of_waiting(tmp_path: Path) -> None:
+    """The first child computes for longer than the service is patient."""
+    script = [[RUN] * 3, [RUN], [AWAY], [{"kind": "outcome", "content": {"ok": 2}}]]
+    job, orders = carried_out(tmp_path, *script, patience_seconds=1.0, poll_seconds=0.05)
+    assert len(orders) == 4 and job.state is State.SUCCESSFUL
 
 
 def test_a_study_that_waits_too_long_for_workers_is_given_up(tmp_path: Path) -> None:

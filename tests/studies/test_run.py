@@ -14,7 +14,7 @@ from studies.command.cli import main
 from studies.definition.identity import solver_hash
 from studies.definition.vocabulary import STATUSES
 from studies.execution.task import PathTask, walk
-from tests.studies.conftest import fake_study
+from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, INCREMENTS, FakeParameters
 
 TROUBLES = ["none", "limit", "raise", "die"]
@@ -215,3 +215,17 @@ def test_a_worker_with_another_solver_refuses(store: Store) -> None:
     assert task.source != solver_hash()
     with pytest.raises(RuntimeError, match="another version of the solver"):
         walk(task, lambda content: None, lambda: False)
+
+
+def test_of_failed_runs_those_before_a_retry_are_computed_again(store: Store) -> None:
+    study = fake_study(sweep={"load_ratio": [0.3, 0.9]}, trouble="limit")
+    compute_here(study, store)
+    failed = {
+        run_id for run_id, row in store.sound(study.run_ids()).items() if row["status"] != "ok"
+    }
+    asked = time.time_ns()
+    assert failed
+    first = run_study(study, store, workers=1, resume=True, since=asked)
+    assert set(first.computed) == failed
+    again = run_study(study, store, workers=1, resume=True, since=asked)
+    assert again.computed == []
