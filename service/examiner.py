@@ -19,7 +19,7 @@ from service.errors import Busy
 from service.settings import Settings
 from studies import Bounds, Estimate, Store, Study, estimate
 
-WAITING = 8
+WAITING = 100
 """Studies that may wait to be examined."""
 
 

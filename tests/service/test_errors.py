@@ -256,13 +256,13 @@ def test_a_name_that_occurs_twice_is_refused(service: Server, part: str, name: s
     assert error["field"] == name and "occurs twice" in error["allowed"]
 
 
-def ask(app: FastAPI, path: str) -> httpx.Response:
+def ask(app: FastAPI, path: str, method: str = "GET", **more: Any) -> httpx.Response:
     """Return the answer of an application that runs in this process."""
 
     async def get() -> httpx.Response:
         transport = httpx.ASGITransport(app, raise_app_exceptions=False)
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
-            return await client.get(path)
+            return await client.request(method, path, **more)
 
     return asyncio.run(get())
 
@@ -329,3 +329,13 @@ def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI
     data = app.state.settings.data
     data.rename(data.with_name("elsewhere"))
     assert ask(app, "/health").json()["data_writable"] is False
+
+
+def test_too_many_studies_to_examine_are_put_off(
+    app: FastAPI, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.examiner.WAITING", 0)
+    for path in ("/studies", "/estimate"):
+        answer = ask(app, path, "POST", json={"name": "a", "scene": "punch"})
+        problem(answer, 503)
+        assert int(answer.headers["retry-after"]) > 0
