@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from service.processes import Outlet, claim_stdout, read_order, watch_stdin
+from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdin
 from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable
 from studies.execution.cluster import Access
@@ -53,7 +53,7 @@ def tell(event: StudyEvent, outlet: Outlet) -> None:
 def main() -> None:
     """Read the order and carry it out."""
     outlet = claim_stdout()
-    outlet.send("alive", {})
+    beat(outlet)
     order = read_order()
     try:
         compute(order, outlet, watch_stdin(order["grace"]))

@@ -24,6 +24,8 @@ from service import logs
 LONGEST_LINE = 1_000_000
 """Bytes of one message a process may send."""
 
+BEAT_SECONDS = 5.0
+
 STDIN = 0
 
 
@@ -67,10 +69,11 @@ class Outlet:
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
+        self.one = threading.Lock()
 
     def send(self, kind: str, content: Mapping[str, Any]) -> None:
         """Write one message; when the service no longer reads, the work goes on."""
-        with contextlib.suppress(BrokenPipeError):
+        with contextlib.suppress(BrokenPipeError), self.one:
             self.stream.write(json.dumps({"kind": kind, "content": content}) + "\n")
             self.stream.flush()
 
@@ -80,6 +83,17 @@ def claim_stdout() -> Outlet:
     stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     return Outlet(stream)
+
+
+def beat(outlet: Outlet) -> None:
+    """Say now and then that this process is alive, as long as it is."""
+
+    def go_on() -> None:
+        while True:
+            outlet.send("alive", {})
+            time.sleep(BEAT_SECONDS)
+
+    threading.Thread(target=go_on, name="beat", daemon=True).start()
 
 
 def read_order() -> dict[str, Any]:

@@ -25,12 +25,12 @@ from studies.errors import StoreFull
 log = logging.getLogger(__name__)
 
 SILENCE_SECONDS = 20.0
-"""Time after which a process that has said nothing is told of."""
+"""Time after which a process that says nothing is told of."""
 
 SMALL = 100
 """Most runs of a study for which a place is kept."""
 
-SILENT = f"its process has said nothing for {SILENCE_SECONDS:g} s since its start"
+SILENT = "its process says nothing: it is frozen, or the machine is overloaded"
 
 
 @dataclass(slots=True)
@@ -40,7 +40,7 @@ class Attempt:
     Attributes
     ----------
     progress : percentage of the study that is done
-    heard : whether its process has said anything
+    heard : when its process last said anything [s]
     waiting : what the study waits for; empty when it goes on
     runs : number of runs that got an outcome
     counts : runs by status when the study ended; None when it did not
@@ -50,7 +50,7 @@ class Attempt:
     """
 
     progress: float
-    heard: bool = False
+    heard: float = field(default_factory=time.monotonic)
     waiting: str = ""
     runs: int = 0
     counts: dict[str, int] | None = None
@@ -196,13 +196,18 @@ class Runner:
         except Conflict as error:  # its row is damaged
             return Attempt(progress, reason=str(error), hopeless=True)
         attempt, told = Attempt(progress), (progress, "")
-        started = time.monotonic()
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
                 await asyncio.wait({events}, timeout=self.settings.poll_seconds)
-                if not attempt.heard and time.monotonic() > started + SILENCE_SECONDS:
+                silence = time.monotonic() - attempt.heard
+                if silence > SILENCE_SECONDS:
                     attempt.waiting = SILENT
+                elif attempt.waiting == SILENT:
+                    attempt.waiting = ""
+                if silence > (self.settings.stall_seconds or math.inf):
+                    attempt.reason = SILENT
+                    break
                 if told != (now := (attempt.progress, self._plain(attempt.waiting))):
                     told = now
                     await self._write(self.jobs.note, job.id, *told)
@@ -263,7 +268,7 @@ async def follow(child: Process, attempt: Attempt) -> None:
     assert child.stdout is not None
     async for line in child.stdout:
         message = json.loads(line)
-        attempt.heard = True
+        attempt.heard = time.monotonic()
         content = message["content"]
         match message["kind"]:
             case "event" if content["kind"] == "waiting":

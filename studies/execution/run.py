@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -29,6 +30,9 @@ from studies.storage.store import Store
 DEFAULT = Limits()
 """The limits of a study that sets none."""
 
+
+_ROOM = 10_000_000
+"""Bytes that must be free for a study to begin: a few runs of the scenes."""
 
 _BATCH = 500
 """Runs whose rows are held at a time."""
@@ -149,6 +153,8 @@ def run_study(
                     wanted.discard(run_id)
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
+            if shutil.disk_usage(store.directory).free < _ROOM:
+                raise StoreFull(str(store.directory))  # no path is walked in vain
             work.compute(workers or os.cpu_count() or 1, access, stop)
         stopped = asked and bool(wanted - work.computed)
         combined = _result(study, store, stopped)

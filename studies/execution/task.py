@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
 from studies.errors import StoreFull, StudyError
-from studies.execution.proof import Proof
+from studies.execution.proof import Proof, Unfit
 from studies.storage import dataset as layout
 from studies.storage.store import Store
 
@@ -29,7 +30,7 @@ class PathTask:
     scene, path : what to compute
     directory : of the store
     source : `solver_hash` of the process that started the study; a worker whose own differs
-        refuses the task
+        refuses the task, and the study waits for another one
     proof : that the worker sees the directory; None where this is known
     stale : by id, the time of change [ns] of the files that the study replaces; a file that has
         another one was written by a worker that died on this task, and is kept
@@ -45,8 +46,12 @@ class PathTask:
     def stored(self, store: Store) -> dict[str, dict[str, Any]]:
         """Return, by id, the rows of the runs that this task has stored."""
         times = store.modified(case.id for case in self.path.cases)
-        fresh = [run_id for run_id, time in times.items() if time != self.stale.get(run_id)]
+        fresh = [run_id for run_id, at in times.items() if at != self.stale.get(run_id)]
         return {run_id: row for run_id in fresh if (row := store.found(run_id))}
+
+
+REFUSAL_SECONDS = 1.0
+"""Time a worker takes to refuse a task; while it does, other workers get the paths."""
 
 
 class StopAsked(Exception):
@@ -70,9 +75,10 @@ def walk(
     if task.proof is not None:
         task.proof.check(should_stop)
     if task.source != solver_hash():
-        raise RuntimeError(
-            "the worker has another version of the solver than the process that started the study: "
-            "install the same one for both and restart the worker"
+        time.sleep(REFUSAL_SECONDS)
+        raise Unfit(
+            "has another version of the solver than the process that started the study; install "
+            "the same one for both and restart the worker"
         )
     store = Store(task.directory)
 

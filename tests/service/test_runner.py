@@ -16,7 +16,7 @@ import pytest
 from service.job import Job, State
 from service.jobs import Jobs
 from service.pool import Pool
-from service.runner import Runner
+from service.runner import SILENT, Runner
 from service.settings import Settings
 
 RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5}}
@@ -90,6 +90,37 @@ def test_time_of_work_is_no_time_of_waiting(tmp_path: Path) -> None:
     script = [[RUN] * 3, [RUN], [AWAY], [{"kind": "outcome", "content": {"ok": 2}}]]
     job, orders = carried_out(tmp_path, *script, patience_seconds=1.0, poll_seconds=0.05)
     assert len(orders) == 4 and job.state is State.SUCCESSFUL
+
+
+def test_a_frozen_process_is_told_of_and_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.runner.SILENCE_SECONDS", 0.1)
+    told: list[dict[str, str]] = []
+
+    @dataclass
+    class Frozen(Scripted):
+        async def _start(self, job: Job) -> Process:
+            self.orders.append(0)
+            return await asyncio.create_subprocess_exec("sleep", "60", stdin=PIPE, stdout=PIPE)
+
+    jobs = Jobs(tmp_path / "jobs.sqlite")
+    jobs.accept("a", {"name": "a", "scene": "fake"}, ["b"])
+    settings = Settings(
+        data=tmp_path, attempts=2, poll_seconds=0.02, stall_seconds=0.5, grace_seconds=0.1
+    )
+    runner = Frozen(settings, jobs, Pool(settings, lock=0), 0, lambda: jobs)
+
+    async def work() -> None:
+        async with asyncio.timeout(30.0), runner.working():
+            while not jobs.get("a").state.final:
+                told.append(jobs.waiting())
+                await asyncio.sleep(0.02)
+
+    asyncio.run(work())
+    assert {"a": SILENT} in told
+    assert len(runner.orders) == 2
+    assert SILENT in jobs.get("a").message
 
 
 def test_a_study_that_waits_too_long_for_workers_is_given_up(tmp_path: Path) -> None:

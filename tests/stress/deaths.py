@@ -62,7 +62,7 @@ def full_disk(server: Server) -> list[Figure]:
     """A small disk that fills up in the middle of a study, and is given room again."""
     server.stop()
     server.data.mkdir(exist_ok=True)
-    mount = ["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", str(server.data)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=40m", "tmpfs", str(server.data)]
     if subprocess.run(mount, check=False, capture_output=True).returncode:
         return [Figure("not allowed to mount a small disk here: seen by the tests only", 1)]
     try:

@@ -13,6 +13,7 @@ from studies import Store, Study, StudyEvent, StudyOutcome, open_study, run_stud
 from studies.command.cli import main
 from studies.definition.identity import solver_hash
 from studies.definition.vocabulary import STATUSES
+from studies.execution.proof import Unfit
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, INCREMENTS, FakeParameters
@@ -213,7 +214,7 @@ def test_a_worker_with_another_solver_refuses(store: Store) -> None:
     (path, *_) = fake_study().paths()
     task = PathTask(FAKE, path, store.directory, "0" * 32)
     assert task.source != solver_hash()
-    with pytest.raises(RuntimeError, match="another version of the solver"):
+    with pytest.raises(Unfit, match="another version of the solver"):
         walk(task, lambda content: None, lambda: False)
 
 
