@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import NoReturn
 
 import uvicorn
-from anyio import CapacityLimiter
 from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
@@ -31,6 +30,7 @@ from service.methods import head_is_get
 from service.metrics import Metrics
 from service.overview import Details
 from service.pool import Pool
+from service.probe import Probe
 from service.recovery import open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
@@ -104,7 +104,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.keeper = keeper
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
-    app.state.probe = CapacityLimiter(1)
+    app.state.probe = Probe()
     # Each is outside of those before it: what the others refuse is measured and logged too.
     app.add_middleware(body_limit, limit=settings.max_body_bytes)
     app.add_middleware(Gate, settings=settings, keys=keys)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
 from service.errors import NotFound
@@ -15,6 +14,7 @@ from service.keys import Scope
 from service.maps import Pictures
 from service.metrics import Metrics
 from service.overview import Details
+from service.probe import Probe
 from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
@@ -42,7 +42,7 @@ TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
 TheMetrics = Annotated[Metrics, held("metrics")]
 ThePictures = Annotated[Pictures, held("pictures")]
-TheProbe = Annotated[CapacityLimiter, held("probe")]
+TheProbe = Annotated[Probe, held("probe")]
 TheRunner = Annotated[Runner, held("runner")]
 TheSettings = Annotated[Settings, held("settings")]
 TheStore = Annotated[Store, held("store")]

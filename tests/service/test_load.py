@@ -21,12 +21,11 @@ import psutil
 import pytest
 from fastapi import FastAPI
 
-from service import maps
+from service import maps, probe
 from service.app import create_app
 from service.connections import limited
 from service.errors import Busy
 from service.maps import Pictures
-from service.routes import health
 from service.schemas import MapQuery
 from service.settings import Settings
 from tests.service.servers import Server, fake_study
@@ -266,8 +265,8 @@ def test_health_needs_no_thread_that_others_use(app: FastAPI) -> None:
 
 def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
     hanging = threading.Event()
-    monkeypatch.setattr(health, "PROBE_SECONDS", 0.2)
-    monkeypatch.setattr(health, "look", lambda *given: (hanging.wait(20.0), {}))
+    monkeypatch.setattr(probe, "SECONDS", 0.2)
+    monkeypatch.setattr(probe, "look", lambda *given: (hanging.wait(20.0), {}))
 
     async def twice() -> list[bool]:
         answers = [await told(app), await told(app)]
