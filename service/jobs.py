@@ -158,7 +158,7 @@ class Jobs:
             return None
 
     def resume(self, busy: Collection[str]) -> None:
-        """Mark the jobs that are being computed as running, in a queue made anew."""
+        """Mark jobs as running on which a process works, in a queue made anew."""
         with self.transaction() as connection:
             connection.executemany(
                 "UPDATE job SET state = ?, started = ?, finished = NULL WHERE id = ?",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import shutil
+from collections.abc import Collection
 from pathlib import Path
 
 from service.errors import QueueLost
@@ -15,11 +16,14 @@ from studies import Store, Study
 log = logging.getLogger(__name__)
 
 
-def open_queue(path: Path, store: Store, longest: int | None) -> Jobs:
+def open_queue(
+    path: Path, store: Store, longest: int | None, computed: Collection[str] = ()
+) -> Jobs:
     """Return the queue; one that is missing or damaged is made from the studies of the store.
 
     A damaged file is kept under another name. A study with a data set has ended, as the data set
-    tells; one without is accepted, and computed.
+    tells; one without is accepted, and computed; one of ``computed``, on which a process works
+    now, is running.
     """
     try:
         if path.exists():
@@ -37,6 +41,7 @@ def open_queue(path: Path, store: Store, longest: int | None) -> Jobs:
     jobs = Jobs(part)
     for file in sorted(store.directory.glob("studies/*/study.json")):
         _find(file, jobs, store)
+    jobs.resume(computed)
     part.replace(path)  # at once: until then the queue is lost, not empty
     return Jobs(path, longest)
 

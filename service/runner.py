@@ -68,14 +68,14 @@ class Runner:
     settings, jobs : how to compute, and what
     pool : the workers, and the lock of the store
     lock : descriptor of the directory's lock, handed on to the children
-    restore : makes a queue anew that is gone or damaged
+    restore : makes a queue anew that is gone or damaged; it is told which studies are computed
     """
 
     settings: Settings
     jobs: Jobs
     pool: Pool
     lock: int
-    restore: Callable[[], Jobs]
+    restore: Callable[[list[str]], Jobs]
     _stopping: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
     _studies: dict[str, asyncio.Task[None]] = field(default_factory=dict)
@@ -141,8 +141,7 @@ class Runner:
 
     async def _restore(self) -> None:
         try:
-            await asyncio.to_thread(self.restore)
-            await asyncio.to_thread(self.jobs.resume, list(self._studies))
+            await asyncio.to_thread(self.restore, list(self._studies))
         except Exception as error:  # of the disk, or of what lies there
             log.error("the queue cannot be made anew: %s", error)
 

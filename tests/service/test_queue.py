@@ -17,7 +17,7 @@ from service.job import State
 from service.jobs import Jobs
 from service.lock import DirectoryInUse, lock_directory
 from service.recovery import open_queue
-from studies import Store, StudyError
+from studies import Store, Study, StudyError
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
 
@@ -163,6 +163,17 @@ def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
     path.write_bytes(content)
     assert open_queue(path, Store(tmp_path), None).page(limit=9, offset=0) == ([], 0)
     assert (tmp_path / "jobs.sqlite.damaged").read_bytes() == content
+
+
+def test_in_a_queue_made_anew_what_is_computed_is_running(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    punch = {"scene": "punch", "parameters": {"load_ratio": 1.0}}
+    studies = [Study.from_dict({"name": name} | punch) for name in ("computed", "waiting")]
+    for study in studies:
+        store.save_study(study)
+    jobs = open_queue(tmp_path / "jobs.sqlite", store, None, [studies[0].id])
+    states = [jobs.get(study.id).state for study in studies]
+    assert states == [State.RUNNING, State.ACCEPTED]
 
 
 def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> None:

@@ -129,22 +129,20 @@ def test_one_task_is_served_beside_a_thousand_of_another(two: Access) -> None:
 
 
 def test_the_higher_priority_goes_first(two: Access) -> None:
-    leave = threading.Event()
     order: list[str] = []
 
-    def study(name: str, priority: int) -> None:
-        with Grid(two) as grid:
-            for item in grid.run(nap, [0.3] * 8, leave.is_set, priority=priority):
-                if isinstance(item, Finished):
-                    order.append(name)
+    def study(grid: Grid, name: str, priority: int) -> None:
+        for item in grid.run(nap, [0.3] * 8, never, priority=priority):
+            if isinstance(item, Finished):
+                order.append(name)
 
-    first = threading.Thread(target=study, args=("low", 0))
-    first.start()
-    while not order:
-        time.sleep(0.01)
-    study("high", 5)
-    leave.set()
-    first.join(30)
+    with Grid(two) as low, Grid(two) as high:
+        first = threading.Thread(target=study, args=(low, "low", 0))
+        first.start()
+        while not order:
+            time.sleep(0.01)
+        study(high, "high", 5)
+        first.join(30)
     last_high = max(i for i, name in enumerate(order) if name == "high")
     assert order[:last_high].count("low") <= 4, "those that were running, and no more"
 
