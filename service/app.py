@@ -31,6 +31,7 @@ from service.metrics import Metrics
 from service.overview import Details
 from service.pool import Pool
 from service.probe import Probe
+from service.processes import Starter
 from service.recovery import open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
@@ -73,7 +74,7 @@ def create_app(settings: Settings) -> FastAPI:
     store = open_store(settings.data)
     open_jobs = partial(open_queue, settings.data / "jobs.sqlite", store, settings.max_queue)
     jobs = open_jobs()
-    runner = Runner(settings, jobs, Pool(settings, lock), lock, open_jobs)
+    runner = Runner(settings, jobs, Pool(settings, lock), Starter("service.child", lock), open_jobs)
     examiner = Examiner(settings)
     keeper = Keeper(jobs, store, runner.computes, settings.keep_days, settings.keep_bytes)
     metrics = Metrics(jobs, store, runner)

@@ -14,6 +14,7 @@ from typing import Any
 
 from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdin
 from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
+from studies.definition.identity import solver_hash
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable
 from studies.execution.cluster import Access
 from studies.execution.limits import Limits
@@ -50,10 +51,18 @@ def tell(event: StudyEvent, outlet: Outlet) -> None:
         log.info("run: %s %s", event.status, event.message, extra={"run": event.run})
 
 
+def prepare() -> None:
+    """Load what every study needs: dask, and the sources that make the ids of runs."""
+    from studies.execution import grid  # noqa: F401
+
+    solver_hash()
+
+
 def main() -> None:
     """Read the order and carry it out."""
     outlet = claim_stdout()
     beat(outlet)
+    prepare()
     order = read_order()
     try:
         compute(order, outlet, watch_stdin(order["grace"]))

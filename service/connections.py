@@ -16,6 +16,9 @@ from service.errors import LATER, problem
 from service.headers import HEADERS
 from service.settings import Settings
 
+MACOS_FILES = 10_240
+"""Most file descriptors a process of macOS may have, whatever its limit says."""
+
 OTHER_FILES = 256
 """File descriptors that are kept for all but connections and the files they send."""
 
@@ -129,9 +132,11 @@ def limited(settings: Settings) -> type[Connection]:
     Each connection may send a file; the number of connections is limited to what that leaves.
     """
     files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with contextlib.suppress(ValueError):  # some systems allow less than they say
-        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-        files = most
+    for wanted in (most, MACOS_FILES):  # where "any number" is said, it is not meant
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+            files = wanted
+            break
     if files != resource.RLIM_INFINITY:
         room = max(1, min(settings.connections, (files - OTHER_FILES) // 2))
         settings = settings.model_copy(update={"connections": room})

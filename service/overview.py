@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-import threading
+import asyncio
+import math
+import time
 from collections import OrderedDict
+from dataclasses import dataclass, field
 from typing import Any
+
+from anyio.to_thread import run_sync
 
 from service.job import Job
 from service.jobs import Jobs
@@ -23,29 +28,46 @@ def summary(job: Job) -> StudySummary:
     return StudySummary(**_columns(job))
 
 
-class Details:
-    """Studies with the states of their runs, as JSON; what has not changed is not looked up again.
+@dataclass(slots=True)
+class Detail:
+    """One answer: what it was made of, when that was looked at, and who looks at it now."""
 
-    Many may follow one study: each change is then looked up once for all of them.
+    state: object = None
+    content: bytes = b""
+    looked: float = -math.inf
+    one: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+
+class Details:
+    """Studies with the states of their runs, as JSON; what has not changed is not made anew.
+
+    Many may follow one study: one look serves all who asked before it.
     """
 
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs = jobs
         self.store = store
-        self.one = threading.Lock()
-        self.kept: OrderedDict[tuple[str, int, int], tuple[object, bytes]] = OrderedDict()
+        self.kept: OrderedDict[tuple[str, int, int], Detail] = OrderedDict()
 
-    def get(self, job: Job, window: Window) -> bytes:
+    async def get(self, study_id: str, window: Window) -> bytes:
         """Return a study, and one by one those of its runs that are in ``window``."""
-        key, state = (job.id, window.limit, window.offset), (job, self.store.catalogue.changes())
-        with self.one:
-            known = self.kept.get(key)
-            if known is None or known[0] != state:
-                known = state, self._look_up(job, window).model_dump_json().encode()
-                self.kept[key] = known
-                if len(self.kept) > KEPT:
-                    self.kept.popitem(last=False)
-        return known[1]
+        asked = time.monotonic()
+        detail = self.kept.setdefault((study_id, window.limit, window.offset), Detail())
+        if len(self.kept) > KEPT:
+            self.kept.popitem(last=False)
+        async with detail.one:
+            if detail.looked < asked:
+                await run_sync(self._look, study_id, window, detail)
+        return detail.content
+
+    def _look(self, study_id: str, window: Window, detail: Detail) -> None:
+        began = time.monotonic()
+        job = self.jobs.get(study_id)
+        state = job, self.store.catalogue.changes()
+        if detail.state != state:
+            detail.content = self._look_up(job, window).model_dump_json().encode()
+            detail.state = state
+        detail.looked = began
 
     def _look_up(self, job: Job, window: Window) -> StudyDetail:
         study = self.jobs.study(job.id)

@@ -71,7 +71,8 @@ class Pool:
             "grace": self.settings.grace_seconds,
         }
         try:
-            self._process = await processes.start("service.pool", order, self.lock)
+            self._process = await processes.start("service.pool", self.lock)
+            processes.send(self._process, order)
         except OSError as error:
             raise PoolAway(f"the workers cannot be started: {error.strerror}") from error
         said: dict[str, Any] = {}

@@ -17,6 +17,7 @@ import threading
 import time
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, TextIO
 
 from service import logs
@@ -29,15 +30,15 @@ BEAT_SECONDS = 5.0
 STDIN = 0
 
 
-async def start(module: str, order: Mapping[str, Any], lock: int) -> Process:
-    """Start ``python -m module`` and send it its order.
+async def start(module: str, lock: int) -> Process:
+    """Start ``python -m module``; it loads what it needs, then waits for its order.
 
     Raises
     ------
     OSError
         If the system cannot start a process.
     """
-    process = await asyncio.create_subprocess_exec(
+    return await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
         module,
@@ -47,9 +48,12 @@ async def start(module: str, order: Mapping[str, Any], lock: int) -> Process:
         pass_fds=(lock,),
         start_new_session=True,  # an interrupt from a terminal is the service's to handle
     )
+
+
+def send(process: Process, order: Mapping[str, Any]) -> None:
+    """Send a process its order."""
     assert process.stdin is not None
     process.stdin.write(json.dumps(order).encode() + b"\n")
-    return process
 
 
 async def end(process: Process, grace: float) -> None:
@@ -126,3 +130,43 @@ def watch_stdin(grace: float) -> threading.Event:
 
     threading.Thread(target=watch, name="stop-watch", daemon=True).start()
     return stop
+
+
+@dataclass(slots=True)
+class Starter:
+    """Starts processes of one module, each before it is needed: to load takes a second or two.
+
+    Attributes
+    ----------
+    module, lock : as for `start`
+    """
+
+    module: str
+    lock: int
+    _ready: Process | None = None
+
+    async def prepare(self) -> None:
+        """Start the next process, unless it is there; without one the start is later, and told."""
+        if self._ready is None or self._ready.returncode is not None:
+            with contextlib.suppress(OSError):
+                self._ready = await start(self.module, self.lock)
+
+    async def give(self, order: Mapping[str, Any]) -> Process:
+        """Return a process that has this order.
+
+        Raises
+        ------
+        OSError
+            If the system cannot start one.
+        """
+        process, self._ready = self._ready, None
+        if process is None or process.returncode is not None:
+            process = await start(self.module, self.lock)
+        send(process, order)
+        return process
+
+    async def close(self) -> None:
+        """End the process that waits for an order."""
+        process, self._ready = self._ready, None
+        if process is not None:
+            await end(process, 1.0)

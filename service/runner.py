@@ -19,6 +19,7 @@ from service.errors import Conflict, NotFound, QueueLost
 from service.job import Job, State, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
+from service.processes import Starter
 from service.settings import Settings
 from studies.errors import StoreFull
 
@@ -67,14 +68,14 @@ class Runner:
     ----------
     settings, jobs : how to compute, and what
     pool : the workers, and the lock of the store
-    lock : descriptor of the directory's lock, handed on to the children
+    starter : of the processes that compute
     restore : makes a queue anew that is gone or damaged; it is told which studies are computed
     """
 
     settings: Settings
     jobs: Jobs
     pool: Pool
-    lock: int
+    starter: Starter
     restore: Callable[[list[str]], Jobs]
     _stopping: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
@@ -108,7 +109,7 @@ class Runner:
                     continue
                 idle = 0.0 if self._studies else idle + pause
                 if idle >= self.settings.idle_seconds:
-                    await self.pool.close()
+                    await asyncio.gather(self.pool.close(), self.starter.close())
                 trouble = ""
             except (QueueLost, StoreFull, OSError) as error:
                 if trouble != (trouble := str(error)):  # once, however long it lasts
@@ -121,7 +122,7 @@ class Runner:
                 pause *= 10
             await self._pause(pause)
         await asyncio.gather(*self._studies.values(), return_exceptions=True)
-        await self.pool.close()
+        await asyncio.gather(self.pool.close(), self.starter.close())
 
     async def _next(self) -> bool:
         """Begin the study whose turn it is; tell whether there was one, and room for it.
@@ -207,6 +208,8 @@ class Runner:
                 if silence > (self.settings.stall_seconds or math.inf):
                     attempt.reason = SILENT
                     break
+                if attempt.runs:  # while the workers compute, there is time
+                    await self.starter.prepare()
                 if told != (now := (attempt.progress, self._plain(attempt.waiting))):
                     told = now
                     await self._write(self.jobs.note, job.id, *told)
@@ -233,7 +236,7 @@ class Runner:
             "since": job.since,
             "grace": self.settings.grace_seconds,
         }
-        return await processes.start("service.child", order, self.lock)
+        return await self.starter.give(order)
 
     def _plain(self, text: str) -> str:
         """Return what is told of a study without the path of the data directory."""

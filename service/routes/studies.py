@@ -88,9 +88,11 @@ def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> Study
 
 
 @router.get("/{study_id}", response_model=StudyDetail)
-def get_study(job: TheJob, window: Annotated[Window, Query()], details: TheDetails) -> Response:
+async def get_study(
+    study_id: ContentId, window: Annotated[Window, Query()], details: TheDetails
+) -> Response:
     """Return where a study stands, and a page of its runs in the order of the sweep."""
-    return Response(details.get(job, window), media_type="application/json")
+    return Response(await details.get(study_id, window), media_type="application/json")
 
 
 @router.delete(

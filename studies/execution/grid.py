@@ -160,9 +160,11 @@ class _HandedOut:
         # tasks there are. Otherwise it would wait at one worker, which may be slow, or frozen.
         content = self._function, self._topic, key, ticket.task
         graph = {key: Task(key, _call, *content, _data_producer=True)}
-        (future,) = self._client.get(
-            graph, [key], sync=False, priority=self._priority, fifo_timeout=0
-        )
+        # Of those with the same priority, who has fewest tasks here comes first: a study that has
+        # just begun does not wait behind what another keeps in stock.
+        others = len(self._tickets)
+        priority = self._priority - others / (1 + others)
+        (future,) = self._client.get(graph, [key], sync=False, priority=priority, fifo_timeout=0)
         ticket.future, ticket.worker, ticket.computing = future, "", False
         self._tickets[key] = ticket
         future.add_done_callback(self._inbox.put)

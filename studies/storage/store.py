@@ -149,7 +149,8 @@ class Store:
 
     def _sound(self, wanted: Sequence[str]) -> dict[str, Row]:
         known = self.catalogue.rows(wanted)
-        found = {run_id: self.found(run_id, known.get(run_id)) for run_id in wanted}
+        there = [each for each in wanted if each in known or self.run_path(each).exists()]
+        found = {run_id: self.found(run_id, known.get(run_id)) for run_id in there}
         rows = {run_id: row for run_id, row in found.items() if row}
         if gone := known.keys() - rows.keys():
             self.catalogue.remove(gone)

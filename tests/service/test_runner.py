@@ -13,9 +13,11 @@ from typing import Any
 
 import pytest
 
+from service import processes
 from service.job import Job, State
 from service.jobs import Jobs
 from service.pool import Pool
+from service.processes import Starter
 from service.runner import SILENT, Runner
 from service.settings import Settings
 
@@ -55,7 +57,7 @@ def carried_out(
         jobs.retry("a")
     settings = Settings(**{"data": data, "attempts": 2, "poll_seconds": 0.01, **limits})
     pool = Pool(settings, lock=0)
-    runner = Scripted(settings, jobs, pool, 0, lambda: jobs, script=list(script))
+    runner = Scripted(settings, jobs, pool, Starter("none", 0), lambda: jobs, script=list(script))
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -109,7 +111,7 @@ def test_a_frozen_process_is_told_of_and_ended(
     settings = Settings(
         data=tmp_path, attempts=2, poll_seconds=0.02, stall_seconds=0.5, grace_seconds=0.1
     )
-    runner = Frozen(settings, jobs, Pool(settings, lock=0), 0, lambda _: jobs)
+    runner = Frozen(settings, jobs, Pool(settings, lock=0), Starter("none", 0), lambda _: jobs)
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -136,7 +138,7 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
         connection.execute("UPDATE job SET study = '{' WHERE id = 'bad'")
     settings = Settings(data=tmp_path, poll_seconds=0.01, scheduler="tcp://127.0.0.1:1")
-    runner = Runner(settings, jobs, Pool(settings, lock=0), 0, lambda _: jobs)
+    runner = Runner(settings, jobs, Pool(settings, lock=0), Starter("none", 0), lambda _: jobs)
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -147,3 +149,30 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     assert jobs.get("bad").state is State.FAILED
     assert "cannot be read" in jobs.get("bad").message
     assert jobs.get("good").state is State.RUNNING
+
+
+def test_a_process_is_ready_before_it_is_needed(tmp_path: Path) -> None:
+    async def work() -> None:
+        starter = Starter("this", 0)
+        await starter.prepare()
+        ready = starter._ready
+        assert ready is not None
+        await starter.prepare()
+        assert starter._ready is ready, "one is enough"
+        given = await starter.give({"id": "a"})
+        assert given is ready and starter._ready is None
+        await processes.end(given, 1.0)
+        await starter.prepare()
+        dead = starter._ready
+        assert dead is not None
+        dead.kill()
+        await dead.wait()
+        given = await starter.give({"id": "b"})
+        assert given.pid != dead.pid, "one that has died is of no use"
+        await processes.end(given, 1.0)
+        await starter.prepare()
+        waiting = starter._ready
+        await starter.close()
+        assert waiting is not None and waiting.returncode is not None
+
+    asyncio.run(work())

@@ -128,6 +128,27 @@ def test_one_task_is_served_beside_a_thousand_of_another(two: Access) -> None:
     assert not crowd.is_alive()
 
 
+def test_who_has_just_come_goes_before_what_another_keeps_in_stock(two: Access) -> None:
+    order: list[str] = []
+
+    def many(grid: Grid) -> None:
+        for item in grid.run(nap, [0.5] * 8, never):
+            if isinstance(item, Finished):
+                order.append("stock")
+
+    with Grid(two) as stock, Grid(two) as new:
+        crowd = threading.Thread(target=many, args=(stock,))
+        crowd.start()
+        while not order:  # two run, two wait
+            time.sleep(0.01)
+        began = len(order)
+        for item in new.run(nap, [0.0], never):
+            if isinstance(item, Finished):
+                order.append("new")
+        crowd.join(30)
+    assert order.index("new") - began <= 2, "those that were running, and no more"
+
+
 def test_the_higher_priority_goes_first(two: Access) -> None:
     order: list[str] = []
 

@@ -1,0 +1,81 @@
+"""What a study tells its followers, when many ask at once."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.job import Job, State
+from service.jobs import Jobs
+from service.overview import KEPT, Details
+from service.schemas import StudyDetail, Window
+from studies import Store
+
+STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
+
+
+class Counted(Details):
+    """Counts how often it looks up a study, which takes a while."""
+
+    looks = 0
+
+    def _look_up(self, job: Job, window: Window) -> StudyDetail:
+        self.looks += 1
+        time.sleep(0.05)
+        return super()._look_up(job, window)
+
+
+@pytest.fixture
+def details(tmp_path: Path) -> Counted:
+    jobs = Jobs(tmp_path / "jobs.sqlite")
+    jobs.accept("a", STUDY, ["b"])
+    jobs.take()
+    return Counted(jobs, Store(tmp_path))
+
+
+def status(content: bytes) -> Any:
+    return json.loads(content)["status"]
+
+
+def test_one_look_serves_all_who_asked_before_it(details: Counted) -> None:
+    async def crowd() -> None:
+        for progress in range(1, 5):  # something changes all the time
+            details.jobs.note("a", progress)
+            await asyncio.gather(*(details.get("a", Window()) for _ in range(50)))
+
+    asyncio.run(crowd())
+    assert 4 <= details.looks <= 8
+
+
+def test_what_has_not_changed_is_not_looked_up(details: Counted) -> None:
+    async def twice() -> None:
+        first = await details.get("a", Window())
+        assert first == await details.get("a", Window())
+
+    asyncio.run(twice())
+    assert details.looks == 1
+
+
+def test_who_asks_after_a_change_sees_it_although_others_look_already(details: Counted) -> None:
+    async def change() -> None:
+        before = asyncio.create_task(details.get("a", Window()))
+        await asyncio.sleep(0.03)  # its look has begun
+        details.jobs.finish("a", State.FAILED, "why")
+        assert status(await details.get("a", Window())) == "failed"
+        assert status(await before) in ("running", "failed")
+
+    asyncio.run(change())
+
+
+def test_answers_are_kept_in_a_limited_number(details: Counted) -> None:
+    async def pages() -> None:
+        for offset in range(KEPT + 20):
+            await details.get("a", Window(offset=offset))
+
+    asyncio.run(pages())
+    assert len(details.kept) == KEPT
