@@ -161,8 +161,9 @@ class Jobs:
         """Mark jobs as running on which a process works, in a queue made anew."""
         with self.transaction() as connection:
             connection.executemany(
-                "UPDATE job SET state = ?, started = ?, finished = NULL WHERE id = ?",
-                [(State.RUNNING, now(), job_id) for job_id in busy],
+                "UPDATE job SET stood = IIF(state = ?, '', state), state = ?, message = '',"
+                " progress = 0, started = ?, finished = NULL WHERE id = ?",
+                [(State.ACCEPTED, State.RUNNING, now(), job_id) for job_id in busy],
             )
 
     def waiting(self) -> dict[str, str]:

@@ -52,13 +52,19 @@ class Details:
     async def get(self, study_id: str, window: Window) -> bytes:
         """Return a study, and one by one those of its runs that are in ``window``."""
         asked = time.monotonic()
-        detail = self.kept.setdefault((study_id, window.limit, window.offset), Detail())
-        if len(self.kept) > KEPT:
-            self.kept.popitem(last=False)
-        async with detail.one:
-            if detail.looked < asked:
-                await run_sync(self._look, study_id, window, detail)
-        return detail.content
+        key = study_id, window.limit, window.offset
+        detail = self.kept.setdefault(key, Detail())
+        self.kept.move_to_end(key)
+        try:
+            async with detail.one:
+                if detail.looked < asked:
+                    await run_sync(self._look, study_id, window, detail)
+            return detail.content
+        finally:
+            if not detail.content:
+                self.kept.pop(key, None)
+            elif len(self.kept) > KEPT:
+                self.kept.popitem(last=False)
 
     def _look(self, study_id: str, window: Window, detail: Detail) -> None:
         began = time.monotonic()

@@ -19,7 +19,7 @@ SECONDS = 5.0
 
 
 class Probe:
-    """Looks at the data directory once for all who ask meanwhile: where it hangs, so do they."""
+    """Looks at the data directory, once for all who ask meanwhile."""
 
     def __init__(self) -> None:
         self.limiter = CapacityLimiter(1)

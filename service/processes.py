@@ -26,6 +26,7 @@ LONGEST_LINE = 1_000_000
 """Bytes of one message a process may send."""
 
 BEAT_SECONDS = 5.0
+"""Time between two signs of life; who takes a process for frozen must wait for longer."""
 
 STDIN = 0
 
@@ -106,7 +107,7 @@ def read_order() -> dict[str, Any]:
     while not text.endswith(b"\n"):
         piece = os.read(STDIN, 65536)
         if not piece:
-            raise SystemExit("the service ended before it sent the order")
+            raise SystemExit(0)  # nothing to do: nobody has sent an order, or will
         text += piece
     order: dict[str, Any] = json.loads(text)
     logs.configure(os.environ.get("RESIDUA_LOG_FORMAT", "plain"), study=order.get("id", ""))
@@ -144,12 +145,15 @@ class Starter:
     module: str
     lock: int
     _ready: Process | None = None
+    _starting: bool = False
 
     async def prepare(self) -> None:
-        """Start the next process, unless it is there; without one the start is later, and told."""
-        if self._ready is None or self._ready.returncode is not None:
+        """Start the next process, unless it is there already; where that fails, `give` does."""
+        if self._ready is None and not self._starting:
+            self._starting = True
             with contextlib.suppress(OSError):
                 self._ready = await start(self.module, self.lock)
+            self._starting = False
 
     async def give(self, order: Mapping[str, Any]) -> Process:
         """Return a process that has this order.

@@ -201,18 +201,15 @@ class Runner:
             while not events.done() and not await self._unwanted(job):
                 await asyncio.wait({events}, timeout=self.settings.poll_seconds)
                 silence = time.monotonic() - attempt.heard
-                if silence > SILENCE_SECONDS:
-                    attempt.waiting = SILENT
-                elif attempt.waiting == SILENT:
-                    attempt.waiting = ""
-                if silence > (self.settings.stall_seconds or math.inf):
+                waiting = SILENT if silence > SILENCE_SECONDS else attempt.waiting
+                if silence > max(self.settings.stall_seconds or math.inf, 2 * SILENCE_SECONDS):
                     attempt.reason = SILENT
                     break
                 if attempt.runs:  # while the workers compute, there is time
                     await self.starter.prepare()
-                if told != (now := (attempt.progress, self._plain(attempt.waiting))):
+                now = attempt.progress, self._plain(waiting)
+                if told != now and await self._write(self.jobs.note, job.id, *now):
                     told = now
-                    await self._write(self.jobs.note, job.id, *told)
         finally:
             await processes.end(child, self.settings.grace_seconds)
             await asyncio.wait({events})
@@ -252,12 +249,14 @@ class Runner:
         except NotFound:
             return True
 
-    async def _write(self, write: Callable[..., None], *what: Any) -> None:
-        """Write how a study goes; the work does not end because that cannot be written now."""
+    async def _write(self, write: Callable[..., None], *what: Any) -> bool:
+        """Write how a study goes; tell whether it could be: the work goes on without."""
         try:
             await asyncio.to_thread(write, *what)
         except (QueueLost, StoreFull, OSError) as error:
             log.error("%s", error)
+            return False
+        return True
 
     async def _pause(self, seconds: float) -> None:
         with contextlib.suppress(TimeoutError):

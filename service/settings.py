@@ -84,7 +84,9 @@ class Settings(BaseSettings):
         default=None, gt=0, description="time without a worker after which a study ends; none: wait"
     )
     stall_seconds: float | None = Field(
-        default=900.0, gt=0, description="longest time without progress of a loading path"
+        default=900.0,
+        gt=0,
+        description="longest time without progress of a loading path, or without a word of a child",
     )
     path_seconds: float | None = Field(
         default=None, gt=0, description="longest time that a loading path may take"

@@ -38,6 +38,8 @@ _GRACE = 5.0
 """Seconds that running tasks are given to stop; a frozen worker never does."""
 _SPARE = 2
 """Tasks that wait at the scheduler, so that no worker waits for the next one."""
+_HEAD_START = 60.0
+"""Seconds by which each task that a study has here puts its next one off."""
 _RESTART = 30.0
 """Seconds within which the keeper of a worker must have killed it."""
 _STARTS = 2
@@ -160,10 +162,9 @@ class _HandedOut:
         # tasks there are. Otherwise it would wait at one worker, which may be slow, or frozen.
         content = self._function, self._topic, key, ticket.task
         graph = {key: Task(key, _call, *content, _data_producer=True)}
-        # Of those with the same priority, who has fewest tasks here comes first: a study that has
-        # just begun does not wait behind what another keeps in stock.
-        others = len(self._tickets)
-        priority = self._priority - others / (1 + others)
+        # Who has just come does not wait behind what another study keeps in stock here, and who
+        # comes again and again does not go first for ever.
+        priority = self._priority - (time.time() + _HEAD_START * len(self._tickets)) / 1e11
         (future,) = self._client.get(graph, [key], sync=False, priority=priority, fifo_timeout=0)
         ticket.future, ticket.worker, ticket.computing = future, "", False
         self._tickets[key] = ticket

@@ -21,6 +21,10 @@ from studies.storage.store import Store
 NO_RECORD = "the scene ended its loading path without a record of this run"
 
 
+REFUSAL_SECONDS = 1.0
+"""Time a worker takes to refuse a task; while it does, other workers get the paths."""
+
+
 @dataclass(frozen=True, slots=True)
 class PathTask:
     """A loading path to walk, or what is left of it, and where its runs are written.
@@ -48,10 +52,6 @@ class PathTask:
         times = store.modified(case.id for case in self.path.cases)
         fresh = [run_id for run_id, at in times.items() if at != self.stale.get(run_id)]
         return {run_id: row for run_id in fresh if (row := store.found(run_id))}
-
-
-REFUSAL_SECONDS = 1.0
-"""Time a worker takes to refuse a task; while it does, other workers get the paths."""
 
 
 class StopAsked(Exception):

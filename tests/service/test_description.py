@@ -14,6 +14,8 @@ from tests.service.servers import Server, fake_study
 
 CONFIGURATION = Path(__file__).with_name("schemathesis.toml")
 
+PHASES = ("Examples", "Coverage", "Fuzzing", "Stateful")
+
 SHORT = ["--max-examples", "5", "--max-time", "20"]
 LONG = ["--max-examples", "200", "--max-time", "300"]
 """How far it may go: in the suite, and where there is time [s]."""
@@ -41,7 +43,7 @@ def explored(tmp_path: Path) -> Iterator[Server]:
 def test_schemathesis_finds_nothing(explored: Server) -> None:
     found = explore(explored, SHORT)
     assert found.returncode == 0, found.stdout
-    for phase in ("Examples", "Coverage", "Fuzzing", "Stateful"):
+    for phase in PHASES:
         assert f"✅ {phase}" in found.stdout, found.stdout
 
 

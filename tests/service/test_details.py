@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
+from service.errors import NotFound
 from service.job import Job, State
 from service.jobs import Jobs
-from service.overview import KEPT, Details
+from service.overview import KEPT, Detail, Details
 from service.schemas import StudyDetail, Window
 from studies import Store
 
@@ -23,10 +24,16 @@ class Counted(Details):
     """Counts how often it looks up a study, which takes a while."""
 
     looks = 0
+    made = 0
+    seconds = 0.05
+
+    def _look(self, study_id: str, window: Window, detail: Detail) -> None:
+        self.looks += 1
+        super()._look(study_id, window, detail)
 
     def _look_up(self, job: Job, window: Window) -> StudyDetail:
-        self.looks += 1
-        time.sleep(0.05)
+        self.made += 1
+        time.sleep(self.seconds)
         return super()._look_up(job, window)
 
 
@@ -58,7 +65,7 @@ def test_what_has_not_changed_is_not_looked_up(details: Counted) -> None:
         assert first == await details.get("a", Window())
 
     asyncio.run(twice())
-    assert details.looks == 1
+    assert details.made == 1
 
 
 def test_who_asks_after_a_change_sees_it_although_others_look_already(details: Counted) -> None:
@@ -73,9 +80,22 @@ def test_who_asks_after_a_change_sees_it_although_others_look_already(details: C
 
 
 def test_answers_are_kept_in_a_limited_number(details: Counted) -> None:
+    details.seconds = 0.0
+
     async def pages() -> None:
         for offset in range(KEPT + 20):
             await details.get("a", Window(offset=offset))
 
     asyncio.run(pages())
     assert len(details.kept) == KEPT
+
+
+def test_nothing_is_kept_of_a_study_that_does_not_exist(details: Counted) -> None:
+    async def unknown() -> None:
+        await details.get("a", Window())
+        for _ in range(3):
+            with pytest.raises(NotFound):
+                await details.get("b", Window())
+
+    asyncio.run(unknown())
+    assert list(details.kept) == [("a", 100, 0)]

@@ -28,6 +28,7 @@ from service.errors import Busy
 from service.maps import Pictures
 from service.schemas import MapQuery
 from service.settings import Settings
+from studies import Store, StoreFull, Study
 from tests.service.servers import Server, fake_study
 from tests.service.test_errors import problem
 
@@ -127,6 +128,18 @@ def test_connections_leave_files_for_all_else(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(resource, "setrlimit", lambda which, limits: None)
     for wanted, given in ((500, 384), (10, 10)):
         assert limited(Settings(connections=wanted)).settings.connections == given
+
+
+def test_a_system_that_allows_less_than_it_says_gives_what_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def at_most(which: int, limits: tuple[int, int]) -> None:
+        if limits[0] > 10_240:
+            raise ValueError("not allowed to raise maximum limit")
+
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (256, 2**63 - 1))
+    monkeypatch.setattr(resource, "setrlimit", at_most)
+    assert limited(Settings(connections=500)).settings.connections == 500
 
 
 @pytest.mark.parametrize("begun", UNFINISHED[1:], ids=["head", "body"])
@@ -266,7 +279,10 @@ def test_health_needs_no_thread_that_others_use(app: FastAPI) -> None:
 def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
     hanging = threading.Event()
     monkeypatch.setattr(probe, "SECONDS", 0.2)
-    monkeypatch.setattr(probe, "look", lambda *given: (hanging.wait(20.0), {}))
+    asked: list[Any] = []
+    monkeypatch.setattr(
+        probe, "look", lambda *given: (asked.append(given), (hanging.wait(20.0), {}))[1]
+    )
 
     async def twice() -> list[bool]:
         answers = [await told(app), await told(app)]
@@ -274,3 +290,20 @@ def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.Monkey
         return answers
 
     assert asyncio.run(twice()) == [False, False]
+    assert len(asked) == 1
+
+
+def test_a_full_disk_has_a_status_of_its_own(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Store, study: Study) -> Path:
+        raise StoreFull(str(self.directory))
+
+    async def post() -> httpx.Response:
+        study = {"name": "a", "scene": "punch", "sweep": {"friction": [0.0]}}
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.post("/studies", json=study)
+
+    monkeypatch.setattr(Store, "save_study", full)
+    answer = asyncio.run(post())
+    assert answer.status_code == 507
+    assert answer.json()["detail"] == "no room is left on the disk of the data directory"

@@ -176,6 +176,21 @@ def test_in_a_queue_made_anew_what_is_computed_is_running(tmp_path: Path) -> Non
     assert states == [State.RUNNING, State.ACCEPTED]
 
 
+@pytest.mark.parametrize("end", ["ok", "error"])
+def test_a_retry_that_is_computed_forgets_its_old_end_in_a_queue_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    store = Store(tmp_path)
+    study = Study.from_dict({"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}})
+    store.save_study(study)
+    monkeypatch.setattr(Store, "outcomes", lambda self, study_id: {end: 1})
+    jobs = open_queue(tmp_path / "jobs.sqlite", store, None, [study.id])
+    job = jobs.get(study.id)
+    assert (job.state, job.message, job.progress) == (State.RUNNING, "", 0)
+    left = State.SUCCESSFUL if end == "ok" else State.DISMISSED
+    assert jobs.dismiss(study.id).state is left
+
+
 def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> None:
     path = tmp_path / "jobs.sqlite"
     with closing(sqlite3.connect(path)) as connection, connection:

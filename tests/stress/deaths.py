@@ -12,7 +12,7 @@ from studies import open_netcdf
 from tests.service.servers import Server, fake_study, wait_until
 from tests.stress.measure import Figure, process_of
 
-KILLS = 12
+KILLS = 8
 
 
 def deaths(server: Server) -> list[Figure]:

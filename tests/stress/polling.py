@@ -61,7 +61,7 @@ def pollers(server: Server, seconds: float = 600.0) -> list[Figure]:
     study_id = server.post(study)
     process, answers = process_of(server), Answers()
     paths = [f"/studies/{study_id}", "/studies", "/health", f"/studies/{study_id}"]
-    asyncio.run(crowd(paths, server.port, Answers(), min(60.0, seconds / 4)))  # warm
+    asyncio.run(crowd(paths, server.port, Answers(), min(20.0, seconds / 4)))  # warm
     before, cpu, began = megabytes(process), cpu_seconds(process), time.monotonic()
     asyncio.run(crowd(paths, server.port, answers, seconds))
     after, taken = megabytes(process), cpu_seconds(process) - cpu

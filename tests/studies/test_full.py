@@ -8,6 +8,7 @@ import resource
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -73,6 +74,18 @@ def test_the_command_ends_with_one_line_and_a_repeat_computes_the_rest(
     compute_here(study, store)  # as a repeat does, without the seconds that worker processes take
     assert combine(study, store, list(study.cases())).counts == {"ok": 4}
     assert list(out.rglob("*.part")) == []
+
+
+def test_a_study_without_room_for_a_run_begins_nothing(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usage = shutil.disk_usage(store.directory.parent)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=9_000_000))
+    began = time.monotonic()
+    with pytest.raises(StoreFull, match="no room is left in"):
+        run_study(fake_study(points=30), store, workers=1)
+    assert time.monotonic() - began < 2.0, "no worker was started"
+    assert not list(store.directory.glob("runs/*"))
 
 
 def test_a_worker_without_room_stores_no_run_as_failed(store: Store, limited: Limit) -> None:

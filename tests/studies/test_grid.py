@@ -132,7 +132,7 @@ def test_who_has_just_come_goes_before_what_another_keeps_in_stock(two: Access) 
     order: list[str] = []
 
     def many(grid: Grid) -> None:
-        for item in grid.run(nap, [0.5] * 8, never):
+        for item in grid.run(nap, [0.4, 1.0] * 4, never):
             if isinstance(item, Finished):
                 order.append("stock")
 
@@ -162,7 +162,7 @@ def test_the_higher_priority_goes_first(two: Access) -> None:
         first.start()
         while not order:
             time.sleep(0.01)
-        study(high, "high", 5)
+        study(high, "high", 1)
         first.join(30)
     last_high = max(i for i, name in enumerate(order) if name == "high")
     assert order[:last_high].count("low") <= 4, "those that were running, and no more"
