@@ -15,7 +15,7 @@ LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
         "deprecation", "errors", "tensors", "linear", "mesh", "materials", "model", "fem",
-        "contact", "loading", "results", "scenes",
+        "contact", "loading", "steady", "results", "scenes",
     ),
     "studies": ("errors", "definition", "storage", "execution", "views", "command"),
 }  # fmt: skip

@@ -1,0 +1,13 @@
+"""Steady passes: rolling on a track without ends, solved in the frame of the load.
+
+A long track under a constant load is steady in the frame of the load. Nothing is stepped: material
+flows along rows of integration points through a mesh that stands still, and each pass is the
+solution of one nonlinear system. Before and after a pass the state is a function of depth alone.
+"""
+
+from solver.steady.layers import Layers
+from solver.steady.passing import Pass
+from solver.steady.rolling import rolling
+from solver.steady.track import Track, track_of
+
+__all__ = ["Layers", "Pass", "Track", "rolling", "track_of"]

@@ -1,0 +1,67 @@
+"""A half-plane whose state is a function of depth alone, as steady passes leave it.
+
+With plastic strain ep and no load the strains along x and z are zero, and no stress acts on planes
+y = const:
+
+    eps_yy = ep_yy + lambda / (lambda + 2 G) (ep_xx + ep_zz),   eps_xy = ep_xy
+    sigma_xx = -E / (1 - nu^2) (ep_xx + nu ep_zz),   sigma_zz likewise
+
+K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.elasticity import Elasticity
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """Internal variables by depth; never changed, only replaced.
+
+    Attributes
+    ----------
+    depth : (n,) of the rows of integration points, increasing [mm]
+    thickness : (n,) that each row stands for [mm]
+    plastic_strain : (n, 4) Mandel
+    accumulated : (n,) equivalent plastic strain
+    """
+
+    depth: Array
+    thickness: Array
+    plastic_strain: Array
+    accumulated: Array
+
+    def strain(self, elasticity: Elasticity) -> Array:
+        """Return total strain (n, 4), Mandel."""
+        nu = elasticity.poisson_ratio
+        total = np.zeros_like(self.plastic_strain)
+        ep = self.plastic_strain
+        total[:, 1] = ep[:, 1] + nu / (1 - nu) * (ep[:, 0] + ep[:, 2])
+        total[:, 3] = ep[:, 3]
+        return total
+
+    def stress(self, elasticity: Elasticity) -> Array:
+        """Return residual stress (n, 4), Mandel [MPa]."""
+        stress = np.zeros_like(self.plastic_strain)
+        stress[:, [0, 2]] = -elasticity.biaxial_stress(self.plastic_strain[:, [0, 2]].T).T
+        return stress
+
+    @property
+    def advance(self) -> float:
+        """Displacement of the surface along x against the depth [mm]."""
+        return float(np.sqrt(2.0) * self.plastic_strain[:, 3] @ self.thickness)
+
+    @property
+    def mirrored(self) -> Layers:
+        """The same, seen along -x."""
+        return replace(self, plastic_strain=self.plastic_strain * [1.0, 1.0, 1.0, -1.0])

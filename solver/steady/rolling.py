@@ -1,0 +1,76 @@
+"""Pass after pass of the same load over a track without ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from solver.errors import ModelError
+from solver.linear.threads import one_thread
+from solver.steady.passing import TOLERANCE, passing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.materials.material import Material
+    from solver.steady.layers import Layers
+    from solver.steady.passing import Pass
+    from solver.steady.track import Track
+
+EXACT_AFTER = 4
+REPEATED = 1e-5
+"""After so many passes the tolerance is this one: small changes of many passes add up."""
+
+
+def rolling(
+    track: Track,
+    material: Material,
+    forces: NDArray[np.float64],
+    directions: Iterable[int],
+    *,
+    parts: int = 16,
+) -> Iterator[Pass]:
+    """Yield the passes of a load over a track that begins without plastic strain.
+
+    Parameters
+    ----------
+    track : with the elastic constants of the material
+    material : of the track
+    forces : (n,) nodal forces of the load that goes along +x [N]
+    directions : for each pass, 1 along +x, -1 back
+    parts : increments between two points of a row
+
+    Raises
+    ------
+    ModelError
+        if the track has other elastic constants
+    LimitLoad
+        if plastic strain grows without bound
+    NotConverged
+        if a pass is not found
+    """
+    rows, elasticity = track.rows, track.part.body.law.elasticity
+    if material.elasticity != elasticity:
+        raise ModelError(
+            "material", material.elasticity, f"must have those of the track, {elasticity}"
+        )
+    loaded = rows.strain(forces)
+    state: Layers = rows.virgin
+    guesses: dict[int, NDArray[np.float64]] = {}
+    for number, direction in enumerate(directions):
+        with one_thread():
+            found = passing(
+                rows,
+                material,
+                loaded,
+                state if direction == 1 else state.mirrored,
+                guesses.get(direction),
+                parts=parts,
+                tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
+            )
+        found = replace(found, direction=direction)
+        guesses[direction], state = found.strain, found.left
+        yield found

@@ -1,0 +1,148 @@
+"""Rows of integration points along which material flows through a mesh that stands still.
+
+The load goes along +x, material along -x. Around the load the mesh is uniform along x and yields;
+columns of points are numbered downstream. Behind that window the plastic strain is that of the
+last column, closed to the residual state, down to the left end of the mesh.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from solver.errors import ModelError
+from solver.steady.layers import Layers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.operators import Operator
+
+    Array = NDArray[np.float64]
+
+_LEVEL = 1e-6
+"""Difference of depth / depth of the rows, up to which points lie on one row."""
+
+
+class Rows:
+    """The points of the window, and the strain that plastic strain there makes.
+
+    Parameters
+    ----------
+    part : the half-plane, made of quadrilaterals in rows; its top is y = 0
+    operator : the inverse of its elastic stiffness
+    ahead, behind : the window reaches from x = -behind to x = ahead [mm]
+    deep : and down to this depth [mm]
+    interleaved : make two rows of each, of every other column
+
+    Attributes
+    ----------
+    points : (n_rows, n_columns) their numbers
+    behind : (n_rows, n) numbers of the points behind the window, on the same rows
+    x : (n_rows, n_columns) their positions, decreasing along each row [mm]
+    shape : n_rows, n_columns
+    virgin : the state before any load
+    weights : (n_rows, n_columns) volume of the points [mm3]
+    """
+
+    def __init__(
+        self,
+        part: Discretisation,
+        operator: Operator,
+        *,
+        ahead: float,
+        behind: float,
+        deep: float,
+        interleaved: bool = False,
+    ) -> None:
+        self.part = part
+        self._operator = operator
+        middle = part.points.mean(axis=2)
+        shallow = middle[1] > -deep
+        inside = shallow & (middle[0] > -behind) & (middle[0] < ahead)
+        points = _in_rows(part, inside, deep, interleaved)
+        self.shape = points.shape
+        x, y = part.points.reshape(2, -1)
+        self.points = points
+        self.x = x[points]
+        self.weights = part.volumes[points]
+        n_rows = len(points)
+        length = self._length(points)
+        self.virgin = Layers(
+            depth=-y[points[:, 0]],
+            thickness=self.weights.sum(axis=1) / length,
+            plastic_strain=np.zeros((n_rows, 4)),
+            accumulated=np.zeros(n_rows),
+        )
+        self.behind = downstream = _in_rows(
+            part, shallow & (middle[0] < -behind), deep, interleaved
+        )
+        if len(downstream) != n_rows:
+            raise ModelError("mesh", len(downstream), f"must have {n_rows} rows behind the window")
+        self._strain = self._strain_at(points)
+        self._force = self._force_of(points, self._strain)
+        # all points behind the window have the plastic strain of their row
+        same = sparse.kron(
+            sparse.eye_array(n_rows), np.ones((downstream.shape[1], 1)), format="csr"
+        )
+        each = self._force_of(downstream, self._strain_at(downstream))
+        self._force_behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
+
+    def _length(self, points: NDArray[np.int64]) -> float:
+        """Return the length of the window [mm]."""
+        elements = np.unique(points // self.part.weights.shape[1])
+        corners = self.part.body.mesh.p[0, self.part.body.mesh.t[:, elements]]
+        return float(np.ptp(corners))
+
+    def _force_of(self, points: NDArray[np.int64], strain: sparse.csr_array) -> sparse.csr_array:
+        """Return the matrix from plastic strains at points to the forces that stand for them."""
+        stiff = 2 * self.part.body.law.elasticity.shear_modulus
+        weights = stiff * np.repeat(self.part.volumes[points].ravel(), 4)
+        return sparse.csr_array(strain.T @ sparse.diags_array(weights))
+
+    def _strain_at(self, points: NDArray[np.int64]) -> sparse.csr_array:
+        """Return the matrix from displacements to strains at points, row by row."""
+        part = self.part
+        n_points = part.weights.shape[1]
+        element, point = np.divmod(points.ravel(), n_points)
+        B = part.B[element, point]
+        columns = np.broadcast_to(part.dofs[element][:, None, :], B.shape)
+        indptr = np.arange(0, B.size + 1, B.shape[2])
+        return sparse.csr_array(
+            (B.ravel(), columns.ravel(), indptr), shape=(4 * points.size, part.n)
+        )
+
+    def strain(self, force: Array) -> Array:
+        """Return the strains (n_rows, n_columns, 4) that nodal forces (n,) make."""
+        u = self._operator.solve(force)
+        return np.asarray((self._strain @ u).reshape(*self.shape, 4))
+
+    def force(self, flow: Array, behind: Array) -> Array:
+        """Return the nodal forces (n,) that stand for plastic strain.
+
+        Parameters
+        ----------
+        flow : (n_rows, n_columns, 4) in the window
+        behind : (n_rows, 4) all the way behind it
+        """
+        return np.asarray(self._force @ flow.ravel() + self._force_behind @ behind.ravel())
+
+
+def _in_rows(
+    part: Discretisation, elements: NDArray[np.bool_], deep: float, interleaved: bool
+) -> NDArray[np.int64]:
+    """Return the points of elements (n_rows, n_columns), downwards and downstream."""
+    n_points = part.weights.shape[1]
+    points = (np.flatnonzero(elements)[:, None] * n_points + np.arange(n_points)).ravel()
+    x, y = part.points.reshape(2, -1)[:, points]
+    level = np.round(y / (_LEVEL * deep)).astype(np.int64)
+    depths, counts = np.unique(level, return_counts=True)
+    if len(points) == 0 or len(set(counts)) != 1:
+        raise ModelError("mesh", len(depths), "must have its points in rows of equal length")
+    rows = points[np.lexsort((-x, -level))].reshape(len(depths), -1)
+    if interleaved:
+        rows = rows.reshape(len(depths), -1, 2).swapaxes(1, 2).reshape(2 * len(depths), -1)
+    return rows

@@ -1,0 +1,208 @@
+"""Material flowing along rows of points: the radial return from point to point, compiled.
+
+Every row starts with the state before the pass and meets the strains of its points one after the
+other. The derivative is carried along in the same way. The law is the one of `radial_return`, von
+Mises with linear isotropic and kinematic hardening, on deviators: plastic strain is one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+SQRT23 = math.sqrt(2.0 / 3.0)
+
+
+@njit(cache=True)
+def _return(strain, plastic, accumulated, law, step):  # type: ignore[no-untyped-def]
+    """Bring `plastic` (4,) to the end of an increment to `strain`; return the accumulated strain.
+
+    `step` (6,) receives the direction of flow, the multiplier and the size of the trial.
+    """
+    double_shear, kappa, Hi, modulus, Re = law
+    mean = (strain[0] + strain[1] + strain[2]) / 3.0
+    size = 0.0
+    for k in range(4):
+        trial = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        step[k] = trial
+        size += trial * trial
+    size = math.sqrt(size)
+    beyond = size - SQRT23 * (Re + Hi * accumulated)
+    step[5] = size
+    if beyond <= 0.0:
+        step[4] = 0.0
+        return accumulated
+    gamma = beyond / modulus
+    step[4] = gamma
+    for k in range(4):
+        step[k] /= size
+        plastic[k] += gamma * step[k]
+    return accumulated + SQRT23 * gamma
+
+
+@njit(cache=True)
+def _return_along(strain, plastic, accumulated, law, step):  # type: ignore[no-untyped-def]
+    """Bring the derivatives `plastic` (4,) and `accumulated` through the same increment."""
+    gamma = step[4]
+    if gamma == 0.0:
+        return accumulated
+    double_shear, kappa, Hi, modulus, _ = law
+    mean = (strain[0] + strain[1] + strain[2]) / 3.0
+    trial = np.empty(4)
+    along = 0.0
+    for k in range(4):
+        trial[k] = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        along += step[k] * trial[k]
+    grows = (along - SQRT23 * Hi * accumulated) / modulus
+    turn = gamma / step[5]
+    for k in range(4):
+        plastic[k] += grows * step[k] + turn * (trial[k] - along * step[k])
+    return accumulated + SQRT23 * grows
+
+
+@njit(cache=True)
+def flow(strain, plastic, accumulated, law, parts):  # type: ignore[no-untyped-def]
+    """Let material flow along rows.
+
+    Parameters
+    ----------
+    strain : (n_rows, n_columns + 1, 4) Mandel, downstream; the first is that before the pass
+    plastic, accumulated : (n_rows, 4) and (n_rows,), before the pass
+    law : 2 G, 2 G + 2/3 Hk, Hi, 2 G + 2/3 H, Re [MPa]
+    parts : equal parts in which strain grows from one column to the next
+
+    Returns
+    -------
+    plastic strain (n_rows, n_columns, 4) and accumulated strain (n_rows, n_columns) at the columns
+    steps (n_rows, n_columns, parts, 6) : for `flow_along`
+    """
+    n_rows, n_columns = strain.shape[0], strain.shape[1] - 1
+    flowed = np.empty((n_rows, n_columns, 4))
+    total = np.empty((n_rows, n_columns))
+    steps = np.empty((n_rows, n_columns, parts, 6))
+    now, e = np.empty(4), np.empty(4)
+    for row in range(n_rows):
+        now[:] = plastic[row]
+        a = accumulated[row]
+        for column in range(n_columns):
+            for part in range(parts):
+                share = (part + 1.0) / parts
+                for k in range(4):
+                    before = strain[row, column, k]
+                    e[k] = before + share * (strain[row, column + 1, k] - before)
+                a = _return(e, now, a, law, steps[row, column, part])
+            flowed[row, column] = now
+            total[row, column] = a
+    return flowed, total, steps
+
+
+@njit(cache=True)
+def flow_along(strain, law, steps):  # type: ignore[no-untyped-def]
+    """Return the derivatives of what `flow` gives along a change of strain.
+
+    Parameters
+    ----------
+    strain : (n_rows, n_columns, 4) change of strain at the columns; upstream there is none
+    steps : from `flow`
+
+    Returns
+    -------
+    changes of plastic strain (n_rows, n_columns, 4) and accumulated strain (n_rows, n_columns)
+    """
+    n_rows, n_columns, parts = steps.shape[:3]
+    flowed = np.empty((n_rows, n_columns, 4))
+    total = np.empty((n_rows, n_columns))
+    now, e = np.empty(4), np.empty(4)
+    for row in range(n_rows):
+        now[:] = 0.0
+        a = 0.0
+        for column in range(n_columns):
+            for part in range(parts):
+                if steps[row, column, part, 4] == 0.0:
+                    continue
+                share = (part + 1.0) / parts
+                for k in range(4):
+                    before = strain[row, column - 1, k] if column else 0.0
+                    e[k] = before + share * (strain[row, column, k] - before)
+                a = _return_along(e, now, a, law, steps[row, column, part])
+            flowed[row, column] = now
+            total[row, column] = a
+    return flowed, total
+
+
+@njit(cache=True)
+def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
+    """Let rows come to rest behind the load, where no stress acts on planes y = const.
+
+    The strains along x and z go back to zero. A row that would be at rest outside the yield
+    surface flows on its way there.
+
+    Parameters
+    ----------
+    plastic, accumulated : (n_rows, 4) and (n_rows,) at the last column
+    law : as for `flow`
+    bulk : bulk modulus [MPa]
+
+    Returns
+    -------
+    plastic (n_rows, 4), accumulated (n_rows,), steps (n_rows, 6), inverses (n_rows, 2, 2) : the
+    last two for `close_along`
+    """
+    double_shear = law[0]
+    n_rows = len(plastic)
+    flowed, total = plastic.copy(), accumulated.copy()
+    steps, inverses = np.zeros((n_rows, 6)), np.zeros((n_rows, 2, 2))
+    e, now = np.zeros(4), np.empty(4)
+    along, unit = np.empty(4), np.zeros(4)
+    share = (bulk - double_shear / 3.0) / (bulk + 2.0 * double_shear / 3.0)
+    jacobian = np.empty((2, 2))
+    for row in range(n_rows):
+        e[1] = plastic[row, 1] + share * (plastic[row, 0] + plastic[row, 2])
+        e[3] = plastic[row, 3]
+        for _ in range(30):
+            now[:] = plastic[row]
+            total[row] = _return(e, now, accumulated[row], law, steps[row])
+            normal = bulk * e[1] + double_shear * (e[1] * 2.0 / 3.0 - now[1])
+            shear = double_shear * (e[3] - now[3])
+            for column in range(2):
+                at = 1 if column == 0 else 3
+                unit[:] = 0.0
+                unit[at] = 1.0
+                along[:] = 0.0
+                _return_along(unit, along, 0.0, law, steps[row])
+                whole = bulk + double_shear * 2.0 / 3.0 if column == 0 else 0.0
+                jacobian[0, column] = whole - double_shear * along[1]
+                jacobian[1, column] = (double_shear if column == 1 else 0.0) - double_shear * along[
+                    3
+                ]
+            inverses[row] = np.linalg.inv(jacobian)
+            if abs(normal) + abs(shear) < 1e-11 * law[4]:
+                break
+            e[1] -= inverses[row, 0, 0] * normal + inverses[row, 0, 1] * shear
+            e[3] -= inverses[row, 1, 0] * normal + inverses[row, 1, 1] * shear
+        flowed[row] = now
+    return flowed, total, steps, inverses
+
+
+@njit(cache=True)
+def close_along(plastic, accumulated, law, steps, inverses):  # type: ignore[no-untyped-def]
+    """Return the derivative of the plastic strain (n_rows, 4) that `close` gives.
+
+    `plastic` (n_rows, 4) and `accumulated` (n_rows,) change at the last column.
+    """
+    double_shear = law[0]
+    out = np.empty_like(plastic)
+    e, now = np.zeros(4), np.empty(4)
+    for row in range(len(plastic)):
+        e[:] = 0.0
+        now[:] = plastic[row]
+        _return_along(e, now, accumulated[row], law, steps[row])
+        normal, shear = -double_shear * now[1], -double_shear * now[3]
+        e[1] = -(inverses[row, 0, 0] * normal + inverses[row, 0, 1] * shear)
+        e[3] = -(inverses[row, 1, 0] * normal + inverses[row, 1, 1] * shear)
+        now[:] = plastic[row]
+        _return_along(e, now, accumulated[row], law, steps[row])
+        out[row] = now
+    return out
