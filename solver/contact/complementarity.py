@@ -9,6 +9,7 @@ for most instances: its matrix is not copositive.)
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +44,18 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
         return ContactSolution(empty, empty, start, False) if solvable else None
     capped = np.zeros(problem.n, dtype=bool)
     return _active_sets(problem, start, capped) or _lag_bound(problem)
+
+
+def change_of_forces(
+    problem: ContactProblem, solution: ContactSolution, offset: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the change (m,) of a solution's forces with the offset (m,), statuses kept.
+
+    No point may be at its limit.
+    """
+    changed = replace(problem, offset=offset, balance=np.zeros_like(problem.balance), limit=None)
+    found = _forces(changed, solution.status, np.zeros(problem.n, dtype=bool))
+    return np.zeros_like(offset) if found is None else found[0]
 
 
 def _forces(

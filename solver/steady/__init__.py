@@ -9,5 +9,6 @@ from solver.steady.layers import Layers
 from solver.steady.passing import Pass
 from solver.steady.rolling import rolling
 from solver.steady.track import Track, track_of
+from solver.steady.wheel import RollingWheel
 
-__all__ = ["Layers", "Pass", "Track", "rolling", "track_of"]
+__all__ = ["Layers", "Pass", "RollingWheel", "Track", "rolling", "track_of"]

@@ -4,11 +4,11 @@ In the frame of the load nothing changes in time. With e the strains of what the
 displacements, at the points of the window, and ep(e) the plastic strain that material has gathered
 on its way along the rows, equilibrium is the fixed point
 
-    e = Phi(e) = e_load + S K^-1 f(ep(e) - ep before)
+    e = Phi(e) = S K^-1 (f + load(f)),   f = f(ep(e) - ep before)
 
 with the elastic stiffness K, the same for every pass, and the nodal forces f that stand for plastic
-strain. Newton's equation (I - Phi') d = Phi(e) - e is solved by GMRES, Phi' by the derivative of
-the flow along the rows.
+strain. A load may depend on the shape that these give the surface. Newton's equation
+(I - Phi') d = Phi(e) - e is solved by GMRES, Phi' by the derivative of the flow along the rows.
 
 K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 """
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
+    from solver.steady.load import Load, Loading
     from solver.steady.rows import Rows
 
     Array = NDArray[np.float64]
@@ -58,6 +59,7 @@ class Pass:
     strain : (n_rows, n_columns, 4) Mandel strain that the pass adds, at the points of the window
     plastic_strain : (n_rows, n_columns, 4) there
     accumulated : (n_rows, n_columns) there
+    loading : the load on it
     steps, solves : of Newton's method, of the stiffness
     direction : 1 if the load goes along +x, -1 if it goes back
     """
@@ -67,6 +69,7 @@ class Pass:
     strain: Array
     plastic_strain: Array
     accumulated: Array
+    loading: Loading
     steps: int
     solves: int
     direction: int = 1
@@ -130,7 +133,7 @@ class _Flow:
 def passing(
     rows: Rows,
     material: Material,
-    loaded: Array,
+    load: Load,
     before: Layers,
     guess: Array | None = None,
     *,
@@ -143,7 +146,7 @@ def passing(
     ----------
     rows : of the half-plane's points
     material : its law
-    loaded : (n_rows, n_columns, 4) elastic strains that the load makes
+    load : that passes
     before : state by depth
     guess : strains that a pass like this one adds
     parts : increments between two points of a row
@@ -161,26 +164,29 @@ def passing(
     double_shear = 2 * material.shear_modulus
     solves = 0
 
-    def phi(added: Array) -> tuple[_Flow, Array]:
+    def phi(added: Array) -> tuple[_Flow, Loading, Array]:
         nonlocal solves
         solves += 1
         flow = _Flow(rows, material, before, added, parts)
-        return flow, loaded + rows.strain(flow.force) - added
+        loading = load.on(flow.force)
+        return flow, loading, rows.strain(flow.force + loading.force) - added
 
-    added = loaded.copy() if guess is None else guess
-    flow, residual = phi(added)
+    added = rows.strain(load.on(np.zeros(rows.part.n)).force) if guess is None else guess
+    flow, loading, residual = phi(added)
     size = np.linalg.norm(scale * residual)
     for step in range(_STEPS):
         if _deviation(residual) * double_shear < tolerance * material.yield_stress:
             if flow.beyond:
                 raise NotConverged(f"the window is too small {flow.beyond} for a steady pass")
-            return Pass(before, flow.after, added, flow.plastic, flow.total, step, solves)
+            return Pass(before, flow.after, added, flow.plastic, flow.total, loading, step, solves)
 
-        def newton(scaled: Array, flow: _Flow = flow) -> Array:
+        def newton(scaled: Array, flow: _Flow = flow, loading: Loading = loading) -> Array:
             nonlocal solves
             solves += 1
             change = scaled.reshape(shape) / scale
-            return np.asarray((scale * (change - rows.strain(flow.along(change)))).ravel())
+            force = flow.along(change)
+            made = rows.strain(force + loading.along(force))
+            return np.asarray((scale * (change - made)).ravel())
 
         n = residual.size
         found, missed = gmres(
@@ -191,7 +197,7 @@ def passing(
         length = 1.0
         while True:
             trial = added + length * change
-            flow, residual_there = phi(trial)
+            flow, loading, residual_there = phi(trial)
             there = np.linalg.norm(scale * residual_there)
             if there < (1 - 1e-4 * length) * size or length <= _SHORTEST:
                 break

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
+    from solver.steady.load import Load
     from solver.steady.passing import Pass
     from solver.steady.track import Track
 
@@ -28,7 +29,7 @@ REPEATED = 1e-5
 def rolling(
     track: Track,
     material: Material,
-    forces: NDArray[np.float64],
+    load: Load,
     directions: Iterable[int],
     *,
     parts: int = 16,
@@ -39,7 +40,7 @@ def rolling(
     ----------
     track : with the elastic constants of the material
     material : of the track
-    forces : (n,) nodal forces of the load that goes along +x [N]
+    load : as it goes along +x
     directions : for each pass, 1 along +x, -1 back
     parts : increments between two points of a row
 
@@ -57,7 +58,6 @@ def rolling(
         raise ModelError(
             "material", material.elasticity, f"must have those of the track, {elasticity}"
         )
-    loaded = rows.strain(forces)
     state: Layers = rows.virgin
     guesses: dict[int, NDArray[np.float64]] = {}
     for number, direction in enumerate(directions):
@@ -65,7 +65,7 @@ def rolling(
             found = passing(
                 rows,
                 material,
-                loaded,
+                load,
                 state if direction == 1 else state.mirrored,
                 guesses.get(direction),
                 parts=parts,

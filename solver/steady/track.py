@@ -10,18 +10,21 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
-from solver.fem.surface import travelling_forces
+from solver.fem.surface import extract, travelling_forces
 from solver.materials.material import Material
 from solver.mesh import graded, grid
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
+from solver.steady.load import Given
 from solver.steady.rows import Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from skfem import Mesh
 
     from solver.fem.operators import Operator
+    from solver.fem.surface import Surface
     from solver.materials.elasticity import Elasticity
 
     Array = NDArray[np.float64]
@@ -30,6 +33,8 @@ _AHEAD, _BEHIND, _DEEP = 3.0, 5.0, 4.0
 """Reach of the window from the load / half-width. A window that ends 3 half-widths behind a load
 that pushes errs by 5 MPa in 500 near the surface, as rows at yield still flow there; elements that
 grow behind the load make them flow too much, and err by 30."""
+_CONTACT = 2.0
+"""Half the length of the surface that may come into contact / half-width."""
 _FAR = 1600.0
 """Distance of the sides and the bottom / half-width. Half of it moves stress by 1 MPa in 500."""
 _FAR_GROWTH = 2.0
@@ -70,12 +75,12 @@ class Track:
         a, h = half_width, element_size
         if not 0 < h <= a / 2:
             raise ModelError("element_size", h, f"must be in (0, {a / 2:.3g}], half the half-width")
-        columns = math.ceil((_AHEAD + _BEHIND) * a / h)
+        columns = math.ceil(_AHEAD * a / h) + math.ceil(_BEHIND * a / h)
         if columns > _MOST_COLUMNS:
             allowed = f"makes {columns} elements along the track; at most {_MOST_COLUMNS}"
             raise ModelError("element_size", h, allowed)
         self.half_width = a
-        window = _AHEAD * a - h * np.arange(columns + 1)[::-1]
+        window = h * np.arange(-math.ceil(_BEHIND * a / h), math.ceil(_AHEAD * a / h) + 1)
         beyond = graded(_FAR * a, h, _FAR_GROWTH, _FAR * a / 2)[1:]
         x = np.concatenate([window[0] - beyond[::-1], window, window[-1] + beyond])
         near = graded(_DEEP * a, h, growth, _DEEP * a)
@@ -83,7 +88,7 @@ class Track:
         y = -np.concatenate([near, near[-1] + below])[::-1]
         body = Body(
             name="half_space",
-            mesh=grid(x, y),
+            mesh=_with_contact(grid(x, y), _CONTACT * a),
             material=Material(
                 youngs_modulus=elasticity.youngs_modulus, poisson_ratio=elasticity.poisson_ratio
             ),
@@ -102,10 +107,15 @@ class Track:
     @cached_property
     def operator(self) -> Operator:
         """The inverse of the elastic stiffness."""
-        return self.part.operators([], "auto").elastic
+        return self.part.operators([self.surface], "auto").elastic
 
-    def hertz(self, peak: float, shear_ratio: float = 0.0) -> Array:
-        """Return the nodal forces (n,) of a Hertz pressure with proportional shear [N].
+    @cached_property
+    def surface(self) -> Surface:
+        """The part of the top that may come into contact, as a chain of edges downstream."""
+        return extract(self.part, "contact")
+
+    def hertz(self, peak: float, shear_ratio: float = 0.0) -> Given:
+        """Return a Hertz pressure with proportional shear.
 
         Parameters
         ----------
@@ -124,7 +134,14 @@ class Track:
             position=always(0.0),
             shear_ratio=always(shear_ratio),
         )
-        return travelling_forces(self.part, pressure, 0.0)
+        return Given(travelling_forces(self.part, pressure, 0.0))
+
+
+def _with_contact(mesh: Mesh, half: float) -> Mesh:
+    """Return a grid with a name for its top where x is within ``half``."""
+    top = np.asarray(mesh.boundaries["top"])
+    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
+    return mesh.with_boundaries({"contact": top[np.abs(middle) < half]})
 
 
 @lru_cache(maxsize=4)

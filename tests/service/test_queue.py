@@ -165,6 +165,19 @@ def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
     assert (tmp_path / "jobs.sqlite.damaged").read_bytes() == content
 
 
+@pytest.mark.parametrize("damage", ["deleted", "overwritten", "directory"])
+def test_a_queue_that_is_lost_is_made_anew(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "jobs.sqlite"
+    Jobs(path).accept("0" * 32, STUDY, ["a"])
+    path.unlink()
+    if damage == "overwritten":
+        path.write_text("no queue" * 1000)
+    if damage == "directory":
+        path.mkdir()
+    assert open_queue(path, Store(tmp_path), None).page(limit=9, offset=0) == ([], 0)
+    assert (tmp_path / "jobs.sqlite.damaged").exists() == (damage != "deleted")
+
+
 def test_in_a_queue_made_anew_what_is_computed_is_running(tmp_path: Path) -> None:
     store = Store(tmp_path)
     punch = {"scene": "punch", "parameters": {"load_ratio": 1.0}}

@@ -30,8 +30,8 @@ def passes(pressure, count, *, shear=0.0, size=2.0, directions=None, material=No
     """Passes of p0 / k = ``pressure`` with half-width 8 mm."""
     material = material or steel()
     place = track_of(A, size, 1.15, material.elasticity)
-    forces = place.hertz(pressure * K, shear)
-    return list(rolling(place, material, forces, directions or [1] * count))
+    load = place.hertz(pressure * K, shear)
+    return list(rolling(place, material, load, directions or [1] * count))
 
 
 def flow(one):
@@ -85,8 +85,9 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(hardening, shear):
     """
     material = steel(hardening=hardening, hardening_ratio=0.024)
     place = Track(A, 2.0, 1.15, material.elasticity, interleaved=True)
-    forces = place.hertz(4.7 * K, shear)
-    (one,) = rolling(place, material, forces, [1], parts=1)
+    load = place.hertz(4.7 * K, shear)
+    (one,) = rolling(place, material, load, [1], parts=1)
+    forces = load.force
     rows, part = place.rows, place.part
     before = one.before.plastic_strain
     added = rows.force(one.plastic_strain - before[:, None], one.after.plastic_strain - before)
@@ -116,7 +117,7 @@ def test_the_derivative_of_the_flow_is_that_of_differences():
     material = steel(hardening="mixed", hardening_ratio=0.05)
     place = track_of(A, 1.0, 1.15, material.elasticity)
     rows = place.rows
-    loaded = rows.strain(place.hertz(4.7 * K, 0.1))
+    loaded = rows.strain(place.hertz(4.7 * K, 0.1).force)
     change = loaded * np.random.default_rng(3).normal(size=loaded.shape)
     step = 1e-6
 

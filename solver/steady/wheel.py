@@ -1,0 +1,276 @@
+"""An elastic wheel that rolls on a track, in the frame of its axle.
+
+Material of both bodies flows upstream to downstream through the contact, in which nothing changes.
+The *slip* of a contact point is the relative displacement of the two materials while the axle
+advances by one element h: with the tangential row T of the point, its displacement fields u, and S
+the shift of a field by one element upstream,
+
+    slip = T (u - S u) of track and wheel + rigid rolling + h * creepage
+
+Gap and slip depend linearly on the contact forces through the compliances of the two surfaces. The
+result is the frictional problem of `solver.contact.problem`, with a compliance that is not
+symmetric.
+
+J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section 4.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.complementarity import change_of_forces, solve_contact
+from solver.contact.geometry import pair
+from solver.contact.problem import OPEN, ContactProblem
+from solver.errors import NotConverged
+from solver.steady.load import Loading
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.problem import ContactSolution
+    from solver.fem.surface import Surface
+    from solver.fem.wheel import Wheel
+    from solver.steady.track import Track
+
+    Array = NDArray[np.float64]
+
+_ROUNDS = 40
+_COVERED = 0.999
+"""Share of the hat of a vertex that must face the rim for the vertex to be a contact point."""
+_SETTLED = 1e-9
+"""Change of the contact forces / load, at which the geometry of the contact is found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Touching(Loading):
+    """A wheel on a track.
+
+    Attributes
+    ----------
+    x : (n,) positions of the vertices of the track [mm]
+    normal, tangential : (n,) contact forces on the track, tangential ones along the surface
+        against the way of the load [N]
+    area : (n,) of the hats of the vertices [mm2]
+    status : (n,) of the contact points
+    creepage : 1 + R d(rotation) / d(advance)
+    height : displacement of the axle [mm]
+    """
+
+    x: Array
+    normal: Array
+    tangential: Array
+    area: Array
+    status: NDArray[np.int64]
+    creepage: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A contact, around which the next one is looked for.
+
+    ``on_track`` and ``on_wheel`` are nodal forces on the surfaces, ``tilt`` is what the tangential
+    forces add to the vertical force on the wheel.
+    """
+
+    on_track: Array
+    on_wheel: Array
+    height: float
+    tilt: float
+    status: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Geometry:
+    """Gaps and slips of the contact points ``at``, linear in displacements.
+
+    ``gap`` (n,) without any displacement; ``rows`` and ``moves``, for track and wheel: derivatives
+    (2n, n_unknowns) of gaps and tangential displacements, and of gaps and slips.
+    """
+
+    at: NDArray[np.int64]
+    area: Array
+    gap: Array
+    rows: list[Array]
+    moves: list[Array]
+
+
+class RollingWheel:
+    """A wheel pressed on a track.
+
+    Parameters
+    ----------
+    track : that it rolls on; its lowest point is above x = 0
+    wheel : condensed to its rim, elements as long as those of the track
+    rim : its surface
+    friction : coefficient
+    force : vertical force on the axle [N]
+    drive : moment on the axle / radius, positive when braking [N]; None where `creepage` is given
+    creepage : 1 + R d(rotation) / d(advance)
+    """
+
+    def __init__(
+        self,
+        track: Track,
+        wheel: Wheel,
+        rim: Surface,
+        *,
+        friction: float,
+        force: float,
+        drive: float | None = None,
+        creepage: float = 0.0,
+    ) -> None:
+        self._track, self._rim, self._friction, self._force = track, rim, friction, force
+        self._drive = drive if friction else None
+        self._creepage = creepage
+        surface = track.surface
+        self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
+        self._compliance = (
+            track.operator.compliance(surface.dofs, np.eye(len(surface.dofs))),
+            wheel.operators([], "auto").elastic.compliance(rim.dofs, np.eye(len(rim.dofs))),
+        )
+        self._flowed = _flowed(surface, +1), _flowed(rim, -1)
+        x, y = rim.X - wheel.centre[:, None]
+        self._turning = np.stack([-y, x], axis=1).ravel() / wheel.radius
+        self._up = np.tile([0.0, 1.0], rim.X.shape[1])
+        self._known = _Known(
+            on_track=np.zeros(len(surface.dofs)),
+            on_wheel=np.zeros(len(rim.dofs)),
+            height=0.0,
+            tilt=0.0,
+            status=np.full(len(surface.vertices), OPEN),
+        )
+
+    def on(self, flow: Array) -> Touching:
+        """See `Load`.
+
+        Raises
+        ------
+        NotConverged
+            if no contact forces are found
+        """
+        operator, surface = self._track.operator, self._track.surface
+        geometry, problem, found = self._touch(operator.solve(flow)[surface.dofs])
+
+        def along(flow: Array) -> Array:
+            offset = geometry.moves[0] @ operator.solve(flow)[surface.dofs]
+            change = change_of_forces(problem, found, offset[: len(found.forces)])
+            return self._nodal(geometry.rows[0][: len(change)].T @ change)
+
+        n = len(geometry.at)
+        every = np.zeros((2, len(surface.vertices)))
+        every[0, geometry.at] = found.forces[:n]
+        every[1, geometry.at] = found.forces[n:] if self._friction else 0.0
+        turns = self._drive is not None
+        return Touching(
+            force=self._nodal(self._known.on_track),
+            along=along,
+            x=surface.X[0, surface.vertices],
+            normal=every[0],
+            tangential=every[1],
+            area=geometry.area,
+            status=self._known.status,
+            creepage=float(found.rigid[1]) / self._length if turns else self._creepage,
+            height=self._known.height,
+        )
+
+    def _touch(self, shape: Array) -> tuple[_Geometry, ContactProblem, ContactSolution]:
+        """Return the contact on a surface of this shape (2 n_nodes,), and the problem it solves."""
+        known = self._known
+        for _ in range(_ROUNDS):
+            geometry = self._geometry(shape, known)
+            problem = self._problem(geometry, shape, known)
+            found = solve_contact(problem, known.status[geometry.at])
+            if found is None:
+                raise NotConverged("no contact forces were found in a steady pass")
+            before, known = known, self._following(geometry, found)
+            if np.abs(known.on_track - before.on_track).max() < _SETTLED * self._force:
+                if (known.status[[0, -1]] != OPEN).any():
+                    raise NotConverged("the contact reaches the ends of the surface")
+                self._known = known
+                return geometry, problem, found
+        raise NotConverged("the geometry of the contact was not found in a steady pass")
+
+    def _geometry(self, shape: Array, known: _Known) -> _Geometry:
+        """Return how gaps and slips depend on displacements, around the contact as known."""
+        u = self._compliance[0] @ known.on_track + shape
+        d = self._compliance[1] @ known.on_wheel + known.height * self._up
+        surface, rim = self._track.surface, self._rim
+        pairing = pair(surface, u.reshape(-1, 2).T, rim, d.reshape(-1, 2).T)
+        at = np.flatnonzero(pairing.covered > _COVERED)
+        normal = [block[at] for block in pairing.normal]
+        tangent = [block[at] for block in pairing.tangent]
+        slips = [block @ flowed for block, flowed in zip(tangent, self._flowed, strict=True)]
+        return _Geometry(
+            at=at,
+            area=pairing.area,
+            gap=pairing.gap[at] - normal[0] @ u - normal[1] @ d,
+            rows=[np.vstack(both) for both in zip(normal, tangent, strict=True)],
+            moves=[np.vstack(both) for both in zip(normal, slips, strict=True)],
+        )
+
+    def _following(self, geometry: _Geometry, found: ContactSolution) -> _Known:
+        """Return the contact as a solution of its problem has it."""
+        n = len(geometry.at)
+        track, wheel = (rows[: len(found.forces)] for rows in geometry.rows)
+        status = np.full(len(self._track.surface.vertices), OPEN)
+        status[geometry.at] = found.status
+        return _Known(
+            on_track=track.T @ found.forces,
+            on_wheel=wheel.T @ found.forces,
+            height=float(found.rigid[0]),
+            tilt=float(found.forces[n:] @ (wheel[n:] @ self._up)),
+            status=status,
+        )
+
+    def _problem(self, geometry: _Geometry, shape: Array, known: _Known) -> ContactProblem:
+        """Return the frictional problem; ``shape`` is the surface's without the wheel."""
+        n = len(geometry.at)
+        track, wheel = geometry.rows
+        normal, tangent = wheel[:n], wheel[n:]
+        ahead = np.tile([1.0, 0.0], len(shape) // 2)
+        creeping = tangent @ self._turning
+        offset = geometry.moves[0] @ shape
+        offset[:n] += geometry.gap
+        offset[n:] -= self._length * (track[n:] @ ahead + creeping)
+        motions = [np.concatenate([normal @ self._up, np.zeros(n)])]
+        balance = [known.tilt - self._force]
+        if self._drive is None:
+            offset[n:] += self._creepage * self._length * creeping
+        else:
+            motions.append(np.concatenate([np.zeros(n), creeping]))
+            balance.append(self._drive)
+        sides = zip(geometry.moves, self._compliance, geometry.rows, strict=True)
+        W = np.sum([moves @ C @ rows.T for moves, C, rows in sides], axis=0)
+        if not self._friction:
+            W, offset, motions = W[:n, :n], offset[:n], [each[:n] for each in motions[:1]]
+        return ContactProblem(
+            W=W,
+            offset=offset,
+            friction=np.full(n, self._friction),
+            A=np.stack(motions, axis=1),
+            balance=np.array(balance),
+        )
+
+    def _nodal(self, force: Array) -> Array:
+        """Return the forces (n,) on all nodes of the track from those on its surface."""
+        whole = np.zeros(self._track.part.n)
+        whole[self._track.surface.dofs] = force
+        return whole
+
+
+def _flowed(surface: Surface, way: int) -> Array:
+    """Return the matrix from a nodal field to its change over one element, from upstream.
+
+    ``way`` is +1 for a chain of edges that goes downstream. Where the chain begins upstream there
+    is no change.
+    """
+    chain = np.append(surface.edges[:, [0, 2]].ravel(), surface.edges[-1, 1])
+    chain = chain if way > 0 else chain[::-1]
+    change = np.zeros((surface.X.shape[1],) * 2)
+    change[chain[2:], chain[2:]] = 1.0
+    change[chain[2:], chain[:-2]] = -1.0
+    return np.asarray(np.kron(change, np.eye(2)), dtype=float)
