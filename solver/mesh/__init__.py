@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from solver.mesh.grids import graded, grid, mapped, merged
+from solver.mesh.grids import graded, grid, mapped, merged, with_middle
 
-__all__ = ["graded", "grid", "mapped", "merged"]
+__all__ = ["graded", "grid", "mapped", "merged", "with_middle"]

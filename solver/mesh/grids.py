@@ -65,6 +65,13 @@ def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") ->
     )
 
 
+def with_middle(mesh: Mesh, name: str, half: float) -> Mesh:
+    """Return a grid with a name for its top where the first coordinate is within ``half``."""
+    top = np.asarray(mesh.boundaries["top"])
+    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
+    return mesh.with_boundaries({name: top[np.abs(middle) < half]})
+
+
 def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Mesh:
     """Return a quadrilateral mesh with curved quadratic edges, its points moved by ``function``.
 

@@ -11,7 +11,6 @@ from solver.mesh import graded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from skfem import Mesh
 
     Array = NDArray[np.float64]
 
@@ -53,10 +52,3 @@ def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
 def rim_elements(reach: float, h: float) -> int:
     """Return the number of elements of side ``h`` along the part of the rim that may touch."""
     return 2 * math.ceil(reach / h)
-
-
-def with_middle(mesh: Mesh, name: str, half: float) -> Mesh:
-    """Return a grid with a name for its top where the first coordinate is within ``half``."""
-    top = np.asarray(mesh.boundaries["top"])
-    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
-    return mesh.with_boundaries({name: top[np.abs(middle) < half]})

@@ -12,13 +12,13 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.walker import HALVINGS
 from solver.materials.material import Material
-from solver.mesh import grid, mapped, merged
+from solver.mesh import grid, mapped, merged, with_middle
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
 from solver.scenes.parameters import ContactParameters, Friction, Length, described
-from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes, with_middle
+from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes
 from solver.scenes.schedule import Schedule
 
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width

@@ -42,7 +42,6 @@ class Rows:
     ----------
     points : (n_rows, n_columns) their numbers
     behind : (n_rows, n) numbers of the points behind the window, on the same rows
-    x : (n_rows, n_columns) their positions, decreasing along each row [mm]
     shape : n_rows, n_columns
     virgin : the state before any load
     weights : (n_rows, n_columns) volume of the points [mm3]
@@ -65,14 +64,12 @@ class Rows:
         inside = shallow & (middle[0] > -behind) & (middle[0] < ahead)
         points = _in_rows(part, inside, deep, interleaved)
         self.shape = points.shape
-        x, y = part.points.reshape(2, -1)
         self.points = points
-        self.x = x[points]
         self.weights = part.volumes[points]
         n_rows = len(points)
         length = self._length(points)
         self.virgin = Layers(
-            depth=-y[points[:, 0]],
+            depth=-part.points[1].ravel()[points[:, 0]],
             thickness=self.weights.sum(axis=1) / length,
             plastic_strain=np.zeros((n_rows, 4)),
             accumulated=np.zeros(n_rows),

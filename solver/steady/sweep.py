@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-SQRT23 = math.sqrt(2.0 / 3.0)
+from solver.materials.radial_return import SQRT23
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.surface import extract, travelling_forces
 from solver.materials.material import Material
-from solver.mesh import graded, grid
+from solver.mesh import graded, grid, with_middle
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
@@ -21,7 +21,6 @@ from solver.steady.rows import Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from skfem import Mesh
 
     from solver.fem.operators import Operator
     from solver.fem.surface import Surface
@@ -88,7 +87,7 @@ class Track:
         y = -np.concatenate([near, near[-1] + below])[::-1]
         body = Body(
             name="half_space",
-            mesh=_with_contact(grid(x, y), _CONTACT * a),
+            mesh=with_middle(grid(x, y), "contact", _CONTACT * a),
             material=Material(
                 youngs_modulus=elasticity.youngs_modulus, poisson_ratio=elasticity.poisson_ratio
             ),
@@ -135,13 +134,6 @@ class Track:
             shear_ratio=always(shear_ratio),
         )
         return Given(travelling_forces(self.part, pressure, 0.0))
-
-
-def _with_contact(mesh: Mesh, half: float) -> Mesh:
-    """Return a grid with a name for its top where x is within ``half``."""
-    top = np.asarray(mesh.boundaries["top"])
-    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
-    return mesh.with_boundaries({"contact": top[np.abs(middle) < half]})
 
 
 @lru_cache(maxsize=4)

@@ -157,13 +157,10 @@ class RollingWheel:
 
         def along(flow: Array) -> Array:
             offset = geometry.moves[0] @ operator.solve(flow)[surface.dofs]
-            change = change_of_forces(problem, found, offset[: len(found.forces)])
-            return self._nodal(geometry.rows[0][: len(change)].T @ change)
+            return self._nodal(geometry.rows[0].T @ change_of_forces(problem, found, offset))
 
-        n = len(geometry.at)
         every = np.zeros((2, len(surface.vertices)))
-        every[0, geometry.at] = found.forces[:n]
-        every[1, geometry.at] = found.forces[n:] if self._friction else 0.0
+        every[:, geometry.at] = found.forces.reshape(2, -1)
         turns = self._drive is not None
         return Touching(
             force=self._nodal(self._known.on_track),
@@ -215,7 +212,7 @@ class RollingWheel:
     def _following(self, geometry: _Geometry, found: ContactSolution) -> _Known:
         """Return the contact as a solution of its problem has it."""
         n = len(geometry.at)
-        track, wheel = (rows[: len(found.forces)] for rows in geometry.rows)
+        track, wheel = geometry.rows
         status = np.full(len(self._track.surface.vertices), OPEN)
         status[geometry.at] = found.status
         return _Known(
@@ -245,8 +242,6 @@ class RollingWheel:
             balance.append(self._drive)
         sides = zip(geometry.moves, self._compliance, geometry.rows, strict=True)
         W = np.sum([moves @ C @ rows.T for moves, C, rows in sides], axis=0)
-        if not self._friction:
-            W, offset, motions = W[:n, :n], offset[:n], [each[:n] for each in motions[:1]]
         return ContactProblem(
             W=W,
             offset=offset,

@@ -146,8 +146,10 @@ def run_study(
         _answering(access)
     with store.writing():
         store.save_study(study)
-        wanted, ids = set(study.run_ids()), study.run_ids()
+        wanted: set[str] = set()
+        ids = study.run_ids()
         while some := list(islice(ids, _BATCH)):
+            wanted.update(some)
             for run_id, row in store.sound(some).items():
                 if row["status"] == OK or (resume and row["modified"] >= since):
                     wanted.discard(run_id)

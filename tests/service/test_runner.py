@@ -152,7 +152,7 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     assert jobs.get("good").state is State.RUNNING
 
 
-def test_a_process_is_ready_before_it_is_needed(tmp_path: Path) -> None:
+def test_a_process_is_ready_before_it_is_needed() -> None:
     async def work() -> None:
         starter = Starter("this", 0)
         before = len(psutil.Process().children())

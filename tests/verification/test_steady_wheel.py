@@ -72,6 +72,12 @@ def test_an_elastic_track_is_touched_as_hertz_says():
     assert np.ptp(touching.x[closed]) == pytest.approx(2 * A, abs=2.0)
 
 
+def test_without_friction_nothing_pulls():
+    parameters, touching = elastic(friction=0.0)
+    assert not touching.tangential.any()
+    assert touching.normal.sum() == pytest.approx(parameters.force, rel=1e-4)
+
+
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 def test_creepage_is_carters(share):
     """Braking and driving are averaged: a wheel without a force creeps by 1e-4 of its own."""
