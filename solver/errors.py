@@ -43,5 +43,9 @@ class NotConverged(SolverError):
         return type(self), (str(self), self.reached, self.attempted)
 
 
+class WindowTooSmall(NotConverged):
+    """A steady pass yields, or touches, as far as its mesh was made for; a larger one may do."""
+
+
 class LimitLoad(NotConverged):
     """The load cannot grow beyond ``reached``: the structure flows plastically at constant load."""

@@ -51,10 +51,12 @@ def change_of_forces(
 ) -> NDArray[np.float64]:
     """Return the change (m,) of a solution's forces with the offset (m,), statuses kept.
 
-    No point may be at its limit.
+    Tangential forces at their limit stay there.
     """
-    changed = replace(problem, offset=offset, balance=np.zeros_like(problem.balance), limit=None)
-    found = _forces(changed, solution.status, np.zeros(problem.n, dtype=bool))
+    nothing = np.zeros(problem.n)
+    capped = problem.friction * solution.forces[: problem.n] > problem.limits
+    changed = replace(problem, offset=offset, balance=0 * problem.balance, limit=nothing)
+    found = _forces(changed, solution.status, capped)
     return np.zeros_like(offset) if found is None else found[0]
 
 

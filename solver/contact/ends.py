@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.candidates import Candidates
-    from solver.contact.system import Interface, System
+    from solver.contact.interface import Interface
+    from solver.contact.system import System
 
 _COVERED = 1 - 1e-6
 

@@ -2,106 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import null_space
 
-from solver.contact.geometry import Pairing, pair
-from solver.contact.overlap import check_overlap, largest_overlap
+from solver.contact.interface import interface_of, surfaces_of
 from solver.contact.state import ContactState, State
 from solver.errors import ModelError
-from solver.fem import surface
 from solver.fem.discretisation import Discretisation
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
-from solver.model.model import effective_friction
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
     from solver.fem.part import Part
     from solver.fem.surface import Surface
+    from solver.fem.wheel import Hub
     from solver.materials.state import Response
-    from solver.model.model import ContactPair, Model
+    from solver.model.model import Model
 
 
 _TOUCHING = 1e-9
 """Gap / length of the longest contact surface, below which vertices touch."""
 _SET_DOWN = 1e-9
 """Gap / radius of a wheel that is set down, below which vertices touch."""
-
-
-@dataclass(frozen=True, slots=True)
-class Interface:
-    """A contact pair on its two parts.
-
-    ``shear_strength`` is the largest shear it carries at any pressure [MPa].
-    """
-
-    slave: int
-    master: int
-    slave_surface: Surface
-    master_surface: Surface
-    friction: float
-    shear_strength: float
-    parts: tuple[Part, Part]
-    reach: float
-    reference: Pairing | None
-
-    @property
-    def sides(self) -> tuple[tuple[int, Part, Surface], tuple[int, Part, Surface]]:
-        """Slave and master: number, part and surface."""
-        return (
-            (self.slave, self.parts[0], self.slave_surface),
-            (self.master, self.parts[1], self.master_surface),
-        )
-
-    @property
-    def floating(self) -> bool:
-        """Whether contact has to hold a rigid motion of either part."""
-        return any(part.rigid.shape[1] for part in self.parts)
-
-    def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
-        """Return gap, area and derivative rows at displacements ``u``."""
-        motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
-        if self.reference is not None:
-            change = sum(
-                block @ motion.T.ravel()
-                for block, motion in zip(self.reference.normal, motions, strict=True)
-            )
-            return replace(self.reference, gap=self.reference.gap + change)
-        return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
-
-
-def _surfaces(model: Model, wholes: Mapping[str, Discretisation]) -> dict[tuple[str, str], Surface]:
-    """Return the surfaces of all pairs in the numbering of the whole bodies.
-
-    Where a surface continues as the surface of another pair, contact may pass on: no end is there.
-    """
-    found = {
-        side: surface.extract(wholes[side[0]], side[1])
-        for contact in model.contacts
-        for side in (contact.slave, contact.master)
-    }
-    ends = {side: chain.nodes[chain.vertices[[0, -1]]] for side, chain in found.items()}
-
-    def alone(side: tuple[str, str], node: int) -> bool:
-        return not any(node in ends[o] for o in ends if o[0] == side[0] and o != side)
-
-    out = {}
-    for side, chain in found.items():
-        start, end = (
-            on and alone(side, node)
-            for on, node in zip(chain.goes_on, ends[side].tolist(), strict=True)
-        )
-        out[side] = replace(chain, goes_on=(start, end))
-    return out
 
 
 def _part(whole: Discretisation, own: list[Surface], linear_solver: str) -> Part:
@@ -113,52 +42,13 @@ def _part(whole: Discretisation, own: list[Surface], linear_solver: str) -> Part
     return whole
 
 
-def _interface(
-    contact: ContactPair,
-    parts: tuple[Part, ...],
-    names: list[str],
-    surfaces: dict[tuple[str, str], Surface],
-) -> Interface:
-    sides = []
-    for side in (contact.slave, contact.master):
-        number, chain = names.index(side[0]), surfaces[side]
-        part = parts[number]
-        sides.append((number, part.surface(chain)))
-    (slave, slave_surface), (master, master_surface) = sides
-    both = (parts[slave], parts[master])
-    check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
-    reference, reach = None, float(np.ptp(both[0].body.mesh.p, axis=1).max())
-    if contact.sliding == "small":
-        at_rest = [np.zeros_like(chain.X) for _, chain in sides]
-        reach = largest_overlap(both[0].body, both[1].body)
-        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
-        if not reference.area.any():
-            raise ModelError(
-                "contacts", (contact.slave, contact.master),
-                "these surfaces do not face each other: before loading no normal of the slave "
-                "meets the master from outside; check the boundaries and where the bodies are",
-            )  # fmt: skip
-    strength = min(part.body.material.shear_yield_stress for part in both)
-    return Interface(
-        slave=slave,
-        master=master,
-        slave_surface=slave_surface,
-        master_surface=master_surface,
-        friction=effective_friction(contact.friction),
-        shear_strength=contact.shear_limit * strength,
-        parts=both,
-        reach=reach,
-        reference=reference,
-    )
-
-
 class System:
     """A model's parts, operators and interfaces, built once and shared by all its runs."""
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
         self.model = model
         self._wholes = {body.name: Discretisation(body) for body in model.bodies}
-        surfaces = _surfaces(model, self._wholes)
+        surfaces = surfaces_of(model, self._wholes)
         own = [[chain for (name, _), chain in surfaces.items() if name == body.name]
                for body in model.bodies]  # fmt: skip
         self.parts: tuple[Part, ...] = tuple(
@@ -169,9 +59,8 @@ class System:
             part.operators(chains, linear_solver)
             for part, chains in zip(self.parts, own, strict=True)
         )
-        names = [body.name for body in model.bodies]
         self.interfaces = tuple(
-            _interface(contact, self.parts, names, surfaces) for contact in model.contacts
+            interface_of(contact, self.parts, self.names, surfaces) for contact in model.contacts
         )
 
         self._check_held()
@@ -200,6 +89,11 @@ class System:
                     dict(part.body.supports),
                     f"body {part.body.name!r} can move freely: support it, or hold it by contact",
                 )
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the bodies."""
+        return [body.name for body in self.model.bodies]
 
     @property
     def n_unknowns(self) -> int:
@@ -245,7 +139,7 @@ class System:
 
     def part(self, name: str) -> int:
         """Return the number of the part called ``name``."""
-        return [body.name for body in self.model.bodies].index(name)
+        return self.names.index(name)
 
     def full(self, name: str) -> Discretisation:
         """Return the whole body called ``name``."""
@@ -256,6 +150,11 @@ class System:
         number = self.part(name)
         part, u = self.parts[number], state.u[number]
         return part.expand(u, state.time)
+
+    def axle(self, converged: Converged) -> Hub | None:
+        """Return the motion of the first wheel, where there is one."""
+        both = zip(self.parts, converged.state.u, strict=True)
+        return next((part.hub(u) for part, u in both if isinstance(part, Wheel)), None)
 
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body."""

@@ -10,6 +10,7 @@ from solver.errors import LimitLoad
 
 if TYPE_CHECKING:
     from solver.contact.system import System
+    from solver.materials.law import Law
 
 
 def unbearable(system: System) -> LimitLoad | None:
@@ -25,12 +26,19 @@ def unbearable(system: System) -> LimitLoad | None:
         times = np.union1d(travelling.amplitude.time, travelling.shear_ratio.time)
         now = (travelling.now(time) for time in times)
         shear = max(abs(share * ratio) for share, _, ratio in now) * travelling.peak
-        strength = body.material.ultimate_shear_stress
-        if shear > strength:
-            return LimitLoad(
-                f"the prescribed shear, {shear:.4g} MPa, is above the shear yield stress, "
-                f"{strength:.4g} MPa: no equilibrium without hardening",
-                strength / shear,
-                1.0,
-            )
+        if (limit := too_much_shear(body.material, shear)) is not None:
+            return limit
     return None
+
+
+def too_much_shear(material: Law, shear: float) -> LimitLoad | None:
+    """Return the error that a surface has no equilibrium under this shear; None if it may have."""
+    strength = material.ultimate_shear_stress
+    if shear <= strength:
+        return None
+    return LimitLoad(
+        f"the prescribed shear, {shear:.4g} MPa, is above the shear yield stress, "
+        f"{strength:.4g} MPa: no equilibrium without hardening",
+        strength / shear,
+        1.0,
+    )

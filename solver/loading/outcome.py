@@ -106,8 +106,8 @@ class Outcome:
     """
 
     tally: Tally
-    last: Converged
-    points: Mapping[str, Converged] = field(default_factory=dict)
+    last: Any
+    points: Mapping[str, Any] = field(default_factory=dict)
     traces: tuple[Any, ...] = ()
     error: NotConverged | None = None
     settled: Settled = field(default_factory=Settled)

@@ -39,7 +39,7 @@ DEGREES_OF_FREEDOM = declare("degrees_of_freedom", "degrees of freedom", count=T
 def extremes(look: Look) -> Values:
     """Return the largest plastic strain, the extreme residual stresses, and the plastic work."""
     system = look.system
-    names = [body.name for body in system.model.bodies]
+    names = system.names
     strains = {n: system.response(n, look.unloaded).state.accumulated for n in names}
     most = max(names, key=lambda name: strains[name].max())
     points = system.full(most).points.reshape(2, -1)

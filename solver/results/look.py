@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 from solver.results.quantities import Quantity
 
 if TYPE_CHECKING:
-    from solver.contact.state import Converged
-    from solver.contact.system import System
     from solver.loading.outcome import Outcome
-    from solver.results.samples import Samples
+    from solver.results.audit import Audit
+    from solver.results.samples import Bodies, Samples, Solved
     from solver.results.touch import Touch
     from solver.results.view import View
 
@@ -27,16 +26,20 @@ class Look:
     samples : fields of its system at the positions of the scene's view
     touch : pressure and shear on its lower body
     outcome : the result of its program
+    check : () -> its audit, of a complete run
+    notes : what the user must know of how it was computed
     """
 
     parameters: Any
     samples: Samples
     touch: Touch
     outcome: Outcome
+    check: Callable[[], Audit]
+    notes: tuple[str, ...] = ()
 
     @property
-    def system(self) -> System:
-        """The discretised model."""
+    def system(self) -> Bodies:
+        """The discretised bodies."""
         return self.samples.system
 
     @property
@@ -50,17 +53,17 @@ class Look:
         return self.outcome.error is None
 
     @property
-    def loaded(self) -> Converged:
+    def loaded(self) -> Solved:
         """The state under load."""
         return self.outcome.points[self.view.loaded]
 
     @property
-    def unloaded(self) -> Converged:
+    def unloaded(self) -> Solved:
         """The state after unloading."""
         return self.outcome.points[self.view.unloaded]
 
     @property
-    def stages(self) -> list[tuple[Converged, float]]:
+    def stages(self) -> list[tuple[Solved, float]]:
         """States whose contact is recorded, each with the x at which s is zero [mm]."""
         states = [(name, self.outcome.points[name]) for name in self.view.stages]
         following = self.view.following

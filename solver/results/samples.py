@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -10,22 +10,56 @@ from solver.fem.fields import Sampler, recovery
 from solver.tensors import to_tensor, von_mises
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
-    from solver.contact.state import Converged
-    from solver.contact.system import System
+    from solver.contact.state import State
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.wheel import Hub
+    from solver.materials.state import Response
     from solver.results.view import View
 
     Array = NDArray[np.float64]
 
 
-class Nodal:
-    """Fields at the nodes of a system's bodies; the recovery operators are built once."""
+class Solved(Protocol):
+    """A state that was found."""
 
-    def __init__(self, system: System) -> None:
+    @property
+    def state(self) -> State:
+        """Its unknowns."""
+
+
+class Bodies(Protocol):
+    """Bodies of which states were found, each body a whole mesh: a `System`, for one."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the bodies."""
+
+    @property
+    def n_unknowns(self) -> int:
+        """Displacement unknowns of all bodies."""
+
+    def full(self, name: str) -> Discretisation:
+        """Return a body."""
+
+    def response(self, name: str, converged: Any) -> Response:
+        """Return stress and internal variables at the points of a body."""
+
+    def displacement(self, name: str, state: State) -> Array:
+        """Return the displacements (n,) of a body [mm]."""
+
+    def axle(self, converged: Any) -> Hub | None:
+        """Return the motion of the first wheel, where there is one."""
+
+
+class Nodal:
+    """Fields at the nodes of bodies; the recovery operators are built once."""
+
+    def __init__(self, system: Bodies) -> None:
         self.system = system
         self._recovery: dict[str, csr_array] = {}
 
@@ -35,11 +69,11 @@ class Nodal:
             self._recovery[body] = recovery(self.system.full(body))
         return np.asarray((self._recovery[body] @ points.T).T)
 
-    def stress(self, body: str, converged: Converged) -> Array:
+    def stress(self, body: str, converged: Solved) -> Array:
         """Return recovered nodal stress (4, n_nodes), Mandel [MPa]."""
         return self.of_points(body, self.system.response(body, converged).stress)
 
-    def plastic_strain(self, body: str, converged: Converged) -> Array:
+    def plastic_strain(self, body: str, converged: Solved) -> Array:
         """Return recovered equivalent plastic strain (n_nodes,), not below zero."""
         strain = self.system.response(body, converged).state.accumulated
         return np.maximum(self.of_points(body, strain), 0.0)
@@ -48,7 +82,7 @@ class Nodal:
 class Samples(Nodal):
     """Samples one system; the interpolation is set up once for all its runs."""
 
-    def __init__(self, system: System, view: View) -> None:
+    def __init__(self, system: Bodies, view: View) -> None:
         super().__init__(system)
         self.view = view
         X, Y = np.meshgrid(view.x, view.y)
@@ -69,30 +103,34 @@ class Samples(Nodal):
         assert out is not None
         return out.reshape(*out.shape[:-1], len(self.view.y), len(self.view.x))
 
-    def on_surface(self, body: str, converged: Converged) -> Array:
+    def on_surface(self, body: str, converged: Solved) -> Array:
         """Return surface stress (4, n_s) of a body, tensor components [MPa]."""
         return to_tensor(self._surface[body](self.stress(body, converged)))
 
-    def profile(self, converged: Converged) -> tuple[Array, Array]:
+    def along_depth(self, nodal: Array) -> Array:
+        """Return nodal fields of the profile body along depth (..., station, depth)."""
+        values = self._lines(nodal)
+        return values.reshape(*values.shape[:-1], len(self.view.station), len(self.view.depth))
+
+    def profile(self, converged: Solved) -> tuple[Array, Array]:
         """Return stress (station, 4, depth) [MPa] and plastic strain (station, depth)."""
-        body, shape = self.view.profile_body, (len(self.view.station), len(self.view.depth))
-        stress = self._lines(self.stress(body, converged)).reshape(4, *shape)
-        strain = self._lines(self.plastic_strain(body, converged)).reshape(shape)
+        body = self.view.profile_body
+        stress = self.along_depth(self.stress(body, converged))
+        strain = self.along_depth(self.plastic_strain(body, converged))
         return to_tensor(stress).swapaxes(0, 1), strain
 
-    def flow(self, converged: Converged) -> Array:
+    def flow(self, converged: Solved) -> Array:
         """Return signed plastic strain (station, 4, depth), tensor components."""
-        body, view = self.view.profile_body, self.view
+        body = self.view.profile_body
         points = self.system.response(body, converged).state.plastic_strain
-        strain = self._lines(self.of_points(body, points))
-        return to_tensor(strain.reshape(4, len(view.station), -1)).swapaxes(0, 1)
+        return to_tensor(self.along_depth(self.of_points(body, points))).swapaxes(0, 1)
 
-    def displacement(self, converged: Converged) -> Array:
+    def displacement(self, converged: Solved) -> Array:
         """Return the displacement (2, station) of the surface [mm]."""
         u = self.system.displacement(self.view.profile_body, converged.state).reshape(-1, 2).T
-        return np.asarray(self._lines(u).reshape(2, len(self.view.station), -1)[:, :, 0])
+        return np.asarray(self.along_depth(u)[:, :, 0])
 
-    def surface_mises(self, converged: Converged, centre: float) -> Array:
+    def surface_mises(self, converged: Solved, centre: float) -> Array:
         """Return von Mises stress along s at the surface of the profile body [MPa].
 
         Von Mises stress is recovered from the points; that of recovered stress would go far

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.contact.system import System
     from solver.model.motion import TravellingPressure
+    from solver.results.samples import Solved
 
     Array = NDArray[np.float64]
 
@@ -22,20 +23,20 @@ if TYPE_CHECKING:
 class Touch(Protocol):
     """Pressure and shear on the lower body, whose surface runs along x."""
 
-    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+    def along(self, converged: Any, x: Array) -> tuple[Array, Array, Array]:
         """Return pressure, shear along +x [MPa] and gap [mm] at positions x (n,).
 
         NaN beyond the surface. The gap is NaN also for bodies taken apart and for a prescribed
         pressure.
         """
 
-    def extent(self, converged: Converged) -> tuple[float, float]:
+    def extent(self, converged: Any) -> tuple[float, float]:
         """Return the half-width of the contact [mm] and the peak pressure [MPa]."""
 
-    def force(self, converged: Converged) -> float:
+    def force(self, converged: Any) -> float:
         """Return the tangential force along +x [N]."""
 
-    def centre(self, converged: Converged) -> float:
+    def centre(self, converged: Any) -> float:
         """Return where the load is along x [mm]."""
 
 
@@ -98,23 +99,23 @@ class Prescribed:
         self._travelling = travelling
         self._period = period
 
-    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+    def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
         """See `Touch`."""
         pressure, ratio = self._travelling.at(converged.state.time, x, self._period)
         return pressure, ratio * pressure, np.full_like(x, np.nan)
 
-    def extent(self, converged: Converged) -> tuple[float, float]:
+    def extent(self, converged: Solved) -> tuple[float, float]:
         """See `Touch`."""
         share, _, _ = self._travelling.now(converged.state.time)
         return self._travelling.half_width, share * self._travelling.peak
 
-    def force(self, converged: Converged) -> float:
+    def force(self, converged: Solved) -> float:
         """See `Touch`."""
         _, _, ratio = self._travelling.now(converged.state.time)
         width, peak = self.extent(converged)
         return np.pi / 2 * width * peak * ratio
 
-    def centre(self, converged: Converged) -> float:
+    def centre(self, converged: Solved) -> float:
         """See `Touch`."""
         _, centre, _ = self._travelling.now(converged.state.time)
         return centre
@@ -123,20 +124,20 @@ class Prescribed:
 class Nothing:
     """No contact and no travelling pressure: such a scene lists no output of contact."""
 
-    def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
+    def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
         """See `Touch`."""
         nowhere = np.full_like(x, np.nan)
         return nowhere, nowhere, nowhere
 
-    def extent(self, converged: Converged) -> tuple[float, float]:
+    def extent(self, converged: Solved) -> tuple[float, float]:
         """See `Touch`."""
         return np.nan, np.nan
 
-    def force(self, converged: Converged) -> float:
+    def force(self, converged: Solved) -> float:
         """See `Touch`."""
         return np.nan
 
-    def centre(self, converged: Converged) -> float:
+    def centre(self, converged: Solved) -> float:
         """See `Touch`."""
         return 0.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import types
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -93,10 +94,12 @@ def check(parameters: Any) -> None:
     """Raise `ModelError` for the first field that breaks its annotation."""
     for name, kinds, wanted, choices, bounds in _rules(parameters.__class__):
         value = getattr(parameters, name)
-        if choices:
-            if value not in choices:
-                raise ModelError(name, value, "must be one of " + ", ".join(choices))
+        if isinstance(value, str) and value in choices:
             continue
+        if kinds is tuple:
+            continue
+        if kinds is str:
+            raise ModelError(name, value, "must be one of " + ", ".join(choices))
         if kinds is bool:
             if not isinstance(value, bool):
                 raise ModelError(name, value, "must be true or false")
@@ -106,7 +109,7 @@ def check(parameters: Any) -> None:
         for test, limit, _ in bounds:
             if not test(value, limit):
                 allowed = " and ".join(f"{words} {limit:g}" for _, limit, words in bounds)
-                raise ModelError(name, value, "must be " + allowed)
+                raise ModelError(name, value, "must be " + " or ".join([allowed, *choices]))
 
 
 _Bound = tuple[Callable[[float, float], bool], float, str]
@@ -115,17 +118,35 @@ _Rule = tuple[str, Any, str, tuple[str, ...], tuple[_Bound, ...]]
 
 @cache
 def _rules(kind: Any) -> tuple[_Rule, ...]:
-    """Return name, types, these in words, permitted words and bounds of every field."""
+    """Return name, types, what it must be, permitted words and bounds of every field."""
     rules = []
     hints = typing.get_type_hints(kind, include_extras=True)
     for item in fields(kind):
-        hint = hints[item.name]
-        choices = typing.get_args(hint) if typing.get_origin(hint) is Literal else ()
-        of, *limits = (str,) if choices else typing.get_args(hint) or (hint,)
+        of, choices, limits = _taken_apart(hints[item.name])
         bounds = tuple(bound for limit in limits for bound in _bounds(limit))
-        kinds, wanted = (of, "an integer") if of in (int, bool) else ((int, float), "a number")
+        kinds, wanted = {
+            str: (str, ""), bool: (bool, ""), tuple: (tuple, ""), int: (int, "an integer")
+        }.get(of, ((int, float), "a number"))  # fmt: skip
+        wanted = " or ".join([wanted, *choices])
         rules.append((item.name, kinds, wanted, choices, bounds))
     return tuple(rules)
+
+
+def _taken_apart(hint: Any) -> tuple[Any, tuple[str, ...], tuple[Any, ...]]:
+    """Return the type, the permitted words and the limits of ``hint``: a number, words, or both."""
+    of, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if of is tuple:  # what it holds is for its owner to check
+        return tuple, (), ()
+    if of is Literal:
+        return str, arguments, ()
+    if of is Annotated:
+        kind, choices, limits = _taken_apart(arguments[0])
+        return kind, choices, (*limits, *arguments[1:])
+    if of in (typing.Union, types.UnionType):
+        each = [_taken_apart(part) for part in arguments]
+        kind = next((kind for kind, _, _ in each if kind is not str), str)
+        return kind, sum((words for _, words, _ in each), ()), sum((own for *_, own in each), ())
+    return hint, (), ()
 
 
 def _bounds(limit: Any) -> list[_Bound]:

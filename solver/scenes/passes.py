@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.fem.wheel import Wheel
 from solver.results.fields import PLASTIC_STRAIN_PROFILE, RESIDUAL_PROFILE
 from solver.results.quantities import declare
 from solver.results.shakedown import Shakedown, ShakedownState, classify
@@ -19,7 +18,8 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged
     from solver.results.look import Values
-    from solver.results.samples import Samples
+    from solver.results.samples import Bodies, Samples, Solved
+    from solver.scenes.rolling_parameters import RollingParameters
 
     Array = NDArray[np.float64]
 
@@ -81,18 +81,17 @@ class Trace:
             *samples.profile(left),
             samples.flow(left),
             samples.displacement(left),
-            _creepage(samples, points["mid_track"], points["loaded"]),
+            _creepage(samples.system, points["mid_track"], points["loaded"]),
             float(left.responses[-1].state.accumulated.max()),
         )
 
 
-def _creepage(samples: Samples, first: Converged, last: Converged) -> float:
+def _creepage(bodies: Bodies, first: Solved, last: Solved) -> float:
     """Return the creepage of the wheel between two states, NaN without a wheel."""
-    for number, part in enumerate(samples.system.parts):
-        if isinstance(part, Wheel):
-            before, now = part.hub(first.state.u[number]), part.hub(last.state.u[number])
-            return float(1 + (now.arc - before.arc) / (now.x - before.x))
-    return np.nan
+    before, now = bodies.axle(first), bodies.axle(last)
+    if before is None or now is None:
+        return np.nan
+    return float(1 + (now.arc - before.arc) / (now.x - before.x))
 
 
 def passes(traces: Sequence[Trace], cycle: int) -> Values:
@@ -116,18 +115,18 @@ def passes(traces: Sequence[Trace], cycle: int) -> Values:
     }
 
 
-def shakedown(
-    traces: Sequence[Trace], cycle: int, yield_strain: float, *, periodic: bool, hardens: bool
-) -> Shakedown:
+def shakedown_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shakedown:
     """Return the shakedown state that the passes tend to.
 
     On a track with ends a body that yields stays undecided: the ends hold back the layer that
     ratchetting moves, until the cycle seems closed.
     """
+    cycle, yield_strain = parameters.cycle, parameters.yield_stress / parameters.youngs_modulus
+    hardens = parameters.material().hardens
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)
     found = classify(accumulated[last], _equivalent(left)[last], yield_strain, hardens=hardens)
-    if periodic or found.state is ShakedownState.ELASTIC:
+    if parameters.endless or parameters.periodic or found.state is ShakedownState.ELASTIC:
         return found
     return Shakedown(ShakedownState.UNDECIDED, found.accumulated, found.net)
 

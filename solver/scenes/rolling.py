@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.fem.wheel import Wheel
 from solver.loading.walker import Settling
 from solver.results.contact import contact
 from solver.results.fields import maps, surfaces
@@ -29,10 +28,12 @@ from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.results.view import View
-from solver.scenes.passes import Trace, passes, shakedown
+from solver.scenes.passes import Trace, passes, shakedown_of
 from solver.scenes.rolling_effort import effort
-from solver.scenes.rolling_model import RollingParameters, model
-from solver.scenes.scene import Scene
+from solver.scenes.rolling_endless import without_ends
+from solver.scenes.rolling_model import model
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.scene import Scene, by_increments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -122,6 +123,9 @@ STEADY_NET_INCREMENT = declare(
 )
 
 
+_SEEN = 4.0  # reach of what is recorded on a track without ends / Hertz half-width
+
+
 def program(parameters: RollingParameters) -> Program:
     """Return the passes."""
     return parameters.schedule.program
@@ -129,14 +133,16 @@ def program(parameters: RollingParameters) -> Program:
 
 def view(parameters: RollingParameters) -> View:
     """Return where the results are taken: a function of dimensions, not of the mesh."""
-    half, a = parameters.track / 2, parameters.half_width
+    if parameters.endless:
+        return _around_the_load(parameters.widest.half_width)
+    half, a = parameters.length / 2, parameters.half_width
     depth = 5 * a
     edge = math.ceil(half + 2 * a)
     return View(
         x=np.linspace(-edge, edge, 2 * edge * 2 + 1),
         y=-(np.arange(120) + 0.5) * depth / 120,
-        depth=np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)]),
-        station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.track / 50.0),
+        depth=_depths(a),
+        station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.length / 50.0),
         s=np.linspace(-edge, edge, 8 * edge + 1),
         profile_body="half_space",
         surfaces={"half_space": "top"},
@@ -144,6 +150,25 @@ def view(parameters: RollingParameters) -> View:
         loaded="mid_track",
         following=("loaded",),
     )
+
+
+def _around_the_load(a: float) -> View:
+    """Return where the results of a track without ends are taken, for the half-width a [mm]."""
+    return View(
+        x=a * np.linspace(-_SEEN, _SEEN, 161),
+        y=-(np.arange(120) + 0.5) * 5 * a / 120,
+        depth=_depths(a),
+        station=np.array([0.0]),
+        s=a * np.linspace(-_SEEN, _SEEN, 641),
+        profile_body="half_space",
+        surfaces={"half_space": "top"},
+        stages=("loaded", "unloaded"),
+    )
+
+
+def _depths(a: float) -> NDArray[np.float64]:
+    """Return the depths of profiles for the half-width a [mm]."""
+    return np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)])
 
 
 def settling(parameters: RollingParameters) -> Settling | None:
@@ -159,6 +184,8 @@ def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
 
 def progress(look: Look) -> Values:
     """Return the length rolled in the last pass, and the advance of its increments."""
+    if look.parameters.endless:
+        return {}
     schedule, settled = look.parameters.schedule, look.outcome.settled
     return {
         TRAVEL: schedule.travel(look.outcome.last.state.time),
@@ -190,10 +217,8 @@ def profile_figures(look: Look) -> Values:
 def wheel(look: Look) -> Values:
     """Return the longitudinal force at mid-track, and height and rotation of the wheel if any."""
     out: dict[Quantity, float] = {LONGITUDINAL_FORCE: look.touch.force(look.loaded)}
-    for part, u in zip(look.system.parts, look.loaded.state.u, strict=True):
-        if isinstance(part, Wheel):
-            hub = part.hub(u)
-            out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
+    if (hub := look.system.axle(look.loaded)) is not None:
+        out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
     return out
 
 
@@ -214,13 +239,9 @@ def surface(look: Look) -> Values:
 def cycles(look: Look) -> Values:
     """Return the results of every pass, and the shakedown state that the cycles tend to."""
     parameters = look.parameters
-    cycle = parameters.schedule.cycle
-    found = shakedown(
-        look.outcome.traces, cycle, parameters.yield_stress / parameters.youngs_modulus,
-        periodic=parameters.periodic, hardens=parameters.material().hardens,
-    )  # fmt: skip
+    found = shakedown_of(parameters, look.outcome.traces)
     return {
-        **passes(look.outcome.traces, cycle),
+        **passes(look.outcome.traces, parameters.cycle),
         SHAKEDOWN_STATE: found.state,
         STEADY_PLASTIC_INCREMENT: found.accumulated,
         STEADY_NET_INCREMENT: found.net,
@@ -230,7 +251,7 @@ def cycles(look: Look) -> Values:
 def warnings(look: Look) -> tuple[str, ...]:
     """Return a warning where the error by the advance is above its tolerance, or unknown."""
     settled, tolerance = look.outcome.settled, settling(look.parameters)
-    if tolerance is None or settled.error <= tolerance.tolerance:
+    if look.parameters.endless or tolerance is None or settled.error <= tolerance.tolerance:
         return ()
     advance = look.parameters.schedule.increment
     known = not np.isnan(settled.error)
@@ -248,6 +269,7 @@ ROLLING = Scene(
     summary="elastic cylinder rolling on an elastic-plastic half-space, pass after pass",
     parameters=RollingParameters,
     branch="passes",
+    method=lambda parameters: without_ends if parameters.endless else by_increments,
     refining=frozenset(
         {
             "element_size", "growth", "advance_step", "advance_tolerance", "press_steps",

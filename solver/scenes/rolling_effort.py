@@ -9,11 +9,12 @@ from solver.loading.walker import HALVINGS
 from solver.scenes.effort import Effort, lattice
 from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
 from solver.scenes.rolling_model import track_grid
+from solver.steady import track_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from solver.scenes.rolling_model import RollingParameters
+    from solver.scenes.rolling_parameters import RollingParameters
 
 _ELEMENT = "quad8"
 
@@ -21,6 +22,9 @@ _ELEMENT = "quad8"
 def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
     """Return the work of rolling up to the largest number of passes."""
     elements, unknowns = _size(parameters)
+    if parameters.endless:
+        count = int(max(passes))
+        return Effort(elements=elements, unknowns=unknowns, increments=count, most_increments=count)
     schedule = parameters.schedule
     fixed = schedule.press * (1 + schedule.driven) + schedule.release
     rolled = 2 * schedule.half_steps
@@ -37,12 +41,21 @@ def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
 
 
 def _size(parameters: RollingParameters) -> tuple[int, int]:
-    """Return the elements, and the unknowns of the half-space and of the wheel's rim."""
-    elements, unknowns = _track(*track_grid(parameters))
-    if parameters.load == "hertz":
+    """Return the elements, and the unknowns of the half-space and of the wheel's rim.
+
+    A steady pass does not count those of the rim.
+    """
+    p = parameters
+    if p.endless:
+        elements, unknowns = _endless(p.widest.half_width, p.element_size, p.growth)
+    else:
+        elements, unknowns = _track(*track_grid(p))
+    if p.load == "hertz":
         return elements, unknowns
-    own, rim = _wheel(parameters.radius, parameters.reach, parameters.element_size)
-    hub = 1 if parameters.guided else 2  # its height, and its rotation
+    own, rim = _wheel(p.radius, p.widest.reach, p.element_size)
+    if p.endless:
+        return elements + own, unknowns
+    hub = 1 if p.guided else 2  # its height, and its rotation
     return elements + own, unknowns + rim + hub
 
 
@@ -52,10 +65,26 @@ def _track(
 ) -> tuple[int, int]:
     """Return elements and unknowns of the half-space."""
     x, y = half_space_nodes(fine, far, a, h, growth, periodic)
+    if not periodic:
+        return _held(len(x), len(y))
     track = lattice(len(x) - 1, len(y) - 1, _ELEMENT)
-    if periodic:  # the nodes of the right side are those of the left; the bottom is held
-        return track.elements, 2 * (track.nodes - track.up) - 2 * (track.along - 1)
-    # x is held at both sides, x and y at the bottom, whose corners belong to both
+    # the nodes of the right side are those of the left; the bottom is held
+    return track.elements, 2 * (track.nodes - track.up) - 2 * (track.along - 1)
+
+
+@lru_cache(maxsize=4096)
+def _endless(a: float, h: float, growth: float) -> tuple[int, int]:
+    """Return elements and unknowns of the half-space of steady passes."""
+    x, y = track_lines(a, h, growth)
+    return _held(len(x), len(y))
+
+
+def _held(columns: int, rows: int) -> tuple[int, int]:
+    """Return elements and unknowns of so many lines, x held at both sides, x and y at the bottom.
+
+    Its corners belong to both.
+    """
+    track = lattice(columns - 1, rows - 1, _ELEMENT)
     return track.elements, 2 * track.nodes - 2 * track.up - 2 * track.along + 2
 
 

@@ -2,219 +2,30 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
-from annotated_types import Interval, Unit
 
-from solver.errors import ModelError
-from solver.loading.walker import HALVINGS
 from solver.materials.material import Material
 from solver.mesh import grid, mapped, merged, with_middle
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
-from solver.scenes.parameters import ContactParameters, Friction, Length, described
 from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes
-from solver.scenes.schedule import Schedule
 
-_MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
-_SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
+if TYPE_CHECKING:
+    from skfem import Mesh
+
+    from solver.scenes.rolling_parameters import RollingParameters
+
 _HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
-_PERIOD = 6.0  # least length of a track without ends / Hertz half-width
-_LONGEST_REACH = 0.8  # of half the rim
-_MOST_COLUMNS = 3000
-_MOST_INCREMENTS = 100_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RollingParameters(ContactParameters):
-    """Parameters of rolling (N, mm, MPa; forces per mm of width)."""
-
-    yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
-        502.0, "uniaxial yield stress Re of the half-space"
-    )
-    load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(
-        1360.0 / 502.0, "peak pressure of the elastic Hertz contact / yield stress"
-    )
-    friction: Friction = described(0.3, "Coulomb friction coefficient")
-    traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
-        0.0,
-        "longitudinal force / full slip force: positive brakes, negative accelerates, 1 is a "
-        "locked wheel",
-    )
-    control: Literal["moment", "creepage"] = described(
-        "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
-    )
-    given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
-        0.0,
-        "1 + R d(rotation) / d(advance) of a wheel that turns as prescribed: positive brakes",
-    )
-    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "passes over the track")
-    direction: Literal["same", "back_and_forth"] = described(
-        "same", "whether every pass goes the same way, or the wheel rolls back"
-    )
-    heading: Literal["forward", "backward"] = described("forward", "way of the first pass along x")
-    load: Literal["contact", "hertz"] = described(
-        "contact", "a wheel in true contact, or a translated Hertz pressure"
-    )
-    radius: Length = described(334.92, "radius R of the wheel")
-    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
-        1.0, "Young's modulus of the wheel / that of the half-space"
-    )
-    wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
-        0.0, "angle by which the wheel is turned before it is set down"
-    )
-    track: Length = described(50.0, "length rolled in a pass, centred on x = 0")
-    periodic: bool = described(
-        False,
-        "whether the half-space, as deep as the track is long, repeats itself after each track "
-        "length, together with its loads: a track without ends",
-    )
-    element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
-        1.0, "element side along the track and at the surface"
-    )
-    growth: Annotated[float, Interval(ge=1.0, le=3.0), Unit("1")] = described(
-        1.15, "ratio of neighbouring element sides in depth"
-    )
-    advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
-        0.5, "advance of the axle in an increment"
-    )
-    advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
-        0.0,
-        "largest change of residual stress / yield stress by halving the advance: it is halved "
-        f"until the change is smaller, at most {HALVINGS} times; 0 keeps advance_step",
-    )
-    press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
-        8, "increments of setting down, and of driving"
-    )
-    unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(4, "increments of unloading")
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not see the class that dataclass(slots=True) makes
-        ContactParameters.__post_init__(self)
-        if self.traction and self.frictionless:
-            raise ModelError("traction", self.traction, "must be 0 without friction")
-        prescribed = self.control == "creepage"
-        if prescribed and self.load == "hertz":
-            raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
-        if self.shear_limit and self.load == "hertz":
-            allowed = "must be 0: load = hertz prescribes the shear"
-            raise ModelError("shear_limit", self.shear_limit, allowed)
-        if prescribed and self.traction:
-            raise ModelError("traction", self.traction, "must be 0 where creepage is given")
-        if self.given_creepage and not prescribed:
-            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
-        if self.element_size > self.half_width / 2:
-            raise ModelError(
-                "element_size", self.element_size,
-                f"must be at most {self.half_width / 2:.3g} mm, half the Hertz half-width of "
-                f"radius {self.radius:g} and load_ratio {self.load_ratio:.4g}",
-            )  # fmt: skip
-        if self.advance_step > self.track / 2:
-            raise ModelError(
-                "advance_step", self.advance_step,
-                f"must be at most {self.track / 2:g} mm, half the track",
-            )  # fmt: skip
-        columns = (self.track + 2 * self.margin) / self.element_size
-        if columns > _MOST_COLUMNS:
-            raise ModelError(
-                "element_size", self.element_size,
-                f"makes {columns:.0f} elements along a track of {self.track:g} mm and half-widths "
-                f"of {self.half_width:.4g} mm; at most {_MOST_COLUMNS}",
-            )  # fmt: skip
-        rolling = self.track / self.advance_step * 2 ** (HALVINGS if self.advance_tolerance else 0)
-        increments = self.passes * (2 * self.press_steps + rolling + self.unload_steps)
-        if increments > _MOST_INCREMENTS:
-            raise ModelError(
-                "passes", self.passes,
-                f"make {increments:.0f} increments of press_steps, advance_step and unload_steps; "
-                f"at most {_MOST_INCREMENTS}",
-            )  # fmt: skip
-        if self.periodic and self.track < _PERIOD * self.half_width:
-            raise ModelError(
-                "track", self.track,
-                f"must be at least {_PERIOD:g} Hertz half-widths when it repeats itself, "
-                f"{_PERIOD * self.half_width:.4g} mm",
-            )  # fmt: skip
-        longest = _LONGEST_REACH * math.pi * self.radius
-        if self.load == "contact" and self.reach > longest:
-            room = 2 * (longest - self.margin) / self._turning
-            raise ModelError(
-                *(("track", self.track) if room > 0 else ("load_ratio", self.load_ratio)),
-                f"the rim of a wheel of radius {self.radius:g} has room for a track of at most "
-                f"{math.floor(max(room, 0.0))} mm beside half-widths of {self.half_width:.4g} mm",
-            )  # fmt: skip
-
-    @property
-    def margin(self) -> float:
-        """Length beyond the end of the track that may come into contact [mm]."""
-        return max(_MARGIN, _SINKS * self.load_ratio) * self.half_width
-
-    @property
-    def reach(self) -> float:
-        """Half the length of the rim that may come into contact [mm]."""
-        return self.track / 2 * self._turning + self.margin
-
-    @property
-    def fine(self) -> float:
-        """Half the length of the half-space with elements of the given side [mm]."""
-        return self.track / 2 + (0.0 if self.periodic else self.margin)
-
-    @property
-    def guided(self) -> bool:
-        """Whether the rotation of the wheel is prescribed; otherwise its moment is."""
-        return self.traction == 1.0 or self.control == "creepage" or self.frictionless
-
-    @property
-    def _turning(self) -> float:
-        """Largest length of rim / length of track over which it passes."""
-        return 1 + max(0.0, -self.given_creepage)
-
-    @property
-    def peak_pressure(self) -> float:
-        """p0 of the elastic Hertz contact [MPa]."""
-        return self.load_ratio * self.yield_stress
-
-    @property
-    def contact_modulus(self) -> float:
-        """E* of wheel and half-space [MPa]."""
-        half = (1 - self.poisson_ratio**2) / self.youngs_modulus
-        return 1 / (half + half / self.wheel_stiffness)
-
-    @property
-    def half_width(self) -> float:
-        """Half-width a = 2 R p0 / E* of the elastic Hertz contact [mm]."""
-        return 2 * self.radius * self.peak_pressure / self.contact_modulus
-
-    @property
-    def force(self) -> float:
-        """Vertical force pi a p0 / 2 [N per mm of width]."""
-        return math.pi * self.half_width * self.peak_pressure / 2
-
-    @property
-    def schedule(self) -> Schedule:
-        """The timetable."""
-        first = 1 if self.heading == "forward" else -1
-        turn = -1 if self.direction == "back_and_forth" else 1
-        return Schedule(
-            n=self.passes,
-            track=self.track,
-            step=self.advance_step,
-            directions=tuple(first * turn**k for k in range(self.passes)),
-            driven=bool(self.traction) and self.traction != 1.0 and self.load == "contact",
-            press=self.press_steps,
-            release=self.unload_steps,
-        )
 
 
 def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
     """Return what `half_space_nodes` takes."""
     p, a = parameters, parameters.half_width
-    far = p.track if p.periodic else _HALF_SPACE * a
+    far = p.length if p.periodic else _HALF_SPACE * a
     return p.fine, far, a, p.element_size, p.growth, p.periodic
 
 
@@ -243,16 +54,31 @@ def _half_space(parameters: RollingParameters) -> Body:
     )
 
 
-def _wheel(parameters: RollingParameters) -> Body:
-    R, reach = parameters.radius, parameters.reach
-    angle, radius = wheel_nodes(R, reach, parameters.element_size)
+def _ring(R: float, reach: float, h: float, turned: float) -> Mesh:
+    """Return the mesh of a wheel above (0, 0), turned by an angle [rad]; see `wheel_nodes`."""
+    angle, radius = wheel_nodes(R, reach, h)
     ring = with_middle(grid(angle, radius), "rim", reach / R)
-    turned = parameters.wheel_turned
 
     def around(p: np.ndarray) -> np.ndarray:
         angle = p[0] - turned
         return np.stack([-p[1] * np.sin(angle), R - p[1] * np.cos(angle)])
 
+    return merged(mapped(ring, around))
+
+
+def wheel_body(axle: Axle, reach: float, h: float, material: Material) -> Body:
+    """Return a wheel on its axle; see `wheel_nodes`."""
+    return Body(
+        name="wheel",
+        mesh=_ring(axle.radius, reach, h, -axle.turned),
+        material=material,
+        supports={"bottom": "xy"},
+        axle=axle,
+    )
+
+
+def _wheel(parameters: RollingParameters) -> Body:
+    R, turned = parameters.radius, parameters.wheel_turned
     schedule = parameters.schedule
     position = schedule.position
     full_slip = parameters.friction * parameters.force
@@ -263,24 +89,20 @@ def _wheel(parameters: RollingParameters) -> Body:
         # without friction no moment turns the wheel: its rotation is prescribed as rolling
         turning = (1 - parameters.given_creepage) * position.value / R
         rotation = Amplitude(position.time, -turned - turning)
-    return Body(
-        name="wheel",
-        mesh=merged(mapped(ring, around)),
-        material=Material(
-            youngs_modulus=parameters.youngs_modulus * parameters.wheel_stiffness,
-            poisson_ratio=parameters.poisson_ratio,
-        ),
-        supports={"bottom": "xy"},
-        axle=Axle(
-            centre=(0.0, R),
-            radius=R,
-            force=schedule.load.times(parameters.force),
-            moment=schedule.drive.times(R * parameters.traction * full_slip),
-            position=position,
-            rotation=rotation,
-            turned=-turned,
-        ),
+    material = Material(
+        youngs_modulus=parameters.youngs_modulus * parameters.wheel_stiffness,
+        poisson_ratio=parameters.poisson_ratio,
     )
+    axle = Axle(
+        centre=(0.0, R),
+        radius=R,
+        force=schedule.load.times(parameters.force),
+        moment=schedule.drive.times(R * parameters.traction * full_slip),
+        position=position,
+        rotation=rotation,
+        turned=-turned,
+    )
+    return wheel_body(axle, parameters.reach, parameters.element_size, material)
 
 
 def model(parameters: RollingParameters) -> Model:

@@ -10,10 +10,11 @@ from typing import Any
 from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.loading.control import Control
+from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
 from solver.loading.walker import Settling, Walker
 from solver.model.model import Model
-from solver.results.audit import AUDIT, audit
+from solver.results.audit import AUDIT, Audit, audit
 from solver.results.look import Look, Output, Values
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
@@ -25,6 +26,10 @@ from solver.scenes.effort import Effort
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
 An exception it raises stops the work and reaches the caller unchanged."""
+
+
+Method = Callable[["Scene", Sequence[Any], Monitor], Iterator[Look]]
+"""Computes runs of a scene, given by their parameters in increasing order."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +52,8 @@ class Scene:
     view : (parameters) -> where results are taken
     outputs : functions that compute quantities of a complete run
     costs : functions that compute quantities of every run, also of one that failed
+    method : (parameters) -> how runs that differ in ``branch`` are computed; `by_increments`
+        where there is none
     trace : (samples, states of a lap) -> what is kept of each lap
     settling : (parameters) -> how increments are halved, or None to take those of the program
     effort : (parameters, values of ``branch``) -> the work of walking this path, told in
@@ -65,6 +72,7 @@ class Scene:
     outputs: tuple[Output, ...]
     costs: tuple[Output, ...]
     refining: frozenset[str] = frozenset()
+    method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
     settling: Callable[[Any], Settling | None] | None = None
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
@@ -78,19 +86,9 @@ class Scene:
         """
         kind = type(getattr(self.parameters(), self.branch))
         runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
-        system = System(self.model(runs[-1]))
-        samples = Samples(system, self.view(runs[-1]))
-        touch = touch_of(system, symmetric=samples.view.symmetric)
-        programs = [self.program(run) for run in runs]
-        walker = Walker(
-            system,
-            Control(),
-            trace=partial(self.trace, samples) if self.trace else None,
-            settling=self.settling(runs[-1]) if self.settling else None,
-            report=_counted(programs, monitor),
-        )
-        for run, outcome in zip(runs, walker.walk(programs), strict=True):
-            yield self.record(Look(parameters=run, samples=samples, touch=touch, outcome=outcome))
+        method = self.method(runs[-1]) if self.method else by_increments
+        for run, look in zip(runs, method(self, runs, monitor), strict=True):
+            yield replace(self.record(look), parameters=run)
         monitor(1.0)
 
     def record(self, look: Look) -> Record:
@@ -99,15 +97,15 @@ class Scene:
         if not look.complete:
             limit = isinstance(look.outcome.error, LimitLoad)
             status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
-            messages: tuple[str, ...] = (str(look.outcome.error),)
+            messages = (*look.notes, str(look.outcome.error))
             return self._labelled(look, status, messages, cost)
-        tally = look.outcome.tally
-        check = audit(look.system, look.loaded, look.unloaded, tally.dissipation)
+        check = look.check()
+        own = self.warnings(look) if self.warnings else ()
         figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
         return self._labelled(
             look,
             Status.OK if check.passed else Status.AUDIT_FAILED,
-            check.violations + check.warnings + (self.warnings(look) if self.warnings else ()),
+            check.violations + look.notes + check.warnings + own,
             {**cost, **figures, **_merged(look, self.outputs)},
         )
 
@@ -142,6 +140,30 @@ def _merged(look: Look, outputs: Sequence[Output]) -> Values:
             names.add(quantity.name)
             values[quantity] = value
     return values
+
+
+def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterator[Look]:
+    """Walk the programs of runs that differ in the branch parameter; yield each when known."""
+    last = runs[-1]
+    system = System(scene.model(last))
+    samples = Samples(system, scene.view(last))
+    touch = touch_of(system, symmetric=samples.view.symmetric)
+    programs = [scene.program(run) for run in runs]
+    walker = Walker(
+        system,
+        Control(),
+        trace=partial(scene.trace, samples) if scene.trace else None,
+        settling=scene.settling(last) if scene.settling else None,
+        report=_counted(programs, monitor),
+    )
+    view = samples.view
+    for run, outcome in zip(runs, walker.walk(programs), strict=True):
+
+        def check(outcome: Outcome = outcome) -> Audit:
+            loaded, unloaded = (outcome.points[name] for name in (view.loaded, view.unloaded))
+            return audit(system, loaded, unloaded, outcome.tally.dissipation)
+
+        yield Look(parameters=run, samples=samples, touch=touch, outcome=outcome, check=check)
 
 
 def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:

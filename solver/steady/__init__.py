@@ -7,8 +7,19 @@ solution of one nonlinear system. Before and after a pass the state is a functio
 
 from solver.steady.layers import Layers
 from solver.steady.passing import Pass
+from solver.steady.rim import Rim
 from solver.steady.rolling import rolling
-from solver.steady.track import Track, track_of
-from solver.steady.wheel import RollingWheel
+from solver.steady.track import Track, track_lines, track_of
+from solver.steady.wheel import RollingWheel, Touching
 
-__all__ = ["Layers", "Pass", "RollingWheel", "Track", "rolling", "track_of"]
+__all__ = [
+    "Layers",
+    "Pass",
+    "Rim",
+    "RollingWheel",
+    "Touching",
+    "Track",
+    "rolling",
+    "track_lines",
+    "track_of",
+]

@@ -56,6 +56,10 @@ class Layers:
         stress[:, [0, 2]] = -elasticity.biaxial_stress(self.plastic_strain[:, [0, 2]].T).T
         return stress
 
+    def displacement(self, elasticity: Elasticity) -> Array:
+        """Return the displacement (2,) of the surface against the depth [mm]."""
+        return np.array([self.advance, self.strain(elasticity)[:, 1] @ self.thickness])
+
     @property
     def advance(self) -> float:
         """Displacement of the surface along x against the depth [mm]."""

@@ -1,4 +1,4 @@
-"""What passes over a track, as nodal forces that may depend on the shape of its surface."""
+"""What passes over a track, as displacements that may depend on the shape of its surface."""
 
 from __future__ import annotations
 
@@ -16,32 +16,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Loading:
-    """A load on a track.
+    """A load on a track whose m unknowns its operator keeps.
 
     Attributes
     ----------
-    force : (n,) nodal forces [N]
-    along : its change (n,) for a change of the forces that stand for plastic strain (n,)
+    force : (n,) nodal forces, on all nodes of the track [N]
+    u : (m,) displacements with it [mm]
+    along : their change (m,) for a change of those without it (m,)
     """
 
     force: Array
+    u: Array
     along: Callable[[Array], Array]
 
 
 class Load(Protocol):
     """Something that passes over a track along +x."""
 
-    def on(self, flow: Array) -> Loading:
-        """Return the load on a track with the forces (n,) that stand for plastic strain."""
+    def on(self, u: Array) -> Loading:
+        """Return the load on a track that has these displacements (m,) without it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Nodal forces (n,) that depend on nothing [N]."""
+    """Nodal forces (n,) [N] that depend on nothing, and the displacements (m,) they make [mm]."""
 
     force: Array
+    u: Array
 
-    def on(self, flow: Array) -> Loading:
+    def on(self, u: Array) -> Loading:
         """See `Load`."""
-        del flow
-        return Loading(self.force, np.zeros_like)
+        return Loading(self.force, u + self.u, lambda change: change)

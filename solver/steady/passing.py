@@ -4,11 +4,12 @@ In the frame of the load nothing changes in time. With e the strains of what the
 displacements, at the points of the window, and ep(e) the plastic strain that material has gathered
 on its way along the rows, equilibrium is the fixed point
 
-    e = Phi(e) = S K^-1 (f + load(f)),   f = f(ep(e) - ep before)
+    e = Phi(e) = S load(u),   u = K^-1 f(ep(e) - ep before)
 
 with the elastic stiffness K, the same for every pass, and the nodal forces f that stand for plastic
-strain. A load may depend on the shape that these give the surface. Newton's equation
-(I - Phi') d = Phi(e) - e is solved by GMRES, Phi' by the derivative of the flow along the rows.
+strain. A load adds the displacements that it makes; it may depend on those without it. Newton's
+equation (I - Phi') d = Phi(e) - e is solved by GMRES, Phi' by the derivative of the flow along the
+rows.
 
 K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 """
@@ -21,32 +22,44 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from solver.errors import LimitLoad, NotConverged
+from solver.errors import LimitLoad, NotConverged, WindowTooSmall
 from solver.steady import sweep
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
     from solver.steady.load import Load, Loading
     from solver.steady.rows import Rows
+    from solver.steady.track import Track
 
     Array = NDArray[np.float64]
 
 TOLERANCE = 1e-4
 """Deviatoric strain of the residual, times 2 G, over the yield stress, at which a pass is found."""
 
-_QUIET = 1e-3
-"""Plastic strain at the ends of the window / yield strain, up to which it is large enough."""
+QUIET = 5e-3
+"""Plastic strain gathered at the ends of the window / yield strain, up to which it is large enough.
+"""
 _FORCING = 0.1
 """Relative error with which Newton's equation is solved."""
-_KRYLOV = 60
-"""Most solves for one step of Newton's."""
-_STEPS = 60
-_SHORTEST = 1 / 64
-_FLOWS = 0.5
-"""Plastic strain gathered in one pass above which a pass that is not found flows without limit."""
+_KRYLOV, _MOST_KRYLOV = 60, 240
+"""Most solves for one step of Newton's: at first, and where that is too few."""
+_STALLED = 0.98
+"""Ratio of residuals above which a step that was not solved to the end leads nowhere."""
+_FAR_FROM = 0.01
+"""Residual, over the first one, above which a pass is far from being found."""
+_STEPS = 40
+_SHORTEST = 1 / 32
+"""Least part of a Newton step."""
+_AWAY = 3.0
+"""Growth of the residual that a whole step may cause."""
+_FLOWS, _RUNS = 0.1, 5.0
+"""Plastic strain gathered in a pass, above which one that leads nowhere flows without limit, and
+above which any does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +72,10 @@ class Pass:
     strain : (n_rows, n_columns, 4) Mandel strain that the pass adds, at the points of the window
     plastic_strain : (n_rows, n_columns, 4) there
     accumulated : (n_rows, n_columns) there
+    last_steps : multiplier (n_rows, n_columns) and direction (n_rows, n_columns, 4) of flow in the
+        last increment before each column
     loading : the load on it
+    left_over : largest deviatoric strain of the residual
     steps, solves : of Newton's method, of the stiffness
     direction : 1 if the load goes along +x, -1 if it goes back
     """
@@ -69,7 +85,9 @@ class Pass:
     strain: Array
     plastic_strain: Array
     accumulated: Array
+    last_steps: tuple[Array, Array]
     loading: Loading
+    left_over: float
     steps: int
     solves: int
     direction: int = 1
@@ -97,7 +115,8 @@ class _Flow:
                 rule.yield_stress,
             ]
         )
-        self._rows = rows
+        self._rows, self._before = rows, before
+        self._yield_strain = material.yield_stress / material.youngs_modulus
         at_rest = before.strain(elasticity)[:, None]
         strain = np.concatenate([at_rest, at_rest + added], axis=1)
         start = before.plastic_strain, before.accumulated
@@ -115,15 +134,22 @@ class _Flow:
     def beyond(self) -> str:
         """Where the window is too small: rows yield at its end already; empty if nowhere.
 
-        Rows that an earlier pass left on the yield surface may flow by next to nothing there.
+        Rows that an earlier pass left on the yield surface flow a little there.
         """
-        ahead = self._path[:, 0, :, 4].max()
-        below = max(self._path[-1, :, :, 4].max(), self._closing[0][-1, 4])
-        quiet = _QUIET * self._law[4] / self._law[0]
+        before = self._before.accumulated
+        ahead = (self.total[:, 0] - before).max()
+        below = self.after.accumulated[-1] - before[-1]
+        quiet = QUIET * self._yield_strain
         return "ahead" if ahead > quiet else "below" if below > quiet else ""
 
+    @property
+    def last_steps(self) -> tuple[Array, Array]:
+        """Multiplier and direction of flow in the last increment before each column."""
+        last = self._path[:, :, -1]
+        return last[..., 4], last[..., :4]
+
     def along(self, added: Array) -> Array:
-        """Return the nodal forces (n,) for a change of the strains."""
+        """Return the nodal forces (m,) for a change of the strains."""
         plastic, total = sweep.flow_along(added, self._law, self._path)
         ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
         closed = sweep.close_along(*ends, self._law, *self._closing)
@@ -131,7 +157,7 @@ class _Flow:
 
 
 def passing(
-    rows: Rows,
+    track: Track,
     material: Material,
     load: Load,
     before: Layers,
@@ -144,7 +170,7 @@ def passing(
 
     Parameters
     ----------
-    rows : of the half-plane's points
+    track : the half-plane
     material : its law
     load : that passes
     before : state by depth
@@ -156,57 +182,103 @@ def passing(
     ------
     LimitLoad
         if plastic strain grows without bound
+    WindowTooSmall
+        if rows yield where the window begins, or the deepest one yields
     NotConverged
-        if no steady pass was found, or the window is too small for it
+        if no steady pass was found
     """
+    rows, solve = track.rows, track.operator.solve
     shape = (*rows.shape, 4)
     scale = np.sqrt(rows.weights)[..., None]
     double_shear = 2 * material.shear_modulus
-    solves = 0
+    solves, krylov = 0, _KRYLOV
 
-    def phi(added: Array) -> tuple[_Flow, Loading, Array]:
+    def at(added: Array) -> _At:
         nonlocal solves
         solves += 1
         flow = _Flow(rows, material, before, added, parts)
-        loading = load.on(flow.force)
-        return flow, loading, rows.strain(flow.force + loading.force) - added
+        loading = load.on(solve(flow.force))
+        residual = rows.strain(loading.u) - added
+        return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
 
-    added = rows.strain(load.on(np.zeros(rows.part.n)).force) if guess is None else guess
-    flow, loading, residual = phi(added)
-    size = np.linalg.norm(scale * residual)
+    nothing = np.zeros(len(track.operator.kept))
+    here = at(rows.strain(load.on(nothing).u) if guess is None else guess)
+    start = here.size
     for step in range(_STEPS):
-        if _deviation(residual) * double_shear < tolerance * material.yield_stress:
+        left_over = _deviation(here.residual)
+        if left_over * double_shear < tolerance * material.yield_stress:
+            flow = here.flow
             if flow.beyond:
-                raise NotConverged(f"the window is too small {flow.beyond} for a steady pass")
-            return Pass(before, flow.after, added, flow.plastic, flow.total, loading, step, solves)
+                raise WindowTooSmall(f"the window is too small {flow.beyond} for a steady pass")
+            return Pass(
+                before=before,
+                after=flow.after,
+                strain=here.added,
+                plastic_strain=flow.plastic,
+                accumulated=flow.total,
+                last_steps=flow.last_steps,
+                loading=here.loading,
+                left_over=left_over,
+                steps=step,
+                solves=solves,
+            )
 
-        def newton(scaled: Array, flow: _Flow = flow, loading: Loading = loading) -> Array:
+        def newton(scaled: Array, here: _At = here) -> Array:
             nonlocal solves
             solves += 1
             change = scaled.reshape(shape) / scale
-            force = flow.along(change)
-            made = rows.strain(force + loading.along(force))
+            made = rows.strain(here.loading.along(solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())
 
-        n = residual.size
+        n = here.residual.size
         found, missed = gmres(
             LinearOperator((n, n), matvec=newton, dtype=float),
-            (scale * residual).ravel(), rtol=_FORCING, restart=_KRYLOV, maxiter=1,
+            (scale * here.residual).ravel(), rtol=_FORCING, restart=krylov, maxiter=1,
         )  # fmt: skip
-        change = found.reshape(shape) / scale
-        length = 1.0
-        while True:
-            trial = added + length * change
-            flow, loading, residual_there = phi(trial)
-            there = np.linalg.norm(scale * residual_there)
-            if there < (1 - 1e-4 * length) * size or length <= _SHORTEST:
-                break
-            length /= 2
-        gathered = float((flow.total - before.accumulated[:, None]).max())
-        if missed and gathered > _FLOWS:
+        there = _along(at, here, found.reshape(shape) / scale)
+        gathered = float((there.flow.total - before.accumulated[:, None]).max())
+        stalled = krylov == _MOST_KRYLOV and missed and there.size > _STALLED * here.size
+        unsolved = here.size > _FAR_FROM * start and gathered > _FLOWS
+        if gathered > _RUNS or (stalled and unsolved):
             raise LimitLoad("plastic strain grows without bound in a steady pass")
-        added, residual, size = trial, residual_there, there
+        if missed:
+            krylov = min(2 * krylov, _MOST_KRYLOV)
+        here = there
     raise NotConverged(f"no steady pass was found in {_STEPS} steps of Newton's method")
+
+
+@dataclass(frozen=True, slots=True)
+class _At:
+    """Where Newton's method is: strains, what they make, the residual and its norm."""
+
+    added: Array
+    flow: _Flow
+    loading: Loading
+    residual: Array
+    size: float
+
+
+def _along(at: Callable[[Array], _At], here: _At, change: Array) -> _At:
+    """Return where a step leads: the whole of it, or a part that makes the residual smaller.
+
+    The residual has kinks where points begin to yield. Where every part makes it larger, the whole
+    step is taken, which leaves the kink, unless it leads far away.
+    """
+    tried = []
+    length = 1.0
+    while length >= _SHORTEST:
+        try:
+            there = at(here.added + length * change)
+        except NotConverged as error:  # no contact with such a shape
+            failure = error
+        else:
+            if there.size < (1 - 1e-4 * length) * here.size:
+                return there
+            tried.append(there)
+        length /= 2
+    if not tried:
+        raise failure
+    return tried[0] if tried[0].size < _AWAY * here.size else min(tried, key=lambda a: a.size)
 
 
 def _deviation(strain: Array) -> float:

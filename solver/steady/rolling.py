@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,7 @@ from solver.linear.threads import one_thread
 from solver.steady.passing import TOLERANCE, passing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     import numpy as np
     from numpy.typing import NDArray
@@ -29,9 +31,10 @@ REPEATED = 1e-5
 def rolling(
     track: Track,
     material: Material,
-    load: Load,
+    load: Load | Iterable[Load],
     directions: Iterable[int],
     *,
+    guess: NDArray[np.float64] | None = None,
     parts: int = 16,
 ) -> Iterator[Pass]:
     """Yield the passes of a load over a track that begins without plastic strain.
@@ -40,8 +43,9 @@ def rolling(
     ----------
     track : with the elastic constants of the material
     material : of the track
-    load : as it goes along +x
+    load : as it goes along +x; one for all passes, or one for each
     directions : for each pass, 1 along +x, -1 back
+    guess : strains (n_rows, n_columns, 4) that the first pass adds, as a coarser mesh has them
     parts : increments between two points of a row
 
     Raises
@@ -53,24 +57,26 @@ def rolling(
     NotConverged
         if a pass is not found
     """
-    rows, elasticity = track.rows, track.part.body.law.elasticity
-    if material.elasticity != elasticity:
+    if material.elasticity != track.elasticity:
         raise ModelError(
-            "material", material.elasticity, f"must have those of the track, {elasticity}"
+            "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
-    state: Layers = rows.virgin
-    guesses: dict[int, NDArray[np.float64]] = {}
-    for number, direction in enumerate(directions):
+    state: Layers = track.rows.virgin
+    guesses: dict[tuple[int, int], NDArray[np.float64]] = {}
+    loads = load if isinstance(load, Iterable) else itertools.repeat(load)
+    for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
+        which = id(own), direction
         with one_thread():
             found = passing(
-                rows,
+                track,
                 material,
-                load,
+                own,
                 state if direction == 1 else state.mirrored,
-                guesses.get(direction),
+                guesses.get(which, guess),
                 parts=parts,
                 tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
             )
         found = replace(found, direction=direction)
-        guesses[direction], state = found.strain, found.left
+        guesses[which] = guess = found.strain
+        state = found.left
         yield found

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import RegularGridInterpolator
 
 from solver.errors import ModelError
 from solver.steady.layers import Layers
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
-    from solver.fem.operators import Operator
+    from solver.steady.condensed import Condensed
 
     Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ class Rows:
     Parameters
     ----------
     part : the half-plane, made of quadrilaterals in rows; its top is y = 0
-    operator : the inverse of its elastic stiffness
+    operator : the inverse of its elastic stiffness, which keeps m unknowns: all of the window
     ahead, behind : the window reaches from x = -behind to x = ahead [mm]
     deep : and down to this depth [mm]
     interleaved : make two rows of each, of every other column
@@ -41,7 +42,7 @@ class Rows:
     Attributes
     ----------
     points : (n_rows, n_columns) their numbers
-    behind : (n_rows, n) numbers of the points behind the window, on the same rows
+    ahead, behind : (n_rows, n) numbers of the points before and behind the window, on these rows
     shape : n_rows, n_columns
     virgin : the state before any load
     weights : (n_rows, n_columns) volume of the points [mm3]
@@ -50,7 +51,7 @@ class Rows:
     def __init__(
         self,
         part: Discretisation,
-        operator: Operator,
+        operator: Condensed,
         *,
         ahead: float,
         behind: float,
@@ -58,7 +59,6 @@ class Rows:
         interleaved: bool = False,
     ) -> None:
         self.part = part
-        self._operator = operator
         middle = part.points.mean(axis=2)
         shallow = middle[1] > -deep
         inside = shallow & (middle[0] > -behind) & (middle[0] < ahead)
@@ -74,19 +74,26 @@ class Rows:
             plastic_strain=np.zeros((n_rows, 4)),
             accumulated=np.zeros(n_rows),
         )
+        self.ahead = _in_rows(part, shallow & (middle[0] > ahead), deep, interleaved)
         self.behind = downstream = _in_rows(
             part, shallow & (middle[0] < -behind), deep, interleaved
         )
         if len(downstream) != n_rows:
             raise ModelError("mesh", len(downstream), f"must have {n_rows} rows behind the window")
-        self._strain = self._strain_at(points)
+        self._strain = sparse.csr_array(self._strain_at(points)[:, operator.kept])
         self._force = self._force_of(points, self._strain)
         # all points behind the window have the plastic strain of their row
         same = sparse.kron(
             sparse.eye_array(n_rows), np.ones((downstream.shape[1], 1)), format="csr"
         )
         each = self._force_of(downstream, self._strain_at(downstream))
-        self._force_behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
+        self._behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
+        self._force_behind = operator.condense(self._behind.toarray())
+
+    @property
+    def every(self) -> NDArray[np.int64]:
+        """The points of each row all along the body (n_rows, n), in and beyond the window."""
+        return np.hstack([self.points, self.ahead, self.behind])
 
     def _length(self, points: NDArray[np.int64]) -> float:
         """Return the length of the window [mm]."""
@@ -112,13 +119,21 @@ class Rows:
             (B.ravel(), columns.ravel(), indptr), shape=(4 * points.size, part.n)
         )
 
-    def strain(self, force: Array) -> Array:
-        """Return the strains (n_rows, n_columns, 4) that nodal forces (n,) make."""
-        u = self._operator.solve(force)
+    def strain(self, u: Array) -> Array:
+        """Return the strains (n_rows, n_columns, 4) of displacements (m,)."""
         return np.asarray((self._strain @ u).reshape(*self.shape, 4))
 
+    def interpolated(self, strain: Array, rows: Rows) -> Array:
+        """Return strains (n_rows, n_columns, 4) here from those at the points of other rows."""
+        x, depth = (rows.part.points.reshape(2, -1)[k, rows.points] for k in (0, 1))
+        here = self.part.points.reshape(2, -1)[:, self.points]
+        along = RegularGridInterpolator(
+            (depth[::-1, 0], x[0, ::-1]), strain[::-1, ::-1], bounds_error=False, fill_value=None
+        )
+        return np.asarray(along((here[1], here[0])))
+
     def force(self, flow: Array, behind: Array) -> Array:
-        """Return the nodal forces (n,) that stand for plastic strain.
+        """Return the nodal forces (m,) that stand for plastic strain, as those kept feel them.
 
         Parameters
         ----------
@@ -126,6 +141,10 @@ class Rows:
         behind : (n_rows, 4) all the way behind it
         """
         return np.asarray(self._force @ flow.ravel() + self._force_behind @ behind.ravel())
+
+    def force_behind(self, behind: Array) -> Array:
+        """Return the forces on all nodes (n,) that stand for plastic strain behind the window."""
+        return np.asarray(self._behind @ behind.ravel())
 
 
 def _in_rows(

@@ -7,6 +7,7 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
@@ -16,13 +17,13 @@ from solver.mesh import graded, grid, with_middle
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
+from solver.steady.condensed import Condensed
 from solver.steady.load import Given
 from solver.steady.rows import Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.fem.operators import Operator
     from solver.fem.surface import Surface
     from solver.materials.elasticity import Elasticity
 
@@ -41,6 +42,26 @@ _FAR_GROWTH = 2.0
 _MOST_COLUMNS = 3000
 
 
+def track_lines(
+    half_width: float, element_size: float, growth: float, reach: float = 1.0
+) -> tuple[Array, Array]:
+    """Return where the lines x = const and y = const of the mesh of a `Track` are [mm]."""
+    a, h = half_width, element_size
+    ahead, behind = _window(a, h, reach)
+    window = h * np.arange(-behind, ahead + 1)
+    beyond = graded(_FAR * a, h, _FAR_GROWTH, _FAR * a / 2)[1:]
+    x = np.concatenate([window[0] - beyond[::-1], window, window[-1] + beyond])
+    near = graded(_DEEP * reach * a, h, growth, _DEEP * reach * a)
+    below = graded(_FAR * a, near[-1] - near[-2], _FAR_GROWTH, _FAR * a / 2)[1:]
+    return x, -np.concatenate([near, near[-1] + below])[::-1]
+
+
+def _window(a: float, h: float, reach: float) -> tuple[int, int]:
+    """Return the elements of the window before and behind the load."""
+    ahead, behind = (math.ceil(each * reach * a / h) for each in (_AHEAD, _BEHIND))
+    return ahead, behind
+
+
 class Track:
     """An elastic half-plane y < 0 with rows of points around a load at x = 0.
 
@@ -53,6 +74,7 @@ class Track:
     element_size : side of the elements in the window [mm]
     growth : ratio of neighbouring sides in depth
     elasticity : of the half-plane
+    reach : how much longer and deeper the window is than usual
     interleaved : make two rows of each, of every other column: their points are one element
         apart, as increments of one element would have it
 
@@ -69,57 +91,87 @@ class Track:
         growth: float,
         elasticity: Elasticity,
         *,
+        reach: float = 1.0,
         interleaved: bool = False,
     ) -> None:
         a, h = half_width, element_size
         if not 0 < h <= a / 2:
             raise ModelError("element_size", h, f"must be in (0, {a / 2:.3g}], half the half-width")
-        columns = math.ceil(_AHEAD * a / h) + math.ceil(_BEHIND * a / h)
-        if columns > _MOST_COLUMNS:
+        ahead, behind = _window(a, h, reach)
+        if (columns := ahead + behind) > _MOST_COLUMNS:
             allowed = f"makes {columns} elements along the track; at most {_MOST_COLUMNS}"
             raise ModelError("element_size", h, allowed)
         self.half_width = a
-        window = h * np.arange(-math.ceil(_BEHIND * a / h), math.ceil(_AHEAD * a / h) + 1)
-        beyond = graded(_FAR * a, h, _FAR_GROWTH, _FAR * a / 2)[1:]
-        x = np.concatenate([window[0] - beyond[::-1], window, window[-1] + beyond])
-        near = graded(_DEEP * a, h, growth, _DEEP * a)
-        below = graded(_FAR * a, near[-1] - near[-2], _FAR_GROWTH, _FAR * a / 2)[1:]
-        y = -np.concatenate([near, near[-1] + below])[::-1]
-        body = Body(
-            name="half_space",
-            mesh=with_middle(grid(x, y), "contact", _CONTACT * a),
-            material=Material(
-                youngs_modulus=elasticity.youngs_modulus, poisson_ratio=elasticity.poisson_ratio
-            ),
-            supports={"left": "x", "right": "x", "bottom": "xy"},
-        )
-        self.part = Discretisation(body)
+        self._lines = track_lines(a, h, growth, reach)
+        self._contact = _CONTACT * reach * a
+        self.part = Discretisation(_body(*self._lines, self._contact, elasticity))
+        self._window = h * ahead, h * behind, _DEEP * reach * a
         self.rows = Rows(
             self.part,
             self.operator,
-            ahead=window[-1],
-            behind=-window[0],
-            deep=near[-1],
+            ahead=h * ahead,
+            behind=h * behind,
+            deep=_DEEP * reach * a,
             interleaved=interleaved,
         )
 
     @cached_property
-    def operator(self) -> Operator:
-        """The inverse of the elastic stiffness."""
-        return self.part.operators([self.surface], "auto").elastic
+    def mirrored(self) -> Discretisation:
+        """The half-plane seen along -x."""
+        x, y = self._lines
+        return Discretisation(_body(-x[::-1], y, self._contact, self.elasticity))
+
+    @cached_property
+    def mirror(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The points, and the nodes, whose places those of `mirrored` have."""
+        own, seen = self.part, self.mirrored
+        both = ((own.points.reshape(2, -1), seen.points.reshape(2, -1)), (own.X, seen.X))
+        points, nodes = (
+            cKDTree(of.T).query((at * [[-1.0], [1.0]]).T)[1].astype(np.int64) for of, at in both
+        )
+        return points, nodes
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """Elastic constants."""
+        return self.part.body.law.elasticity
+
+    @cached_property
+    def operator(self) -> Condensed:
+        """The inverse of the elastic stiffness, which keeps the m unknowns of the window."""
+        x, y = self.part.X
+        ahead, behind, deep = self._window
+        edge = 1e-6 * deep
+        inside = (x < ahead + edge) & (x > -behind - edge) & (y > -deep - edge)
+        return Condensed(self.part, np.flatnonzero(inside))
+
+    @cached_property
+    def at_surface(self) -> NDArray[np.int64]:
+        """Where the unknowns of the surface are among those of the window."""
+        return self.operator.place(self.surface.dofs)
+
+    @cached_property
+    def response(self) -> Array:
+        """Displacements (m, n) of the window for forces on the n unknowns of the surface [mm/N]."""
+        forces = np.zeros((len(self.operator.kept), len(self.at_surface)))
+        forces[self.at_surface, np.arange(len(self.at_surface))] = 1.0
+        return self.operator.solve(forces)
 
     @cached_property
     def surface(self) -> Surface:
         """The part of the top that may come into contact, as a chain of edges downstream."""
         return extract(self.part, "contact")
 
-    def hertz(self, peak: float, shear_ratio: float = 0.0) -> Given:
+    def hertz(
+        self, peak: float, shear_ratio: float = 0.0, half_width: float | None = None
+    ) -> Given:
         """Return a Hertz pressure with proportional shear.
 
         Parameters
         ----------
         peak : p0 [MPa]
         shear_ratio : shear along +x, the way of the load, / pressure; positive when braking
+        half_width : of the pressure [mm]; that of the track by default
         """
 
         def always(value: float) -> Amplitude:
@@ -127,18 +179,34 @@ class Track:
 
         pressure = TravellingPressure(
             boundary="top",
-            half_width=self.half_width,
+            half_width=half_width or self.half_width,
             peak=peak,
             amplitude=always(1.0),
             position=always(0.0),
             shear_ratio=always(shear_ratio),
         )
-        return Given(travelling_forces(self.part, pressure, 0.0))
+        force = travelling_forces(self.part, pressure, 0.0)
+        return Given(force, self.operator.solve(self.operator.condense(force)))
 
 
-@lru_cache(maxsize=4)
+def _body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:
+    return Body(
+        name="half_space",
+        mesh=with_middle(grid(x, y), "contact", contact),
+        material=Material(
+            youngs_modulus=elasticity.youngs_modulus, poisson_ratio=elasticity.poisson_ratio
+        ),
+        supports={"left": "x", "right": "x", "bottom": "xy"},
+    )
+
+
+@lru_cache(maxsize=8)
 def track_of(
-    half_width: float, element_size: float, growth: float, elasticity: Elasticity
+    half_width: float,
+    element_size: float,
+    growth: float,
+    elasticity: Elasticity,
+    reach: float = 1.0,
 ) -> Track:
     """Return the track of these measures, made once in a process: see `Track`."""
-    return Track(half_width, element_size, growth, elasticity)
+    return Track(half_width, element_size, growth, elasticity, reach=reach)

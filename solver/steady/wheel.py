@@ -24,7 +24,7 @@ import numpy as np
 from solver.contact.complementarity import change_of_forces, solve_contact
 from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem
-from solver.errors import NotConverged
+from solver.errors import NotConverged, WindowTooSmall
 from solver.steady.load import Loading
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from solver.contact.problem import ContactSolution
     from solver.fem.surface import Surface
-    from solver.fem.wheel import Wheel
+    from solver.steady.rim import Rim
     from solver.steady.track import Track
 
     Array = NDArray[np.float64]
@@ -54,7 +54,11 @@ class Touching(Loading):
     normal, tangential : (n,) contact forces on the track, tangential ones along the surface
         against the way of the load [N]
     area : (n,) of the hats of the vertices [mm2]
+    gap : (n,) between track and rim, NaN where none faces the other [mm]
+    rim : (2, n_nodes) displacements of the rim's nodes in the frame of the hub [mm]
     status : (n,) of the contact points
+    friction : coefficient
+    bound : (n,) of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
     height : displacement of the axle [mm]
     """
@@ -63,7 +67,11 @@ class Touching(Loading):
     normal: Array
     tangential: Array
     area: Array
+    gap: Array
+    rim: Array
     status: NDArray[np.int64]
+    friction: float
+    bound: Array
     creepage: float
     height: float
 
@@ -103,10 +111,10 @@ class RollingWheel:
 
     Parameters
     ----------
-    track : that it rolls on; its lowest point is above x = 0
-    wheel : condensed to its rim, elements as long as those of the track
-    rim : its surface
+    track : that it rolls on
+    rim : with which it may touch
     friction : coefficient
+    limit : largest shear at any pressure [MPa]
     force : vertical force on the axle [N]
     drive : moment on the axle / radius, positive when braking [N]; None where `creepage` is given
     creepage : 1 + R d(rotation) / d(advance)
@@ -115,36 +123,33 @@ class RollingWheel:
     def __init__(
         self,
         track: Track,
-        wheel: Wheel,
-        rim: Surface,
+        rim: Rim,
         *,
         friction: float,
         force: float,
+        limit: float = np.inf,
         drive: float | None = None,
         creepage: float = 0.0,
     ) -> None:
-        self._track, self._rim, self._friction, self._force = track, rim, friction, force
+        self._track, self._rim, self._friction, self._force = track, rim.surface, friction, force
         self._drive = drive if friction else None
+        self._limit = limit
         self._creepage = creepage
         surface = track.surface
         self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
-        self._compliance = (
-            track.operator.compliance(surface.dofs, np.eye(len(surface.dofs))),
-            wheel.operators([], "auto").elastic.compliance(rim.dofs, np.eye(len(rim.dofs))),
-        )
-        self._flowed = _flowed(surface, +1), _flowed(rim, -1)
-        x, y = rim.X - wheel.centre[:, None]
-        self._turning = np.stack([-y, x], axis=1).ravel() / wheel.radius
-        self._up = np.tile([0.0, 1.0], rim.X.shape[1])
+        self._compliance = track.response[track.at_surface], rim.compliance
+        self._flowed = _flowed(surface, +1), _flowed(rim.surface, -1)
+        self._turning = rim.arms.T.ravel()
+        self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
         self._known = _Known(
             on_track=np.zeros(len(surface.dofs)),
-            on_wheel=np.zeros(len(rim.dofs)),
+            on_wheel=np.zeros(len(rim.surface.dofs)),
             height=0.0,
             tilt=0.0,
             status=np.full(len(surface.vertices), OPEN),
         )
 
-    def on(self, flow: Array) -> Touching:
+    def on(self, u: Array) -> Touching:
         """See `Load`.
 
         Raises
@@ -152,24 +157,34 @@ class RollingWheel:
         NotConverged
             if no contact forces are found
         """
-        operator, surface = self._track.operator, self._track.surface
-        geometry, problem, found = self._touch(operator.solve(flow)[surface.dofs])
+        track = self._track
+        surface, at, response = track.surface, track.at_surface, track.response
+        geometry, problem, found = self._touch(u[at])
 
-        def along(flow: Array) -> Array:
-            offset = geometry.moves[0] @ operator.solve(flow)[surface.dofs]
-            return self._nodal(geometry.rows[0].T @ change_of_forces(problem, found, offset))
+        def along(change: Array) -> Array:
+            forces = change_of_forces(problem, found, geometry.moves[0] @ change[at])
+            return np.asarray(change + response @ (geometry.rows[0].T @ forces))
 
         every = np.zeros((2, len(surface.vertices)))
         every[:, geometry.at] = found.forces.reshape(2, -1)
+        gap, bound = np.full((2, len(surface.vertices)), np.nan)
+        bound[geometry.at] = problem.bound(found.forces[: len(geometry.at)])
+        moved = problem.offset + problem.W @ found.forces + problem.A @ found.rigid
+        gap[geometry.at] = moved[: len(geometry.at)]
         turns = self._drive is not None
         return Touching(
             force=self._nodal(self._known.on_track),
+            u=u + response @ self._known.on_track,
             along=along,
             x=surface.X[0, surface.vertices],
             normal=every[0],
             tangential=every[1],
             area=geometry.area,
+            gap=gap,
+            rim=(self._compliance[1] @ self._known.on_wheel).reshape(-1, 2).T,
             status=self._known.status,
+            friction=self._friction,
+            bound=bound,
             creepage=float(found.rigid[1]) / self._length if turns else self._creepage,
             height=self._known.height,
         )
@@ -186,7 +201,7 @@ class RollingWheel:
             before, known = known, self._following(geometry, found)
             if np.abs(known.on_track - before.on_track).max() < _SETTLED * self._force:
                 if (known.status[[0, -1]] != OPEN).any():
-                    raise NotConverged("the contact reaches the ends of the surface")
+                    raise WindowTooSmall("the contact reaches the ends of the surface")
                 self._known = known
                 return geometry, problem, found
         raise NotConverged("the geometry of the contact was not found in a steady pass")
@@ -248,6 +263,7 @@ class RollingWheel:
             friction=np.full(n, self._friction),
             A=np.stack(motions, axis=1),
             balance=np.array(balance),
+            limit=None if np.isinf(self._limit) else self._limit * geometry.area[geometry.at],
         )
 
     def _nodal(self, force: Array) -> Array:

@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Unit
@@ -156,6 +157,8 @@ def _bare(hint: Any) -> Any:
         return _bare(get_args(hint)[0])
     if get_origin(hint) is Literal:
         return Union[*{type(option) for option in get_args(hint)}]
+    if get_origin(hint) in (Union, UnionType):
+        return Union[*map(_bare, get_args(hint))]
     return hint
 
 
@@ -171,6 +174,7 @@ def _describe(schema: Mapping[str, Any]) -> str:
         "string": "a text",
         "boolean": "true or false",
         "null": "left out",
+        "array": "a list",
     }
     limits = [
         f"{relation} {schema[key]:g}" for key, relation in _RELATIONS.items() if key in schema

@@ -10,9 +10,11 @@ import pytest
 
 from solver.contact.system import System
 from solver.scenes import SCENES, Scene
+from solver.scenes.rolling_steady import rim_of, track_for
 
 COARSE = {"smallest_element": 0.02, "growth": 2.0}
-ROUGH = {"element_size": 4.0, "growth": 1.5, "advance_step": 5.0}
+ROUGH = {"element_size": 4.0, "growth": 1.5, "advance_step": 5.0, "track": 50.0}
+ENDLESS: dict[str, Any] = {"element_size": 2.5, "growth": 1.5}
 CASES: list[tuple[str, dict[str, Any]]] = [
     ("punch", COARSE),
     ("punch", COARSE | {"element": "quad9", "friction": 0.3}),
@@ -47,12 +49,23 @@ def test_elements_and_unknowns_are_those_of_the_system(name: str, changes: dict[
     assert told.unknowns == system.n_unknowns
 
 
+@pytest.mark.parametrize("changes", [{}, {"load": "hertz", "load_ratio": 2.0, "growth": 1.2}])
+def test_those_of_a_track_without_ends_are_told_too(changes: dict[str, Any]) -> None:
+    parameters, effort = parts(SCENES["rolling"], ENDLESS | changes)
+    track = track_for(parameters)
+    wheel = rim_of(parameters).wheel.whole.body.mesh.nelements if not changes else 0
+    told = effort(parameters, [1])
+    assert told.elements == track.part.body.mesh.nelements + wheel
+    assert told.unknowns == len(track.part.free)
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "values"),
     [
         ("punch", COARSE | {"yield_stress": 300.0}, [0.5]),
         ("punch", COARSE | {"friction": 0.2, "unload_steps": 3}, [0.9, 0.6]),
         ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}, [1, 2]),
+        ("rolling", ENDLESS, [2, 5]),
         ("rolling", ROUGH | {"load": "hertz", "press_steps": 3, "advance_step": 8.0}, [1]),
     ],
 )

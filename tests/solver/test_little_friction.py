@@ -13,7 +13,8 @@ from solver.contact.complementarity import solve_contact
 from solver.contact.problem import OPEN, ContactProblem
 from solver.model.model import LEAST_FRICTION
 from solver.scenes.rolling import ROLLING
-from solver.scenes.rolling_model import RollingParameters, model
+from solver.scenes.rolling_model import model
+from solver.scenes.rolling_parameters import RollingParameters
 from tests.solver.test_contact_problem import instance
 
 COARSE = RollingParameters(

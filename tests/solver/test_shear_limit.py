@@ -11,8 +11,8 @@ from solver.mesh import grid
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch import model as punch_model
 from solver.scenes.rolling import ROLLING
-from solver.scenes.rolling_model import RollingParameters
 from solver.scenes.rolling_model import model as rolling_model
+from solver.scenes.rolling_parameters import RollingParameters
 
 YIELD_STRESS, SHARE, PRESSURE = 300.0, 0.1, 100.0
 STRENGTH = SHARE * YIELD_STRESS / np.sqrt(3)
@@ -96,14 +96,14 @@ def test_a_limit_between_elastic_bodies_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("parameters", "model"),
-    [(PunchParameters, punch_model), (RollingParameters, rolling_model)],
+    ("parameters", "model", "fields"),
+    [(PunchParameters, punch_model, {}), (RollingParameters, rolling_model, {"track": 50.0})],
     ids=["punch", "rolling"],
 )
-def test_scenes_take_a_limit_and_by_default_none(parameters, model):
-    (pair,) = model(parameters(shear_limit=0.9, friction=0.3)).contacts
+def test_scenes_take_a_limit_and_by_default_none(parameters, model, fields):
+    (pair,) = model(parameters(shear_limit=0.9, friction=0.3, **fields)).contacts
     assert (pair.shear_limit, pair.friction) == (0.9, 0.3)
-    (pair,) = model(parameters(friction=0.3)).contacts
+    (pair,) = model(parameters(friction=0.3, **fields)).contacts
     assert np.isinf(pair.shear_limit)
 
 

@@ -40,10 +40,13 @@ def records() -> list[Record]:
     coarse = {
         "punch": (COARSE, 0.4),
         "rolling": ({"element_size": 2.0, "advance_step": 2.0, "track": 8.0}, 1),
+        "rolling, endless": ({"element_size": 3.0}, 1),
     }
-    assert coarse.keys() == SCENES.keys() - {"fake"}, "every scene of the product is here"
+    names = {label: label.split(",")[0] for label in coarse}
+    assert set(names.values()) == SCENES.keys() - {"fake"}, "every scene of the product is here"
     found = []
-    for name, (parameters, value) in coarse.items():
+    for label, (parameters, value) in coarse.items():
+        name = names[label]
         scene = SCENES[name]
         found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)
     return found

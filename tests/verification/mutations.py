@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import solver.contact.system
+import solver.contact.interface
 import solver.loading.increment
 import solver.loading.step
 import solver.loading.stepper
@@ -52,9 +52,10 @@ class Mutation:
 
 def friction_times(factor: float) -> Fault:
     def fault(patch: Patch) -> None:
-        patch.setattr(
-            solver.contact.system, "effective_friction", lambda mu: factor * effective_friction(mu)
-        )
+        def scaled(mu: float) -> float:
+            return factor * effective_friction(mu)
+
+        patch.setattr(solver.contact.interface, "effective_friction", scaled)
 
     return fault
 
@@ -74,13 +75,13 @@ def motion_offset(gap: float = 0.0, slip: float = 0.0) -> Fault:
 
 
 def half_tangential_rows(patch: Patch) -> None:
-    pair = solver.contact.system.pair
+    pair = solver.contact.interface.pair
 
     def halved(*args: Any) -> Any:
         found = pair(*args)
         return replace(found, tangent=tuple(side / 2 for side in found.tangent))
 
-    patch.setattr(solver.contact.system, "pair", halved)
+    patch.setattr(solver.contact.interface, "pair", halved)
 
 
 def less_on_the_master(normal: float, tangential: float) -> Fault:
@@ -136,13 +137,13 @@ def overlooked_contact(patch: Patch) -> None:
 
 def master_stands_still(patch: Patch) -> None:
     """Gaps do not see the master move."""
-    pairing = solver.contact.system.Interface.pairing
+    pairing = solver.contact.interface.Interface.pairing
 
     def still(self: Any, u: Any) -> Any:
         number = self.sides[1][0]
         return pairing(self, tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u)))
 
-    patch.setattr(solver.contact.system.Interface, "pairing", still)
+    patch.setattr(solver.contact.interface.Interface, "pairing", still)
 
 
 # -- the law -----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from solver import SCENES, Status
-from solver.scenes.rolling_model import RollingParameters
+from solver.scenes.rolling_parameters import RollingParameters
 
 TABLE = Path(__file__).parents[2] / "data" / "studies" / "rolling-table.toml"
 CASES = tomllib.loads(TABLE.read_text(encoding="utf-8"))["sweep"]["case"]

@@ -11,7 +11,7 @@ from solver import SCENES, ModelError, Status
 from solver.errors import NotConverged
 from solver.loading.outcome import PathEnded
 from solver.loading.stepper import Stepper
-from solver.scenes.rolling_model import RollingParameters
+from solver.scenes.rolling_parameters import RollingParameters
 
 COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
 
@@ -144,7 +144,7 @@ def test_what_is_prescribed_is_told_as_contact_is(heading):
 )
 def test_bad_parameters_are_named(fields, name):
     with pytest.raises(ModelError) as caught:
-        RollingParameters(**fields)
+        RollingParameters(**{"track": 50.0} | fields)
     assert caught.value.field == name
 
 

@@ -11,5 +11,6 @@ from __future__ import annotations
 from solver.results.audit.cut import cut_force
 from solver.results.audit.figures import AUDIT
 from solver.results.audit.report import Audit, audit
+from solver.results.audit.steady import audit_pass
 
-__all__ = ["AUDIT", "Audit", "audit", "cut_force"]
+__all__ = ["AUDIT", "Audit", "audit", "audit_pass", "cut_force"]

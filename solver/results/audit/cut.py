@@ -11,11 +11,11 @@ from solver.fem.fields import Sampler, recovery
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.contact.system import System
+    from solver.results.samples import Bodies
 
 
 def cut_force(
-    system: System, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
+    system: Bodies, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
 ) -> float:
     """Return the normal force on a plane cut / the force that its area carries at yield.
 

@@ -39,6 +39,16 @@ _DECLARED = [
         "audit_contact_after_unloading",
         "force out of balance with the stress of the released bodies", "N",
     ),
+    declare(
+        "audit_inflow",
+        "plastic strain gathered where material enters the window of a steady pass / yield strain",
+    ),
+    declare("audit_outflow", "plastic strain gathered behind that window / yield strain"),
+    declare(
+        "audit_steadiness",
+        "difference between the strain that material meets in a steady pass and that of "
+        "equilibrium, its deviator times 2 G / yield stress",
+    ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),
 ]  # fmt: skip

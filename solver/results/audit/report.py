@@ -83,8 +83,9 @@ def audit(
         "audit_contact_after_unloading": left_on(released),
     }  # fmt: skip
     figures |= _strength(system, loaded) | _discretisation(system, states)
+    largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
     violations = _violations(system, figures, loaded, pairs)
-    return Audit(figures, violations, _warnings(figures, unloaded))
+    return Audit(figures, violations, warnings(figures, largest))
 
 
 def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tuple[float, float]:
@@ -153,34 +154,43 @@ def _violations(
         limits["audit_energy"] = _TURNING
     if any(body.travelling for body in system.model.bodies):
         limits["audit_reactions"] = _TRAVELLING
-    judged = [(name, figures[name], limit) for name, limit in limits.items()]
-    for pair in pairs:
-        judged += [(name, pair.figures[name], limit) for name, limit in pair.limits.items()]
-    broken = [
-        f"{name} = {figure:.2e} exceeds {limit:.2e}"
-        for name, figure, limit in judged
-        if not figure <= limit
-    ]
     yield_stress = max(
         (p.body.material.yield_stress for p in system.parts if not p.body.material.elastic),
         default=1.0,
     )
+    found = sum((_beyond(pair.figures, pair.limits) for pair in pairs), ())
+    return broken(figures, limits, yield_stress) + found
+
+
+def broken(
+    figures: Mapping[str, float], limits: Mapping[str, float], yield_stress: float
+) -> tuple[str, ...]:
+    """Return the conditions violated: figures beyond their limits, and negative dissipation."""
+    found = _beyond(figures, limits)
     if not figures["audit_dissipation"] >= -_LIMITS["audit_yield"] * yield_stress:
-        broken.append(f"plastic dissipation is negative: {figures['audit_dissipation']:.2e}")
-    return tuple(broken)
+        found += (f"plastic dissipation is negative: {figures['audit_dissipation']:.2e}",)
+    return found
 
 
-def _warnings(figures: Mapping[str, float], unloaded: Converged) -> tuple[str, ...]:
-    largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
-    warnings = []
+def _beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[str, ...]:
+    return tuple(
+        f"{name} = {figures[name]:.2e} exceeds {limit:.2e}"
+        for name, limit in limits.items()
+        if name in figures and not figures[name] <= limit
+    )
+
+
+def warnings(figures: Mapping[str, float], largest: float) -> tuple[str, ...]:
+    """Return warnings for figures, and for the largest equivalent plastic strain."""
+    found = []
     if largest > _LARGE_STRAIN:
-        warnings.append(
+        found.append(
             f"equivalent plastic strain reaches {largest:.0%}: small-strain theory is not accurate "
             "any more, reduce the load"
         )
-    shear = figures["audit_surface_shear"]
+    shear = figures.get("audit_surface_shear", 0.0)
     if shear > _SURFACE_SHEAR:
-        warnings.append(
+        found.append(
             f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
         )
-    return tuple(warnings)
+    return tuple(found)

@@ -13,7 +13,7 @@ import numpy as np
 from solver import LimitLoad, NotConverged, Record, Status, System
 from solver.contact.state import Converged, State
 from solver.scenes.rolling import ROLLING
-from solver.scenes.rolling_model import RollingParameters
+from solver.scenes.rolling_parameters import RollingParameters
 from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure, Scene, tells

@@ -266,7 +266,7 @@ def test_two_problems_in_one_data_set_are_refused_unless_one_is_chosen(tmp_path:
 @pytest.mark.parametrize(
     ("fixed", "told"),
     [
-        ({"track": 24.0}, "track 24, not 50"),
+        ({"track": 24.0}, "track 24, not endless"),
         ({"periodic": True}, "periodic True, not False"),
         ({"traction": 0.5, "growth": 1.5}, "traction 0.5, not 0;"),
     ],

@@ -1,0 +1,133 @@
+"""Contact pairs on the parts of a system."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.geometry import Pairing, pair
+from solver.contact.overlap import check_overlap, largest_overlap
+from solver.errors import ModelError
+from solver.fem import surface
+from solver.model.model import effective_friction
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.part import Part
+    from solver.fem.surface import Surface
+    from solver.model.model import ContactPair, Model
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """A contact pair on its two parts.
+
+    ``shear_strength`` is the largest shear it carries at any pressure [MPa].
+    """
+
+    slave: int
+    master: int
+    slave_surface: Surface
+    master_surface: Surface
+    friction: float
+    shear_strength: float
+    parts: tuple[Part, Part]
+    reach: float
+    reference: Pairing | None
+
+    @property
+    def sides(self) -> tuple[tuple[int, Part, Surface], tuple[int, Part, Surface]]:
+        """Slave and master: number, part and surface."""
+        return (
+            (self.slave, self.parts[0], self.slave_surface),
+            (self.master, self.parts[1], self.master_surface),
+        )
+
+    @property
+    def floating(self) -> bool:
+        """Whether contact has to hold a rigid motion of either part."""
+        return any(part.rigid.shape[1] for part in self.parts)
+
+    def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
+        """Return gap, area and derivative rows at displacements ``u``."""
+        motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
+        if self.reference is not None:
+            change = sum(
+                block @ motion.T.ravel()
+                for block, motion in zip(self.reference.normal, motions, strict=True)
+            )
+            return replace(self.reference, gap=self.reference.gap + change)
+        return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
+
+
+def surfaces_of(
+    model: Model, wholes: Mapping[str, Discretisation]
+) -> dict[tuple[str, str], Surface]:
+    """Return the surfaces of all pairs in the numbering of the whole bodies.
+
+    Where a surface continues as the surface of another pair, contact may pass on: no end is there.
+    """
+    found = {
+        side: surface.extract(wholes[side[0]], side[1])
+        for contact in model.contacts
+        for side in (contact.slave, contact.master)
+    }
+    ends = {side: chain.nodes[chain.vertices[[0, -1]]] for side, chain in found.items()}
+
+    def alone(side: tuple[str, str], node: int) -> bool:
+        return not any(node in ends[o] for o in ends if o[0] == side[0] and o != side)
+
+    out = {}
+    for side, chain in found.items():
+        start, end = (
+            on and alone(side, node)
+            for on, node in zip(chain.goes_on, ends[side].tolist(), strict=True)
+        )
+        out[side] = replace(chain, goes_on=(start, end))
+    return out
+
+
+def interface_of(
+    contact: ContactPair,
+    parts: tuple[Part, ...],
+    names: list[str],
+    surfaces: dict[tuple[str, str], Surface],
+) -> Interface:
+    """Return a contact pair on the parts ``names``, given all surfaces by body and boundary."""
+    sides = []
+    for side in (contact.slave, contact.master):
+        number, chain = names.index(side[0]), surfaces[side]
+        part = parts[number]
+        sides.append((number, part.surface(chain)))
+    (slave, slave_surface), (master, master_surface) = sides
+    both = (parts[slave], parts[master])
+    check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
+    reference, reach = None, float(np.ptp(both[0].body.mesh.p, axis=1).max())
+    if contact.sliding == "small":
+        at_rest = [np.zeros_like(chain.X) for _, chain in sides]
+        reach = largest_overlap(both[0].body, both[1].body)
+        reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
+        if not reference.area.any():
+            raise ModelError(
+                "contacts", (contact.slave, contact.master),
+                "these surfaces do not face each other: before loading no normal of the slave "
+                "meets the master from outside; check the boundaries and where the bodies are",
+            )  # fmt: skip
+    strength = min(part.body.material.shear_yield_stress for part in both)
+    return Interface(
+        slave=slave,
+        master=master,
+        slave_surface=slave_surface,
+        master_surface=master_surface,
+        friction=effective_friction(contact.friction),
+        shear_strength=contact.shear_limit * strength,
+        parts=both,
+        reach=reach,
+        reference=reference,
+    )

@@ -1,0 +1,143 @@
+"""The audit of a steady pass, in the frame of the load."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.fields import error_estimate
+from solver.materials.radial_return import SQRT23
+from solver.materials.state import PlasticState
+from solver.results.audit.plain import PlainBody
+from solver.results.audit.report import Audit, broken, warnings
+from solver.steady import Touching
+from solver.steady.fields import of_layers, under_load
+from solver.steady.passing import QUIET
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.material import Material
+    from solver.steady import Pass, Track
+
+    Array = NDArray[np.float64]
+
+_LIMITS = {
+    "audit_residual": 1e-6,
+    "audit_reactions": 5e-3,
+    "audit_law": 1e-6,
+    "audit_yield": 1e-6,
+    "audit_inflow": QUIET,
+    "audit_steadiness": 1e-4,
+}
+_FORCES = ("audit_tension", "audit_friction_excess", "audit_contact_after_unloading")
+_FORCE = 1e-6  # their limit / force level
+
+
+def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
+    """Check a steady pass: the state under load, what it leaves, and how material came there."""
+    plain, C = PlainBody(track.part), material.stiffness(4)
+    loaded, left = under_load(track, found), of_layers(track, found.after)
+    stress, residual = (C @ (f.strain - f.plastic.plastic_strain) for f in (loaded, left))
+    load = found.loading.force.reshape(-1, 2)
+    held = np.ones_like(load, dtype=bool)
+    held.ravel()[track.part.free] = False
+    lacking = plain.forces(stress) - load
+    level = float(np.abs(load).sum(axis=0).max()) or 1.0
+    way = _Way(track, material, found)
+    figures = {
+        "audit_residual": float(np.linalg.norm(lacking[~held])) / level,
+        "audit_reactions": _largest(abs((load + np.where(held, lacking, 0)).sum(axis=0))) / level,
+        "audit_law": way.misfit() / material.yield_stress,
+        "audit_yield": way.beyond() / material.yield_stress,
+        "audit_dissipation": way.dissipation(),
+        "audit_inflow": way.inflow(),
+        "audit_outflow": way.outflow(),
+        "audit_steadiness": 2 * material.shear_modulus * found.left_over / material.yield_stress,
+        "audit_contact_after_unloading": float(np.linalg.norm(plain.forces(residual)[~held])),
+        **_of_contact(material, found),
+    }
+    for name, of in (("loaded", stress), ("residual", residual)):
+        error, energy = error_estimate(track.part, of)
+        figures[f"audit_error_{name}"] = float(np.sqrt(error / energy)) if energy else 0.0
+    limits = _LIMITS | dict.fromkeys(_FORCES, _FORCE * level)
+    violations = broken(figures, limits, material.yield_stress)
+    return Audit(figures, violations, warnings(figures, float(left.plastic.accumulated.max())))
+
+
+class _Way:
+    """The way of material through the window: at each column, the last increment before it."""
+
+    def __init__(self, track: Track, material: Material, found: Pass) -> None:
+        self._material, self._found = material, found
+        rows = len(found.before.depth)
+        strain = found.before.strain(track.elasticity)[:, None] + found.strain
+        self._strain = np.moveaxis(strain, 2, 0).reshape(4, -1)
+        self._after = PlasticState(
+            np.moveaxis(found.plastic_strain, 2, 0).reshape(4, -1), found.accumulated.ravel()
+        )
+        multiplier, direction = found.last_steps
+        flow = np.moveaxis(multiplier[..., None] * direction, 2, 0).reshape(4, -1)
+        self._before = PlasticState(
+            self._after.plastic_strain - flow,
+            self._after.accumulated - SQRT23 * multiplier.ravel(),
+        )
+        self._stress = material.stiffness(4) @ (self._strain - self._after.plastic_strain)
+        self._shape = rows, -1
+
+    def misfit(self) -> float:
+        """Return how far the increments are from the law [MPa]."""
+        off = self._material.misfit(self._strain, self._stress, self._before, self._after)
+        return _largest(off)
+
+    def beyond(self) -> float:
+        """Return the stress beyond yield [MPa]."""
+        return _largest(self._material.yield_value(self._stress, self._after))
+
+    def dissipation(self) -> float:
+        """Return the least work that an increment turns into heat [N mm/mm3]."""
+        flow = self._after.plastic_strain - self._before.plastic_strain
+        back = self._material.back_stress(self._after)
+        return float(((self._stress - back) * flow).sum(axis=0).min())
+
+    def inflow(self) -> float:
+        """Return the plastic strain gathered in the first column / yield strain."""
+        found = self._found
+        return _largest(found.accumulated[:, 0] - found.before.accumulated) / self._yield_strain
+
+    def outflow(self) -> float:
+        """Return the plastic strain gathered behind the window / yield strain."""
+        found = self._found
+        return _largest(found.after.accumulated - found.accumulated[:, -1]) / self._yield_strain
+
+    @property
+    def _yield_strain(self) -> float:
+        return self._material.yield_stress / self._material.youngs_modulus
+
+
+def _largest(values: Array) -> float:
+    """Return the largest value, not below zero, or NaN where one is NaN."""
+    return float(np.maximum(values.max(), 0.0))
+
+
+def _of_contact(material: Material, found: Pass) -> dict[str, float]:
+    """Return the figures of the contact with a wheel, none without a wheel."""
+    touching = found.loading
+    if not isinstance(touching, Touching):
+        return {}
+    strength = float(
+        material.shear_strength(PlasticState(found.after.plastic_strain.T, found.after.accumulated))
+        .max()
+    )  # fmt: skip
+    area = np.where(touching.area > 0, touching.area, np.inf)
+    return {
+        "audit_tension": _largest(-touching.normal),
+        "audit_friction_excess": _largest(
+            np.abs(touching.tangential) - np.nan_to_num(touching.bound)
+        ),
+        "audit_surface_shear": _largest(np.abs(touching.tangential) / area) / strength,
+        "audit_friction_over_strength": touching.friction
+        * _largest(touching.normal / area)
+        / strength,
+    }

@@ -1,0 +1,154 @@
+"""A steady pass as samples and outputs see it: the states of one body in the frame of the load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.state import State
+from solver.fem.wheel import Hub
+from solver.materials.state import PlasticState, Response
+from solver.steady import Touching
+from solver.steady.fields import of_layers, under_load
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.steady import Pass, Track
+    from solver.steady.fields import Fields
+
+    Array = NDArray[np.float64]
+
+_LOADED, _RELEASED = 0.0, 1.0
+_MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """A state of the half-plane.
+
+    Attributes
+    ----------
+    state : displacements and internal variables; its time is 0 under the load and 1 after it
+    response : stress at the points
+    touching : the contact with a wheel as the load sees it, None where there is none
+    """
+
+    state: State
+    response: Response
+    touching: Touching | None
+
+
+class HalfPlane:
+    """The body of a track as one sees it who stands beside it.
+
+    Parameters
+    ----------
+    track : whose load goes along +x
+    way : 1 if the load really goes along +x, -1 if all is mirrored
+    """
+
+    def __init__(self, track: Track, way: int) -> None:
+        self.track, self.way = track, way
+        self._part = track.part if way == 1 else track.mirrored
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the bodies: this one."""
+        return (self._part.body.name,)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Displacement unknowns."""
+        return len(self._part.free)
+
+    def full(self, name: str) -> Discretisation:
+        """Return the body."""
+        del name
+        return self._part
+
+    def response(self, name: str, converged: Standing) -> Response:
+        """Return stress and internal variables at the points."""
+        del name
+        return converged.response
+
+    def displacement(self, name: str, state: State) -> Array:
+        """Return the displacements (n,) [mm]."""
+        del name
+        return state.u[0]
+
+    def axle(self, converged: Standing) -> Hub | None:
+        """Return the displacement of the axle, which stands at x = 0."""
+        touching = converged.touching
+        return None if touching is None else Hub(x=0.0, y=touching.height, arc=0.0, rotation=0.0)
+
+    def under_load(self, found: Pass) -> Standing:
+        """Return the state while the load of a pass is there."""
+        touching = found.loading if isinstance(found.loading, Touching) else None
+        return self._seen(_LOADED, under_load(self.track, found), touching)
+
+    def left_by(self, found: Pass) -> Standing:
+        """Return the state that a pass leaves."""
+        return self._seen(_RELEASED, of_layers(self.track, found.after), None)
+
+    def _seen(self, time: float, fields: Fields, touching: Touching | None) -> Standing:
+        u, strain, plastic = fields
+        stress = self.track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
+        if self.way == -1:
+            points, nodes = self.track.mirror
+            u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
+            stress = stress[:, points] * _MIRRORED
+            plastic = plastic.at(points)
+            plastic = PlasticState(plastic.plastic_strain * _MIRRORED, plastic.accumulated)
+        response = Response(stress, np.zeros((4, 4, 0)), plastic, np.zeros(0, dtype=bool))
+        return Standing(State(time, (u,), (plastic,), ()), response, touching)
+
+
+class SteadyContact:
+    """Pressure and shear of a wheel; see `solver.results.touch.Touch`.
+
+    Parameters
+    ----------
+    way : 1 if the wheel goes along +x, -1 if it goes back
+    """
+
+    def __init__(self, way: int) -> None:
+        self._way = way
+
+    def along(self, converged: Standing, x: Array) -> tuple[Array, Array, Array]:
+        """See `Touch`."""
+        touching = converged.touching
+        if touching is None:
+            return np.zeros_like(x), np.zeros_like(x), np.full_like(x, np.nan)
+        at, area = self._way * touching.x, np.where(touching.area > 0, touching.area, np.inf)
+        order = np.argsort(at)
+
+        def sampled(values: Array, beyond: float) -> Array:
+            return np.asarray(np.interp(x, at[order], values[order], left=beyond, right=beyond))
+
+        return (
+            sampled(touching.normal / area, 0.0),
+            sampled(-self._way * touching.tangential / area, 0.0),
+            sampled(touching.gap, np.nan),
+        )
+
+    def extent(self, converged: Standing) -> tuple[float, float]:
+        """See `Touch`."""
+        touching = converged.touching
+        assert touching is not None
+        closed = touching.normal > 0
+        pressure = touching.normal[closed] / touching.area[closed]
+        return float(np.ptp(touching.x[closed]) / 2), float(pressure.max())
+
+    def force(self, converged: Standing) -> float:
+        """See `Touch`."""
+        assert converged.touching is not None
+        return -self._way * float(converged.touching.tangential.sum())
+
+    def centre(self, converged: Standing) -> float:
+        """See `Touch`."""
+        del converged
+        return 0.0

@@ -1,0 +1,224 @@
+"""How the rolling scene passes over a track without ends: steadily, in the frame of the load."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
+from solver.loading.outcome import Outcome, Tally
+from solver.model.amplitude import Amplitude
+from solver.model.motion import TravellingPressure
+from solver.results.audit import audit_pass
+from solver.results.look import Look
+from solver.results.samples import Samples
+from solver.results.shakedown import ShakedownState
+from solver.results.steady import HalfPlane, SteadyContact
+from solver.results.touch import Prescribed
+from solver.scenes.passes import Trace, shakedown_of
+from solver.scenes.rolling_steady import steady_passes, track_for
+from solver.scenes.scene import by_increments
+from solver.steady import Touching
+from solver.tensors import to_tensor
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.results.audit import Audit
+    from solver.results.steady import Standing
+    from solver.results.touch import Touch
+    from solver.results.view import View
+    from solver.scenes.rolling_parameters import RollingParameters
+    from solver.scenes.scene import Monitor, Scene
+    from solver.steady import Pass, Track
+
+    Array = NDArray[np.float64]
+
+
+_REACHES = (1.0, 1.5, 2.5)
+"""Sizes of the window that are tried, over the usual one."""
+_BY_INCREMENTS = 6.0
+"""Track / half-width, where no steady pass is found: as long as that of the published tests."""
+
+
+def without_ends(
+    scene: Scene, runs: Sequence[RollingParameters], monitor: Monitor
+) -> Iterator[Look]:
+    """Roll pass after pass; yield each of the runs, which differ in the number of passes.
+
+    Where a pass yields or touches beyond the window of its mesh, all begins again with a larger
+    one. Where no steady pass is found, the runs that are left are rolled by increments.
+    """
+    waiting = list(runs)
+    rolled = _Rolled(scene, runs[-1])
+    for reach in _REACHES:
+        for look in rolled.looks(waiting, monitor, reach):
+            waiting.pop(0)
+            yield look
+        if not isinstance(rolled.error, WindowTooSmall):
+            break
+    if not isinstance(rolled.error, LimitLoad) and waiting and (others := _stepped(waiting)):
+        note = f"{rolled.error}: rolled by increments instead, over {others[0].length:.4g} mm"
+        for look in by_increments(scene, others, monitor):
+            yield replace(look, notes=(note,))
+        return
+    yield from map(rolled.look, waiting)
+
+
+def _stepped(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
+    """Return the runs on a track with ends, none if that would take too many increments."""
+    length = _BY_INCREMENTS * runs[-1].half_width
+    with suppress(ModelError):
+        return [
+            replace(run, track=length, until="passes", advance_step=run.element_size / 2)
+            for run in reversed(runs)
+        ][::-1]
+    return []
+
+
+class _Rolled:
+    """The passes of a path, as far as they were rolled."""
+
+    def __init__(self, scene: Scene, last: RollingParameters) -> None:
+        self._scene, self._last = scene, last
+        self._started, self._elsewhere = time.process_time(), 0.0
+        self.error: NotConverged | None = None
+
+    def _begin(self, reach: float) -> None:
+        """Begin with a window of so many times the usual size."""
+        last = self._last
+        view, track = self._scene.view(last), track_for(last, reach)
+        self._sides = {way: _Side(track, view, way)
+                       for way in set(last.directions)}  # fmt: skip
+        self._steps: list[int] = []
+        self._traces: list[Trace] = []
+        self._found: Pass | None = None
+
+    def looks(
+        self, runs: Sequence[RollingParameters], monitor: Monitor, reach: float
+    ) -> Iterator[Look]:
+        """Yield these runs, as many as there are passes for; ``error`` tells why not all."""
+        last, waiting = self._last, list(runs)
+        try:
+            self._begin(reach)
+        except ModelError:
+            if self.error is None:
+                raise
+            return  # such a window has too many elements: the error stays
+        self.error = None
+        try:
+            for number, found in enumerate(steady_passes(last, reach), start=1):
+                self._found = found
+                self._steps.append(max(found.steps, 1))
+                self._traces.append(self._sides[found.direction].trace(found))
+                monitor(min(number / last.passes, 0.99))
+                decided = last.until == "decided" and _decided(last, self._traces)
+                while waiting and (decided or waiting[0].passes == number):
+                    look = self.look(waiting.pop(0))
+                    paused = time.process_time()
+                    yield look
+                    self._elsewhere += time.process_time() - paused
+                if not waiting:
+                    return
+        except NotConverged as failure:
+            self.error = failure
+
+    def look(self, run: RollingParameters) -> Look:
+        """Return a run after the last pass found."""
+        seconds = time.process_time() - self._started - self._elsewhere
+        way = self._found.direction if self._found else self._last.directions[0]
+        tally = Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan)
+        touch = _touch(run.of_pass(max(len(self._steps) - 1, 0)), way)
+        return self._sides[way].look(run, touch, self._found, self._traces, tally, self.error)
+
+
+class _Side:
+    """What one sees of a load that goes one way along x: 1 or -1."""
+
+    def __init__(self, track: Track, view: View, way: int) -> None:
+        self._half_plane = HalfPlane(track, way)
+        self._samples = Samples(self._half_plane, view)
+
+    @cached_property
+    def _by_depth(self) -> Array:
+        """The matrix (n_depth, n_rows) from values of rows to a depth profile."""
+        body, rows = self._samples.view.profile_body, self._half_plane.track.rows
+        each = np.zeros((len(rows.every), self._half_plane.track.part.weights.size))
+        np.put_along_axis(each, rows.every, 1.0, axis=1)
+        return self._samples.along_depth(self._samples.of_points(body, each))[:, 0].T
+
+    def trace(self, found: Pass) -> Trace:
+        """Return what is kept of a pass."""
+        left, elasticity = found.left, self._half_plane.track.elasticity
+        strain = np.maximum(self._by_depth @ left.accumulated, 0.0)
+        stress, flow = (
+            to_tensor((self._by_depth @ values).T)[None]
+            for values in (left.stress(elasticity), left.plastic_strain)
+        )
+        touching = found.loading
+        return Trace(
+            stress=stress,
+            strain=strain[None],
+            flow=flow,
+            surface=left.displacement(elasticity)[:, None],
+            creepage=touching.creepage if isinstance(touching, Touching) else np.nan,
+            peak=float(left.accumulated.max()),
+        )
+
+    def look(
+        self, run: RollingParameters, touch: Touch,
+        found: Pass | None, traces: Sequence[Trace], tally: Tally,
+        error: NotConverged | None,
+    ) -> Look:  # fmt: skip
+        """Return a run after its last pass; ``error`` tells why there are no more."""
+        half_plane = self._half_plane
+        points: dict[str, Standing] = {}
+        view = self._samples.view
+        if found is not None:
+            loaded, left = half_plane.under_load(found), half_plane.left_by(found)
+            points = {name: left if name == view.unloaded else loaded for name in view.stages}
+        outcome = Outcome(
+            tally=tally, last=points.get(view.unloaded), points=points, traces=tuple(traces),
+            error=error,
+        )  # fmt: skip
+
+        def check() -> Audit:
+            assert found is not None
+            return audit_pass(half_plane.track, run.material(), found)
+
+        return Look(
+            parameters=run, samples=self._samples, touch=touch, outcome=outcome, check=check
+        )
+
+
+def _decided(parameters: RollingParameters, traces: Sequence[Trace]) -> bool:
+    """Tell whether the passes so far decide to which state they tend."""
+    state = shakedown_of(parameters, traces).state
+    return state is not ShakedownState.UNDECIDED
+
+
+def _touch(parameters: RollingParameters, way: int) -> Touch:
+    """Return what acts on the half-space."""
+    if parameters.load == "contact":
+        return SteadyContact(way)
+
+    def over_time(start: float, end: float) -> Amplitude:
+        return Amplitude(np.array([0.0, 1.0]), np.array([start, end]))
+
+    ratio = way * parameters.friction * parameters.traction
+    travelling = TravellingPressure(
+        boundary="top",
+        half_width=parameters.half_width,
+        peak=parameters.peak_pressure,
+        amplitude=over_time(1.0, 0.0),
+        position=over_time(0.0, 0.0),
+        shear_ratio=over_time(ratio, ratio),
+    )
+    return Prescribed(travelling, 0.0)

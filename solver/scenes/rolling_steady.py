@@ -1,0 +1,114 @@
+"""The steady passes of the rolling scene: track, rim and load of its parameters."""
+
+from __future__ import annotations
+
+import itertools
+from contextlib import suppress
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError, NotConverged
+from solver.linear.threads import one_thread
+from solver.loading.bearing import too_much_shear
+from solver.materials.material import Material
+from solver.model.amplitude import Amplitude
+from solver.model.model import effective_friction
+from solver.model.motion import Axle
+from solver.scenes.rolling_model import wheel_body
+from solver.steady import Rim, RollingWheel, rolling, track_of
+from solver.steady.passing import passing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from solver.scenes.rolling_parameters import RollingParameters
+    from solver.steady import Pass, Track
+    from solver.steady.load import Load
+
+    Array = NDArray[np.float64]
+
+_PARTS, _TOLERANCE = 4, 0.01
+"""How exactly a pass on a coarser mesh is solved, from which a finer one begins."""
+
+
+def steady_passes(parameters: RollingParameters, reach: float) -> Iterator[Pass]:
+    """Yield the passes, on a window of so many times the usual size."""
+    p = parameters
+    track = track_for(p, reach)
+    block = p.block  # equal passes are one object
+    made = {id(own): load_on(track, p, own) for own in block}
+    loads = itertools.cycle(made[id(own)] for own in block)
+    guess = _first_guess(p, reach)
+    yield from rolling(track, p.material(), loads, p.directions, guess=guess)
+
+
+def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
+    """Return the strains that the first pass adds, as a mesh twice as coarse has them.
+
+    Half of Newton's steps lead into the neighbourhood of the solution; there they cost a fifth.
+    """
+    p = parameters
+    with suppress(NotConverged, ModelError):
+        coarse = replace(p, element_size=2 * p.element_size, growth=p.growth**2)
+        track = track_for(coarse, reach)
+        with one_thread():
+            found = passing(
+                track, p.material(), load_on(track, coarse, coarse.of_pass(0)), track.rows.virgin,
+                _first_guess(coarse, reach), parts=_PARTS, tolerance=_TOLERANCE,
+            )  # fmt: skip
+        return track_for(p, reach).rows.interpolated(found.strain, track.rows)
+    return None
+
+
+def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
+    """Return the half-space, made once for all runs of a process with the same mesh."""
+    p = parameters
+    return track_of(p.widest.half_width, p.element_size, p.growth, p.material().elasticity, reach)
+
+
+def rim_of(parameters: RollingParameters) -> Rim:
+    """Return the rim of the wheel, condensed once for all runs of a process with the same wheel."""
+    p = parameters
+    elasticity = p.youngs_modulus * p.wheel_stiffness, p.poisson_ratio
+    return _rim(p.radius, p.widest.reach, p.element_size, *elasticity)
+
+
+@lru_cache(maxsize=4)
+def _rim(radius: float, reach: float, h: float, youngs_modulus: float, poisson_ratio: float) -> Rim:
+    still = Amplitude(np.array([0.0, 1.0]), np.zeros(2))
+    axle = Axle(centre=(0.0, radius), radius=radius, force=still, moment=still, position=still)
+    material = Material(youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio)
+    return Rim(wheel_body(axle, reach, h, material), "rim")
+
+
+def load_on(track: Track, run: RollingParameters, parameters: RollingParameters) -> Load:
+    """Return what passes over the track of a run, along +x, with the parameters of a pass.
+
+    Raises
+    ------
+    LimitLoad
+        if no surface bears its shear
+    """
+    p = parameters
+    if p.load == "hertz":
+        shear = p.friction * abs(p.traction) * p.peak_pressure
+        if (limit := too_much_shear(p.material(), shear)) is not None:
+            raise limit
+        return track.hertz(p.peak_pressure, p.friction * p.traction, p.half_width)
+    friction = effective_friction(p.friction)
+    creepage = 1.0 if p.traction == 1.0 else p.given_creepage
+    prescribed = p.traction == 1.0 or p.control == "creepage"
+    return RollingWheel(
+        track,
+        rim_of(run),
+        friction=friction,
+        force=p.force,
+        limit=p.shear_limit * p.material().shear_yield_stress or np.inf,
+        drive=None if prescribed else p.traction * friction * p.force,
+        creepage=creepage,
+    )

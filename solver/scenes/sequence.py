@@ -1,0 +1,49 @@
+"""Passes of different loads, one after the other: traffic."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+OF_A_PASS = ("load_ratio", "friction", "traction", "control", "given_creepage", "heading")
+"""Parameters that may differ from pass to pass."""
+_TIMES = "times"
+_MOST_TIMES = 1000
+
+
+def block_of(parameters: Any, sequence: Sequence[Mapping[str, float | str]]) -> tuple[Any, ...]:
+    """Return the parameters of each pass of a sequence; those of equal passes are one object.
+
+    Raises
+    ------
+    ModelError
+        naming the entry and its field
+    """
+    block: list[Any] = []
+    for number, entry in enumerate(sequence):
+        own: dict[str, Any] = dict(entry)
+        try:
+            times = _times(own.pop(_TIMES, 1))
+            for name, value in own.items():
+                if name not in OF_A_PASS:
+                    raise ModelError(
+                        name, value, f"must be one of {', '.join(OF_A_PASS)}, {_TIMES}"
+                    )
+            block += [replace(parameters, sequence=(), **own)] * times
+        except ModelError as error:
+            field = f"sequence[{number}].{error.field}"
+            raise ModelError(field, error.value, error.allowed) from None
+    return tuple(block)
+
+
+def _times(value: Any) -> int:
+    """Return how often an entry stands for a pass."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or value != int(value) or not 1 <= value <= _MOST_TIMES:
+        raise ModelError(_TIMES, value, f"must be an integer from 1 to {_MOST_TIMES}")
+    return int(value)

@@ -1,0 +1,53 @@
+"""The rim of an elastic wheel, condensed once for all loads that it carries."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.discretisation import Discretisation
+from solver.fem.surface import extract
+from solver.fem.wheel import Wheel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.model.body import Body
+
+    Array = NDArray[np.float64]
+
+
+class Rim:
+    """The part of a wheel's rim that may touch a track, in the frame of the hub.
+
+    Parameters
+    ----------
+    body : of the wheel, with its axle; its lowest point is above x = 0, and elements along the
+        rim are as long as those of the track
+    boundary : name of that part of the rim
+
+    Attributes
+    ----------
+    wheel : condensed to the rim
+    surface : the rim as a chain of edges
+    """
+
+    def __init__(self, body: Body, boundary: str) -> None:
+        whole = Discretisation(body)
+        chain = extract(whole, boundary)
+        self.wheel = Wheel(whole, [chain], "auto")
+        self.surface = self.wheel.surface(chain)
+
+    @property
+    def arms(self) -> Array:
+        """Displacements (2, n_nodes) by a unit of arc, by which the wheel turns / radius."""
+        x, y = self.surface.X - self.wheel.centre[:, None]
+        return np.stack([-y, x]) / self.wheel.radius
+
+    @cached_property
+    def compliance(self) -> Array:
+        """Displacements of the rim for forces on it (n, n), over its unknowns [mm/N]."""
+        dofs = self.surface.dofs
+        return self.wheel.operators([], "auto").elastic.compliance(dofs, np.eye(len(dofs)))

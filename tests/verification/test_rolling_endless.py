@@ -1,0 +1,252 @@
+"""Rolling on a track without ends: the records of steady passes, their symmetries, their audit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from solver import SCENES, ModelError, Status
+from solver.results.audit import audit_pass
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_steady import load_on, track_for
+from solver.steady import rolling
+
+COARSE = {"element_size": 2.0, "growth": 1.3}
+CASES = {
+    "free": {},
+    "driven": {"traction": -0.5, "hardening": "isotropic"},
+    "locked": {"traction": 1.0, "friction": 0.1},
+    "creeping": {"control": "creepage", "given_creepage": 0.002, "hardening": "kinematic"},
+    "limited": {"traction": 1.0, "friction": 0.5, "shear_limit": 0.5},
+    "frictionless": {"friction": 0.0},
+    "hertz": {"load": "hertz", "traction": 0.4},
+}
+
+
+@cache
+def records(passes=(1,), **fields):
+    """The records after so many passes."""
+    parameters = RollingParameters(**COARSE | fields | {"passes": max(passes)})
+    return tuple(SCENES["rolling"].path(parameters, passes, lambda share: None))
+
+
+def roll(**fields):
+    """The record of one run."""
+    of = records.__wrapped__ if "sequence" in fields else records  # tables cannot be cached
+    (record,) = of((fields.pop("passes", 1),), **fields)
+    assert record.status is Status.OK, record.message
+    return record
+
+
+def one_pass(**fields):
+    """The parameters, the track and the first pass of a run."""
+    parameters = RollingParameters(**COARSE | fields)
+    track = track_for(parameters)
+    (found,) = rolling(track, parameters.material(), load_on(track, parameters, parameters), [1])
+    return parameters, track, found
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_pass_has_the_results_of_a_run(case):
+    record = roll(**CASES[case])
+    assert record.scalars["increments"] == 1
+    assert record.scalars["max_plastic_strain"] > 1e-3
+    assert -700 < record.scalars["lowest_residual_x"] < -100
+    assert list(record.coordinates["station"]) == [0.0]
+    for name, (dims, values) in record.fields.items():
+        assert len(values.shape) == len(dims), name
+        gap = name in ("contact_gap", "pass_creepage")
+        assert gap or np.isfinite(values).all(), name
+
+
+def test_a_run_has_the_variables_of_one_on_a_track_with_ends():
+    length = RollingParameters(
+        element_size=4.0, advance_step=4.0, track=16.0, growth=1.5, traction=0.1
+    )
+    (other,) = SCENES["rolling"].path(length, [1], lambda share: None)
+    here = roll(traction=0.1)
+    assert here.fields.keys() == other.fields.keys()
+    for name, (dims, _) in here.fields.items():
+        assert dims == other.fields[name][0], name
+    lacks = other.scalars.keys() - here.scalars.keys()
+    assert {n for n in lacks if not n.startswith("audit_")} == {
+        "travel",
+        "advance",
+        "advance_error",
+    }
+    own = here.scalars.keys() - other.scalars.keys()
+    assert own == {"audit_inflow", "audit_outflow", "audit_steadiness"}
+
+
+def test_a_load_that_goes_back_leaves_the_mirror_image():
+    there, back = (roll(traction=0.5, heading=heading) for heading in ("forward", "backward"))
+    for name, (dims, values) in there.fields.items():
+        seen = back.fields[name][1].copy()
+        for along in {"x", "s"} & set(dims):
+            seen = np.flip(seen, dims.index(along))
+        if "component" in dims:
+            np.moveaxis(seen, dims.index("component"), 0)[3] *= -1
+        if name in ("contact_shear", "pass_net_shear", "pass_surface_advance"):
+            seen = -seen
+        np.testing.assert_allclose(values, seen, rtol=1e-9, atol=1e-9, err_msg=name)
+    for name in ("surface_residual_x", "first_row_residual_z", "creepage", "axle_height"):
+        assert there.scalars[name] == pytest.approx(back.scalars[name], rel=1e-9), name
+    assert there.scalars["longitudinal_force"] == -back.scalars["longitudinal_force"] > 100
+
+
+def test_the_state_is_uniform_along_the_track_and_that_of_the_profile():
+    record = roll()
+    residual = record.fields["residual_stress"][1]
+    assert np.ptp(residual, axis=2).max() < 1e-9
+    depth, y = record.coordinates["depth"], record.coordinates["y"]
+    profile = record.fields["residual_profile"][1][-1, 0]
+    for component in (0, 2):
+        on_map = np.interp(depth[:100], -y, residual[component, :, 0])
+        assert abs(on_map[2:] - profile[component, 2:100]).max() < 12.0  # between grid points
+    assert abs(profile[[1, 3]]).max() < 1e-9
+
+
+def test_under_load_the_map_shows_the_load():
+    record = roll(load="hertz", friction=0.0, load_ratio=1.0, element_size=0.5)
+    p0, a = 502.0, record.parameters.half_width
+    mises = record.fields["mises_loaded"][1]
+    at = np.unravel_index(mises.argmax(), mises.shape)
+    assert mises.max() == pytest.approx(0.558 * p0, rel=0.03)  # von Mises 0.558 p0 at 0.704 a
+    assert -record.coordinates["y"][at[0]] == pytest.approx(0.704 * a, abs=0.12 * a)
+    assert abs(record.coordinates["x"][at[1]]) < 0.15 * a
+    loaded = list(record.coordinates["stage"]).index("loaded")
+    s = record.coordinates["s"]
+    hertz = p0 * np.sqrt(np.maximum(1 - (s / a) ** 2, 0.0))
+    np.testing.assert_allclose(record.fields["contact_pressure"][1][loaded], hertz, atol=1e-9)
+    assert not record.fields["contact_pressure"][1][1 - loaded].any()
+
+
+def test_runs_of_one_path_are_those_computed_alone():
+    together = records((1, 2, 4), direction="back_and_forth")
+    assert [len(r.coordinates["pass"]) for r in together] == [1, 2, 4]
+    for record, passes in zip(together, (1, 2, 4), strict=True):
+        alone = roll(passes=passes, direction="back_and_forth")
+        for name, (_, values) in record.fields.items():
+            np.testing.assert_array_equal(values, alone.fields[name][1], err_msg=name)
+
+
+def test_passes_end_when_the_state_is_decided():
+    fields = {"load": "hertz", "hardening": "kinematic", "until": "decided"}
+    record = roll(passes=50, **fields)
+    assert record.scalars["shakedown_state"] == 2
+    assert 3 <= len(record.coordinates["pass"]) < 20
+    assert len(roll(passes=2, **fields).coordinates["pass"]) == 2, "not decided by then"
+
+
+def test_all_runs_with_one_mesh_share_it():
+    one, other = (RollingParameters(**COARSE, hardening=h) for h in ("none", "kinematic"))
+    assert track_for(one) is track_for(other)
+    assert track_for(replace(one, element_size=2.5)) is not track_for(one)
+
+
+@pytest.mark.parametrize(
+    ("broken", "figure"),
+    [
+        (lambda p: replace(p, plastic_strain=p.plastic_strain * 1.01), "audit_residual"),
+        (lambda p: replace(p, strain=p.strain * 1.01), "audit_law"),
+        (lambda p: replace(p, strain=p.strain * 1.05), "audit_yield"),
+        (lambda p: replace(p, loading=replace(p.loading, u=p.loading.u * 1.01)), "audit_residual"),
+        (
+            lambda p: replace(p, loading=replace(p.loading, force=p.loading.force * 0.9)),
+            "audit_residual",
+        ),
+        (lambda p: replace(p, accumulated=p.accumulated + 1e-4), "audit_inflow"),
+        (lambda p: replace(p, left_over=1e-4), "audit_steadiness"),
+        (
+            lambda p: replace(p, loading=replace(p.loading, normal=p.loading.normal - 1.0)),
+            "audit_tension",
+        ),
+        (
+            lambda p: replace(p, loading=replace(p.loading, tangential=p.loading.normal)),
+            "audit_friction_excess",
+        ),
+    ],
+)
+def test_the_audit_finds_what_is_wrong(broken, figure):
+    parameters, track, found = one_pass(traction=0.3)
+    assert audit_pass(track, parameters.material(), found).violations == ()
+    violations = audit_pass(track, parameters.material(), broken(found)).violations
+    assert any(text.startswith(figure) for text in violations), violations
+
+
+@pytest.mark.parametrize(
+    ("fields", "name"),
+    [
+        ({"periodic": True}, "periodic"),
+        ({"advance_tolerance": 0.01}, "advance_tolerance"),
+        ({"track": 50.0, "until": "decided"}, "until"),
+        ({"track": "long"}, "track"),
+        ({"track": 0.0}, "track"),
+        ({"element_size": 0.01}, "element_size"),
+    ],
+)
+def test_bad_input_is_named(fields, name):
+    with pytest.raises(ModelError, match=f"^{name} = "):
+        RollingParameters(**fields)
+
+
+def test_what_no_track_bears_is_a_limit():
+    (record,) = records((1,), load="hertz", traction=1.0, friction=0.6)
+    assert record.status is Status.LIMIT_LOAD
+    assert "load_ratio" in record.message
+
+
+# -- sequences of different loads ----------------------------------------------------------------
+
+
+def test_a_sequence_of_equal_passes_is_that_many_passes():
+    plain, sequence = roll(passes=3), roll(passes=3, sequence=({"times": 3},))
+    for name, (_, values) in plain.fields.items():
+        if not name.startswith("pass_"):
+            np.testing.assert_array_equal(values, sequence.fields[name][1], err_msg=name)
+
+
+def test_what_a_sequence_leaves_depends_on_its_order():
+    light, heavy = {"load_ratio": 2.2, "traction": 0.3}, {"load_ratio": 3.0, "times": 2}
+    one, other = (roll(passes=3, sequence=s) for s in ((light, heavy), (heavy, light)))
+    assert [len(r.coordinates["pass"]) for r in (one, other)] == [3, 3]
+    assert one.scalars["longitudinal_force"] == pytest.approx(0.0, abs=5.0)
+    alone = RollingParameters(**COARSE, load_ratio=2.2)
+    expected = 0.3 * 0.3 * alone.force
+    assert other.scalars["longitudinal_force"] == pytest.approx(expected, rel=0.05)
+    assert other.scalars["contact_half_width"] < 0.9 * one.scalars["contact_half_width"]
+    profiles = [r.fields["residual_profile"][1][-1, 0, 0] for r in (one, other)]
+    assert abs(profiles[0] - profiles[1]).max() > 20.0
+    creepage = other.fields["pass_creepage"][1]
+    assert creepage[2] > creepage[1] + 5e-4, "the last pass brakes"
+
+
+def test_the_state_is_that_of_the_whole_sequence():
+    """Back and forth in one block is a cycle of two passes, as it is without a sequence."""
+    ways = ({"heading": "forward"}, {"heading": "backward"})
+    plain = roll(passes=6, direction="back_and_forth")
+    block = roll(passes=6, sequence=ways)
+    for name in ("residual_profile", "pass_net_increment", "pass_plastic_increment"):
+        np.testing.assert_allclose(
+            plain.fields[name][1], block.fields[name][1], rtol=0.02, atol=1e-4, err_msg=name
+        )
+
+
+@pytest.mark.parametrize(
+    ("sequence", "name"),
+    [
+        (({"load_ratio": -1.0},), "sequence[0].load_ratio"),
+        (({}, {"radius": 100.0}), "sequence[1].radius"),
+        (({"times": 0},), "sequence[0].times"),
+        (({"times": 1.5},), "sequence[0].times"),
+        (({"traction": "much"},), "sequence[0].traction"),
+        (({"load_ratio": 0.3},), "sequence[0].element_size"),
+    ],
+)
+def test_bad_sequences_are_named(sequence, name):
+    with pytest.raises(ModelError) as caught:
+        RollingParameters(sequence=sequence)
+    assert caught.value.field == name
