@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 _INSIDE = 1e-7
 _NEWTON_STEPS = 6
-_CHUNK = 2_000_000
 
 
 def _monomials(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
@@ -85,17 +84,7 @@ def _locate(
     corners = part.X[:, part.basis.element_dofs]
     slack = 1e-9 + 0.05 * (corners.max(axis=1) - corners.min(axis=1))
     low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
-    pairs = []
-    step = max(1, _CHUNK // max(1, x.shape[1]))
-    for first in range(0, low.shape[1], step):
-        some = slice(first, first + step)
-        hit = np.logical_and.reduce(
-            [(x[k] >= low[k, some, None]) & (x[k] <= high[k, some, None]) for k in (0, 1)]
-        )
-        element, point = np.nonzero(hit)
-        pairs.append((element + first, point))
-    element = np.concatenate([p[0] for p in pairs])
-    point = np.concatenate([p[1] for p in pairs])
+    element, point = _within(low, high, x)
     if not len(element):
         return element, point, np.zeros((2, 0))
     local = _reference(part, element, x[:, point])
@@ -108,6 +97,20 @@ def _locate(
     _, first_of = np.unique(point[order], return_index=True)
     best = order[first_of]
     return element[best], point[best], np.clip(local[:, best], 0.0, 1.0)
+
+
+def _within(
+    low: NDArray[np.float64], high: NDArray[np.float64], x: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return box and point number of all points (2, n) in boxes with these corners (2, m)."""
+    order = np.argsort(x[0], kind="stable")
+    first = np.searchsorted(x[0, order], low[0], side="left")
+    count = np.searchsorted(x[0, order], high[0], side="right") - first
+    box = np.repeat(np.arange(len(count)), count)
+    at = np.arange(len(box)) - np.repeat(np.cumsum(count) - count, count)
+    point = order[first[box] + at]
+    inside = (x[1, point] >= low[1, box]) & (x[1, point] <= high[1, box])
+    return box[inside], point[inside]
 
 
 def _reference(

@@ -47,7 +47,7 @@ def _size(parameters: RollingParameters) -> tuple[int, int]:
     """
     p = parameters
     if p.endless:
-        elements, unknowns = _endless(p.widest.half_width, p.element_size, p.growth)
+        elements, unknowns = _endless(p.mesh_width, p.element_size, p.growth)
     else:
         elements, unknowns = _track(*track_grid(p))
     if p.load == "hertz":

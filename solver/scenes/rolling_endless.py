@@ -46,6 +46,8 @@ _REACHES = (1.0, 1.5, 2.5)
 """Sizes of the window that are tried, over the usual one."""
 _BY_INCREMENTS = 6.0
 """Track / half-width, where no steady pass is found: as long as that of the published tests."""
+_MOST_BY_INCREMENTS = 4
+"""Passes up to which this is done: each takes minutes."""
 
 
 def without_ends(
@@ -75,6 +77,8 @@ def without_ends(
 def _stepped(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
     """Return the runs on a track with ends, none if that would take too many increments."""
     length = _BY_INCREMENTS * runs[-1].half_width
+    if runs[-1].passes > _MOST_BY_INCREMENTS:
+        return []
     with suppress(ModelError):
         return [
             replace(run, track=length, until="passes", advance_step=run.element_size / 2)

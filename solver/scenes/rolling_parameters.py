@@ -252,6 +252,11 @@ class RollingParameters(ContactParameters):
         """Those of its passes with the widest contact."""
         return max(self.block, key=lambda own: own.half_width)
 
+    @property
+    def mesh_width(self) -> float:
+        """Half-width that an endless track is meshed for [mm]: runs of nearly the same share it."""
+        return float(f"{self.widest.half_width:.3g}")
+
     def of_pass(self, number: int) -> RollingParameters:
         """Return the parameters of a pass, counted from 0."""
         return self.block[number % len(self.block)]

@@ -19,7 +19,7 @@ from solver.model.model import effective_friction
 from solver.model.motion import Axle
 from solver.scenes.rolling_model import wheel_body
 from solver.steady import Rim, RollingWheel, rolling, track_of
-from solver.steady.passing import passing
+from solver.steady.passing import PARTS, passing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,15 +36,20 @@ _PARTS, _TOLERANCE = 4, 0.01
 """How exactly a pass on a coarser mesh is solved, from which a finer one begins."""
 
 
-def steady_passes(parameters: RollingParameters, reach: float) -> Iterator[Pass]:
-    """Yield the passes, on a window of so many times the usual size."""
+def steady_passes(
+    parameters: RollingParameters, reach: float = 1.0, parts: int = PARTS
+) -> Iterator[Pass]:
+    """Yield the passes, on a window of so many times the usual size.
+
+    ``parts`` are the increments from one point of a row to the next.
+    """
     p = parameters
     track = track_for(p, reach)
     block = p.block  # equal passes are one object
     made = {id(own): load_on(track, p, own) for own in block}
     loads = itertools.cycle(made[id(own)] for own in block)
     guess = _first_guess(p, reach)
-    yield from rolling(track, p.material(), loads, p.directions, guess=guess)
+    yield from rolling(track, p.material(), loads, p.directions, guess=guess, parts=parts)
 
 
 def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
@@ -68,7 +73,7 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
 def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
     """Return the half-space, made once for all runs of a process with the same mesh."""
     p = parameters
-    return track_of(p.widest.half_width, p.element_size, p.growth, p.material().elasticity, reach)
+    return track_of(p.mesh_width, p.element_size, p.growth, p.material().elasticity, reach)
 
 
 def rim_of(parameters: RollingParameters) -> Rim:

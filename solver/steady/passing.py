@@ -46,6 +46,8 @@ QUIET = 5e-3
 """
 _FORCING = 0.1
 """Relative error with which Newton's equation is solved."""
+PARTS = 16
+"""Increments between two points of a row: the error is of first order in their length."""
 _KRYLOV, _MOST_KRYLOV = 60, 240
 """Most solves for one step of Newton's: at first, and where that is too few."""
 _STALLED = 0.98
@@ -163,7 +165,7 @@ def passing(
     before: Layers,
     guess: Array | None = None,
     *,
-    parts: int = 16,
+    parts: int = PARTS,
     tolerance: float = TOLERANCE,
 ) -> Pass:
     """Return the steady pass of a load over a half-plane.

@@ -5,14 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
-from solver.errors import ModelError
+from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.linear.threads import one_thread
-from solver.steady.passing import TOLERANCE, passing
+from solver.steady.passing import PARTS, TOLERANCE, passing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     import numpy as np
     from numpy.typing import NDArray
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from solver.steady.load import Load
     from solver.steady.passing import Pass
     from solver.steady.track import Track
+
+    Array = NDArray[np.float64]
 
 EXACT_AFTER = 4
 REPEATED = 1e-5
@@ -34,8 +37,8 @@ def rolling(
     load: Load | Iterable[Load],
     directions: Iterable[int],
     *,
-    guess: NDArray[np.float64] | None = None,
-    parts: int = 16,
+    guess: Array | None = None,
+    parts: int = PARTS,
 ) -> Iterator[Pass]:
     """Yield the passes of a load over a track that begins without plastic strain.
 
@@ -62,21 +65,29 @@ def rolling(
             "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
     state: Layers = track.rows.virgin
-    guesses: dict[tuple[int, int], NDArray[np.float64]] = {}
+    guesses: dict[tuple[int, int], Array] = {}
     loads = load if isinstance(load, Iterable) else itertools.repeat(load)
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
         which = id(own), direction
+        solve = partial(
+            passing, track, material, own, state if direction == 1 else state.mirrored,
+            parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
+        )  # fmt: skip
         with one_thread():
-            found = passing(
-                track,
-                material,
-                own,
-                state if direction == 1 else state.mirrored,
-                guesses.get(which, guess),
-                parts=parts,
-                tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
-            )
+            found = _found(solve, guesses.get(which, guess))
         found = replace(found, direction=direction)
         guesses[which] = guess = found.strain
         state = found.left
         yield found
+
+
+def _found(solve: Callable[[Array | None], Pass], guess: Array | None) -> Pass:
+    """Return a pass from a guess, or from the elastic one where that leads nowhere."""
+    try:
+        return solve(guess)
+    except (LimitLoad, WindowTooSmall):
+        raise
+    except NotConverged:
+        if guess is None:
+            raise
+        return solve(None)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from tests.benchmarks import punch
-from tests.benchmarks.command import benchmark
+from tests.benchmarks.command import benchmark, of_hertz, of_punch, of_steady
 from tests.benchmarks.measure import timed
 
 TINY = punch.Plan(
@@ -29,7 +30,12 @@ TINY = punch.Plan(
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a benchmark of two Hertz meshes and four punches."""
     out = tmp_path_factory.mktemp("benchmarks")
-    benchmark(out, elements=("quad4",), meshes=(4, 8), plan=TINY, repeats=1)
+    problems = (
+        partial(of_hertz, out, ("quad4",), (4, 8), 1),
+        partial(of_punch, out, TINY, 1),
+        partial(of_steady, out, quick=True, repeats=1),
+    )
+    benchmark(out, problems)
     return out
 
 
@@ -47,6 +53,13 @@ def rows(path: Path) -> dict[str, dict[str, float]]:
 def test_errors_of_hertz_contact_halve_with_the_mesh(written: Path) -> None:
     hertz = rows(written / "hertz.csv")
     assert hertz["quad4 a/8"]["error of pressure"] < 0.6 * hertz["quad4 a/4"]["error of pressure"]
+
+
+def test_errors_of_a_steady_pass_fall_with_the_mesh(written: Path) -> None:
+    steady = rows(written / "steady.csv")
+    for depth in (2, 5):
+        coarse, fine = (steady[f"mesh {h} mm, free"][f"error of {depth} mm"] for h in (4, 2))
+        assert fine < 0.8 * coarse, depth
 
 
 def test_errors_of_the_punch_are_distances_from_its_references(written: Path) -> None:
@@ -74,6 +87,8 @@ def test_every_figure_and_the_table_are_written(written: Path) -> None:
         "punch-element.png",
         "punch-increments.png",
         "punch-solver.png",
+        "steady-free.png",
+        "steady-braking.png",
     }
     text = (written / "table.txt").read_text()
     assert "one thread used" in text

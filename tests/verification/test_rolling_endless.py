@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from solver import SCENES, ModelError, Status
+from solver.errors import NotConverged, WindowTooSmall
 from solver.results.audit import audit_pass
+from solver.scenes import rolling_endless, rolling_steady
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on, track_for
 from solver.steady import rolling
@@ -250,3 +252,42 @@ def test_bad_sequences_are_named(sequence, name):
     with pytest.raises(ModelError) as caught:
         RollingParameters(sequence=sequence)
     assert caught.value.field == name
+
+
+# -- where no steady pass is found ---------------------------------------------------------------
+
+
+def test_a_run_without_a_steady_pass_is_rolled_by_increments_and_says_so(monkeypatch):
+    def fails(parameters, reach):
+        raise NotConverged("no steady pass was found")
+        yield
+
+    monkeypatch.setattr(rolling_endless, "steady_passes", fails)
+    fields = {"element_size": 4.0, "growth": 1.5, "load": "hertz", "friction": 0.0}
+    record = roll(**fields, passes=1)
+    assert "no steady pass was found: rolled by increments instead, over 49." in record.message
+    assert record.parameters.endless
+    assert len(record.coordinates["station"]) == 3
+    assert record.scalars["travel"] == pytest.approx(6 * record.parameters.half_width)
+    (many,) = records((5,), **fields)
+    assert many.status is Status.NOT_CONVERGED, "that many would take too long"
+
+
+def test_a_pass_beyond_its_window_is_found_in_a_larger_one(monkeypatch):
+    tried = []
+    found = rolling_steady.steady_passes
+
+    def needs_more(parameters, reach):
+        tried.append(reach)
+        if reach < 2:
+            raise WindowTooSmall("the window is too small ahead for a steady pass")
+        yield from found(parameters, reach)
+
+    monkeypatch.setattr(rolling_endless, "steady_passes", needs_more)
+    larger = roll(load="hertz", friction=0.05)
+    assert tried == [1.0, 1.5, 2.5]
+    monkeypatch.undo()
+    usual = roll(load="hertz", friction=0.05, heading="forward", control="moment")
+    # the lines of the larger mesh lie at other depths
+    for name in ("surface_residual_x", "lowest_residual_x", "lowest_residual_z"):
+        assert larger.scalars[name] == pytest.approx(usual.scalars[name], abs=15.0), name

@@ -1,0 +1,101 @@
+"""A steady pass: free rolling and braking at 75 %, load ratio 2.71, no hardening.
+
+There is no closed form. The reference is a run of the finest mesh, sub-steps and window; each
+series changes one thing and leaves the rest as it is by default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_steady import steady_passes, track_for
+from solver.steady import Track
+from tests.benchmarks.measure import Point, timed
+
+BASE = RollingParameters()
+SERIES = ("mesh", "growth", "sub-steps")
+LOADS: Mapping[str, Mapping[str, float]] = {"free": {}, "braking": {"traction": 0.75}}
+DEPTHS = (0.0, 1.0, 2.0, 5.0)
+MEASURES = {
+    load: {f"{depth:g} mm": f"residual sigma_x at {depth:g} mm / Re" for depth in DEPTHS}
+    for load in LOADS
+}
+"""Residual stress, linear between rows of points, and from the first two to the surface."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One setting of a series: the parameters it changes, and the sub-steps between points."""
+
+    series: str
+    setting: str
+    changes: Mapping[str, float] = field(default_factory=dict)
+    parts: int = 16
+
+
+def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
+    """Return the reference, and the cases."""
+    return Case("reference", "finest", _mesh(1.0 if quick else 0.25), 32), tuple(_cases(quick))
+
+
+def _mesh(h: float) -> dict[str, float]:
+    return {"element_size": h, "growth": 1.15**h}
+
+
+def _cases(quick: bool) -> Iterator[Case]:
+    for h in (4.0, 2.0) if quick else (4.0, 2.0, 1.0, 0.5):
+        yield Case("mesh", f"{h:g} mm", _mesh(h))
+    if quick:
+        return
+    yield Case("default", "default")
+    for growth in (1.5, 1.3, 1.08):
+        yield Case("growth", f"{growth:g}", {"growth": growth})
+    for parts in (1, 2, 4, 8, 32):
+        yield Case("sub-steps", f"{parts}", {}, parts)
+
+
+def measure(quick: bool, repeats: int) -> list[Point]:
+    """Return a point for every case; errors are those against the reference."""
+    reference, cases = plan(quick)
+    exact = {load: _profile(_rolled(reference, load)) for load in LOADS}
+    points = []
+    for case in cases:
+        for load in LOADS:
+            _rolled(case, load)  # mesh, factor and rim are shared by all runs of a study
+            run = timed(lambda repeat, case=case, load=load: _rolled(case, load), repeats)
+            found = _profile(run.result)
+            names = list(MEASURES[load])
+            errors = np.abs(found - exact[load]) / BASE.yield_stress
+            points.append(
+                Point(
+                    problem="steady pass",
+                    series=case.series,
+                    setting=f"{case.setting}, {load}",
+                    unknowns=len(run.result[0].part.free),
+                    cpu=run.cpu,
+                    spread=run.spread,
+                    repeats=run.repeats,
+                    values=dict(zip(names, found.tolist(), strict=True)),
+                    errors=dict(zip(names, errors.tolist(), strict=True)),
+                )
+            )
+    return points
+
+
+def _rolled(case: Case, load: str) -> tuple[Track, np.ndarray, np.ndarray]:
+    """Return the track, and depth and residual sigma_x after the first pass."""
+    p = replace(BASE, **LOADS[load], **case.changes)
+    track = track_for(p)
+    (one,) = steady_passes(p, parts=case.parts)
+    return track, one.after.depth, one.after.stress(track.elasticity)[:, 0]
+
+
+def _profile(rolled: tuple[Track, np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the stress at the depths that are compared."""
+    _, depth, stress = rolled
+    surface = stress[0] - depth[0] * (stress[1] - stress[0]) / (depth[1] - depth[0])
+    return np.interp(DEPTHS, np.append(0.0, depth), np.append(surface, stress))
