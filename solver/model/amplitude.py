@@ -40,6 +40,11 @@ class Amplitude:
         if (np.diff(time) < 0).any():
             raise ModelError("amplitude.time", time.tolist(), "must not decrease")
 
+    @classmethod
+    def constant(cls, value: float) -> Amplitude:
+        """Return a number that is the same at all times."""
+        return cls(np.zeros(1), np.array([value]))
+
     def times(self, factor: float) -> Amplitude:
         """Return the amplitude with its values multiplied by ``factor``."""
         return Amplitude(self.time, factor * self.value)

@@ -123,15 +123,15 @@ class SteadyContact:
         touching = converged.touching
         if touching is None:
             return np.zeros_like(x), np.zeros_like(x), np.full_like(x, np.nan)
-        at, area = self._way * touching.x, np.where(touching.area > 0, touching.area, np.inf)
+        at = self._way * touching.x
         order = np.argsort(at)
 
         def sampled(values: Array, beyond: float) -> Array:
             return np.asarray(np.interp(x, at[order], values[order], left=beyond, right=beyond))
 
         return (
-            sampled(touching.normal / area, 0.0),
-            sampled(-self._way * touching.tangential / area, 0.0),
+            sampled(touching.pressure, 0.0),
+            sampled(-self._way * touching.shear, 0.0),
             sampled(touching.gap, np.nan),
         )
 
@@ -140,8 +140,7 @@ class SteadyContact:
         touching = converged.touching
         assert touching is not None
         closed = touching.normal > 0
-        pressure = touching.normal[closed] / touching.area[closed]
-        return float(np.ptp(touching.x[closed]) / 2), float(pressure.max())
+        return float(np.ptp(touching.x[closed]) / 2), float(touching.pressure.max())
 
     def force(self, converged: Standing) -> float:
         """See `Touch`."""

@@ -12,8 +12,6 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
-from solver.model.amplitude import Amplitude
-from solver.model.motion import TravellingPressure
 from solver.results.audit import audit_pass
 from solver.results.look import Look
 from solver.results.samples import Samples
@@ -23,7 +21,7 @@ from solver.results.touch import Prescribed
 from solver.scenes.passes import Trace, shakedown_of
 from solver.scenes.rolling_steady import steady_passes, track_for
 from solver.scenes.scene import by_increments
-from solver.steady import Touching
+from solver.steady import Touching, standing_pressure
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
@@ -82,8 +80,8 @@ def _stepped(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
     with suppress(ModelError):
         return [
             replace(run, track=length, until="passes", advance_step=run.element_size / 2)
-            for run in reversed(runs)
-        ][::-1]
+            for run in runs
+        ]
     return []
 
 
@@ -99,8 +97,7 @@ class _Rolled:
         """Begin with a window of so many times the usual size."""
         last = self._last
         view, track = self._scene.view(last), track_for(last, reach)
-        self._sides = {way: _Side(track, view, way)
-                       for way in set(last.directions)}  # fmt: skip
+        self._sides = {way: _Side(track, view, way) for way in set(last.directions)}
         self._steps: list[int] = []
         self._traces: list[Trace] = []
         self._found: Pass | None = None
@@ -136,31 +133,44 @@ class _Rolled:
 
     def look(self, run: RollingParameters) -> Look:
         """Return a run after the last pass found."""
+        found = self._found
+        side = self._sides[found.direction if found else self._last.directions[0]]
         seconds = time.process_time() - self._started - self._elsewhere
-        way = self._found.direction if self._found else self._last.directions[0]
-        tally = Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan)
-        touch = _touch(run.of_pass(max(len(self._steps) - 1, 0)), way)
-        return self._sides[way].look(run, touch, self._found, self._traces, tally, self.error)
+        points = side.states(found) if found else {}
+        outcome = Outcome(
+            tally=Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan),
+            last=points.get(side.samples.view.unloaded),
+            points=points,
+            traces=tuple(self._traces),
+            error=self.error,
+        )
+
+        def check() -> Audit:
+            assert found is not None
+            return audit_pass(side.half_plane.track, run.material(), found)
+
+        touch = _touch(run.of_pass(max(len(self._steps) - 1, 0)), side.half_plane.way)
+        return Look(parameters=run, samples=side.samples, touch=touch, outcome=outcome, check=check)
 
 
 class _Side:
     """What one sees of a load that goes one way along x: 1 or -1."""
 
     def __init__(self, track: Track, view: View, way: int) -> None:
-        self._half_plane = HalfPlane(track, way)
-        self._samples = Samples(self._half_plane, view)
+        self.half_plane = HalfPlane(track, way)
+        self.samples = Samples(self.half_plane, view)
 
     @cached_property
     def _by_depth(self) -> Array:
         """The matrix (n_depth, n_rows) from values of rows to a depth profile."""
-        body, rows = self._samples.view.profile_body, self._half_plane.track.rows
-        each = np.zeros((len(rows.every), self._half_plane.track.part.weights.size))
+        body, rows = self.samples.view.profile_body, self.half_plane.track.rows
+        each = np.zeros((len(rows.every), self.half_plane.track.part.weights.size))
         np.put_along_axis(each, rows.every, 1.0, axis=1)
-        return self._samples.along_depth(self._samples.of_points(body, each))[:, 0].T
+        return self.samples.along_depth(self.samples.of_points(body, each))[:, 0].T
 
     def trace(self, found: Pass) -> Trace:
         """Return what is kept of a pass."""
-        left, elasticity = found.left, self._half_plane.track.elasticity
+        left, elasticity = found.left, self.half_plane.track.elasticity
         strain = np.maximum(self._by_depth @ left.accumulated, 0.0)
         stress, flow = (
             to_tensor((self._by_depth @ values).T)[None]
@@ -176,30 +186,11 @@ class _Side:
             peak=float(left.accumulated.max()),
         )
 
-    def look(
-        self, run: RollingParameters, touch: Touch,
-        found: Pass | None, traces: Sequence[Trace], tally: Tally,
-        error: NotConverged | None,
-    ) -> Look:  # fmt: skip
-        """Return a run after its last pass; ``error`` tells why there are no more."""
-        half_plane = self._half_plane
-        points: dict[str, Standing] = {}
-        view = self._samples.view
-        if found is not None:
-            loaded, left = half_plane.under_load(found), half_plane.left_by(found)
-            points = {name: left if name == view.unloaded else loaded for name in view.stages}
-        outcome = Outcome(
-            tally=tally, last=points.get(view.unloaded), points=points, traces=tuple(traces),
-            error=error,
-        )  # fmt: skip
-
-        def check() -> Audit:
-            assert found is not None
-            return audit_pass(half_plane.track, run.material(), found)
-
-        return Look(
-            parameters=run, samples=self._samples, touch=touch, outcome=outcome, check=check
-        )
+    def states(self, found: Pass) -> dict[str, Standing]:
+        """Return the states of a pass by the names of the view's stages."""
+        loaded, left = self.half_plane.under_load(found), self.half_plane.left_by(found)
+        view = self.samples.view
+        return {name: left if name == view.unloaded else loaded for name in view.stages}
 
 
 def _decided(parameters: RollingParameters, traces: Sequence[Trace]) -> bool:
@@ -212,17 +203,5 @@ def _touch(parameters: RollingParameters, way: int) -> Touch:
     """Return what acts on the half-space."""
     if parameters.load == "contact":
         return SteadyContact(way)
-
-    def over_time(start: float, end: float) -> Amplitude:
-        return Amplitude(np.array([0.0, 1.0]), np.array([start, end]))
-
-    ratio = way * parameters.friction * parameters.traction
-    travelling = TravellingPressure(
-        boundary="top",
-        half_width=parameters.half_width,
-        peak=parameters.peak_pressure,
-        amplitude=over_time(1.0, 0.0),
-        position=over_time(0.0, 0.0),
-        shear_ratio=over_time(ratio, ratio),
-    )
-    return Prescribed(travelling, 0.0)
+    p, ratio = parameters, way * parameters.friction * parameters.traction
+    return Prescribed(standing_pressure(p.half_width, p.peak_pressure, ratio), 0.0)

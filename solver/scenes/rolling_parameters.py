@@ -14,6 +14,7 @@ from solver.loading.walker import HALVINGS
 from solver.scenes.parameters import ContactParameters, Friction, Length, described
 from solver.scenes.schedule import Schedule
 from solver.scenes.sequence import OF_A_PASS, block_of
+from solver.steady import MOST_COLUMNS, window_elements
 
 ENDLESS: Literal["endless"] = "endless"
 """What `track` is where passes are steady."""
@@ -23,8 +24,6 @@ _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz h
 _SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
 _PERIOD = 6.0  # least length of a track that repeats itself / Hertz half-width
 _LONGEST_REACH = 0.8  # of half the rim
-_ENDLESS_WIDTHS = 8.0  # length of an endless track whose elements have the given side / the same
-_MOST_COLUMNS = 3000
 _MOST_INCREMENTS = 100_000
 
 
@@ -130,20 +129,21 @@ class RollingParameters(ContactParameters):
             self._check_endless()
         else:
             self._check_length()
+        self._check_rim()
 
     def _check_endless(self) -> None:
         """Raise `ModelError` for what a track without ends cannot have."""
         for name, usual in (("periodic", False), ("advance_tolerance", 0.0)):
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")
-        columns = _ENDLESS_WIDTHS * self.half_width / self.element_size
-        if columns > _MOST_COLUMNS:
-            raise ModelError(
-                "element_size", self.element_size,
-                f"makes {columns:.0f} elements along half-widths of {self.half_width:.4g} mm; "
-                f"at most {_MOST_COLUMNS}",
-            )  # fmt: skip
-        block_of(self, self.sequence)
+        a, h = self.mesh_width, self.element_size
+        if h > a / 2:
+            allowed = f"must be at most {a / 2:.4g} mm, half the half-width that is meshed"
+            raise ModelError("element_size", h, allowed)
+        columns = sum(window_elements(a, h))
+        if columns > MOST_COLUMNS:
+            allowed = f"makes {columns} elements along a half-width of {a:g} mm; at most"
+            raise ModelError("element_size", h, f"{allowed} {MOST_COLUMNS}")
 
     def _check_length(self) -> None:
         """Raise `ModelError` for what a track of given length cannot have."""
@@ -155,11 +155,11 @@ class RollingParameters(ContactParameters):
                 f"must be at most {self.length / 2:g} mm, half the track",
             )  # fmt: skip
         columns = (self.length + 2 * self.margin) / self.element_size
-        if columns > _MOST_COLUMNS:
+        if columns > MOST_COLUMNS:
             raise ModelError(
                 "element_size", self.element_size,
                 f"makes {columns:.0f} elements along a track of {self.length:g} mm and half-widths "
-                f"of {self.half_width:.4g} mm; at most {_MOST_COLUMNS}",
+                f"of {self.half_width:.4g} mm; at most {MOST_COLUMNS}",
             )  # fmt: skip
         rolling = self.length / self.advance_step * 2 ** (HALVINGS if self.advance_tolerance else 0)
         increments = self.passes * (2 * self.press_steps + rolling + self.unload_steps)
@@ -175,6 +175,9 @@ class RollingParameters(ContactParameters):
                 f"must be at least {_PERIOD:g} Hertz half-widths when it repeats itself, "
                 f"{_PERIOD * self.half_width:.4g} mm",
             )  # fmt: skip
+
+    def _check_rim(self) -> None:
+        """Raise `ModelError` where the rim is too short for what may touch it."""
         longest = _LONGEST_REACH * math.pi * self.radius
         if self.load == "contact" and self.reach > longest:
             room = 0.0 if self.endless else 2 * (longest - self.margin) / self._turning
@@ -265,8 +268,8 @@ class RollingParameters(ContactParameters):
     def directions(self) -> tuple[int, ...]:
         """The way of each pass along x, 1 or -1."""
         turn = -1 if self.direction == "back_and_forth" else 1
-        ways = {"forward": 1, "backward": -1}
-        return tuple(ways[self.of_pass(k).heading] * turn**k for k in range(self.passes))
+        ways = [1 if own.heading == "forward" else -1 for own in self.block]
+        return tuple(ways[k % len(ways)] * turn**k for k in range(self.passes))
 
     @property
     def cycle(self) -> int:

@@ -85,7 +85,7 @@ def rim_of(parameters: RollingParameters) -> Rim:
 
 @lru_cache(maxsize=4)
 def _rim(radius: float, reach: float, h: float, youngs_modulus: float, poisson_ratio: float) -> Rim:
-    still = Amplitude(np.array([0.0, 1.0]), np.zeros(2))
+    still = Amplitude.constant(0.0)
     axle = Axle(centre=(0.0, radius), radius=radius, force=still, moment=still, position=still)
     material = Material(youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio)
     return Rim(wheel_body(axle, reach, h, material), "rim")
@@ -106,14 +106,12 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
             raise limit
         return track.hertz(p.peak_pressure, p.friction * p.traction, p.half_width)
     friction = effective_friction(p.friction)
-    creepage = 1.0 if p.traction == 1.0 else p.given_creepage
-    prescribed = p.traction == 1.0 or p.control == "creepage"
     return RollingWheel(
         track,
         rim_of(run),
         friction=friction,
         force=p.force,
         limit=p.shear_limit * p.material().shear_yield_stress or np.inf,
-        drive=None if prescribed else p.traction * friction * p.force,
-        creepage=creepage,
+        drive=None if p.guided else p.traction * friction * p.force,
+        creepage=1.0 if p.traction == 1.0 else p.given_creepage,
     )

@@ -44,6 +44,6 @@ def block_of(parameters: Any, sequence: Sequence[Mapping[str, float | str]]) -> 
 def _times(value: Any) -> int:
     """Return how often an entry stands for a pass."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or value != int(value) or not 1 <= value <= _MOST_TIMES:
+    if not number or not 1 <= value <= _MOST_TIMES or value != int(value):
         raise ModelError(_TIMES, value, f"must be an integer from 1 to {_MOST_TIMES}")
     return int(value)

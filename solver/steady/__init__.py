@@ -9,10 +9,18 @@ from solver.steady.layers import Layers
 from solver.steady.passing import Pass
 from solver.steady.rim import Rim
 from solver.steady.rolling import rolling
-from solver.steady.track import Track, track_lines, track_of
+from solver.steady.track import (
+    MOST_COLUMNS,
+    Track,
+    standing_pressure,
+    track_lines,
+    track_of,
+    window_elements,
+)
 from solver.steady.wheel import RollingWheel, Touching
 
 __all__ = [
+    "MOST_COLUMNS",
     "Layers",
     "Pass",
     "Rim",
@@ -20,6 +28,8 @@ __all__ = [
     "Touching",
     "Track",
     "rolling",
+    "standing_pressure",
     "track_lines",
     "track_of",
+    "window_elements",
 ]

@@ -52,10 +52,10 @@ class Rows:
         self,
         part: Discretisation,
         operator: Condensed,
-        *,
         ahead: float,
         behind: float,
         deep: float,
+        *,
         interleaved: bool = False,
     ) -> None:
         self.part = part

@@ -39,7 +39,7 @@ _FAR = 1600.0
 """Distance of the sides and the bottom / half-width. Half of it moves stress by 1 MPa in 500."""
 _FAR_GROWTH = 2.0
 """Ratio of neighbouring element sides outside the window: 0.1 MPa in 500, a sixth of the time."""
-_MOST_COLUMNS = 3000
+MOST_COLUMNS = 3000
 
 
 def track_lines(
@@ -47,7 +47,7 @@ def track_lines(
 ) -> tuple[Array, Array]:
     """Return where the lines x = const and y = const of the mesh of a `Track` are [mm]."""
     a, h = half_width, element_size
-    ahead, behind = _window(a, h, reach)
+    ahead, behind = window_elements(a, h, reach)
     window = h * np.arange(-behind, ahead + 1)
     beyond = graded(_FAR * a, h, _FAR_GROWTH, _FAR * a / 2)[1:]
     x = np.concatenate([window[0] - beyond[::-1], window, window[-1] + beyond])
@@ -56,7 +56,7 @@ def track_lines(
     return x, -np.concatenate([near, near[-1] + below])[::-1]
 
 
-def _window(a: float, h: float, reach: float) -> tuple[int, int]:
+def window_elements(a: float, h: float, reach: float = 1.0) -> tuple[int, int]:
     """Return the elements of the window before and behind the load."""
     ahead, behind = (math.ceil(each * reach * a / h) for each in (_AHEAD, _BEHIND))
     return ahead, behind
@@ -97,23 +97,16 @@ class Track:
         a, h = half_width, element_size
         if not 0 < h <= a / 2:
             raise ModelError("element_size", h, f"must be in (0, {a / 2:.3g}], half the half-width")
-        ahead, behind = _window(a, h, reach)
-        if (columns := ahead + behind) > _MOST_COLUMNS:
-            allowed = f"makes {columns} elements along the track; at most {_MOST_COLUMNS}"
+        ahead, behind = window_elements(a, h, reach)
+        if (columns := ahead + behind) > MOST_COLUMNS:
+            allowed = f"makes {columns} elements along the track; at most {MOST_COLUMNS}"
             raise ModelError("element_size", h, allowed)
         self.half_width = a
         self._lines = track_lines(a, h, growth, reach)
         self._contact = _CONTACT * reach * a
         self.part = Discretisation(_body(*self._lines, self._contact, elasticity))
         self._window = h * ahead, h * behind, _DEEP * reach * a
-        self.rows = Rows(
-            self.part,
-            self.operator,
-            ahead=h * ahead,
-            behind=h * behind,
-            deep=_DEEP * reach * a,
-            interleaved=interleaved,
-        )
+        self.rows = Rows(self.part, self.operator, *self._window, interleaved=interleaved)
 
     @cached_property
     def mirrored(self) -> Discretisation:
@@ -173,20 +166,27 @@ class Track:
         shear_ratio : shear along +x, the way of the load, / pressure; positive when braking
         half_width : of the pressure [mm]; that of the track by default
         """
-
-        def always(value: float) -> Amplitude:
-            return Amplitude(np.array([0.0, 1.0]), np.array([value, value]))
-
-        pressure = TravellingPressure(
-            boundary="top",
-            half_width=half_width or self.half_width,
-            peak=peak,
-            amplitude=always(1.0),
-            position=always(0.0),
-            shear_ratio=always(shear_ratio),
-        )
+        pressure = standing_pressure(half_width or self.half_width, peak, shear_ratio)
         force = travelling_forces(self.part, pressure, 0.0)
         return Given(force, self.operator.solve(self.operator.condense(force)))
+
+
+def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> TravellingPressure:
+    """Return a Hertz pressure at x = 0, which is there at time 0 and gone at time 1.
+
+    Parameters
+    ----------
+    half_width, peak : a [mm] and p0 [MPa]
+    shear_ratio : shear along +x / pressure
+    """
+    return TravellingPressure(
+        boundary="top",
+        half_width=half_width,
+        peak=peak,
+        amplitude=Amplitude(np.array([0.0, 1.0]), np.array([1.0, 0.0])),
+        position=Amplitude.constant(0.0),
+        shear_ratio=Amplitude.constant(shear_ratio),
+    )
 
 
 def _body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:

@@ -55,7 +55,6 @@ class Touching(Loading):
         against the way of the load [N]
     area : (n,) of the hats of the vertices [mm2]
     gap : (n,) between track and rim, NaN where none faces the other [mm]
-    rim : (2, n_nodes) displacements of the rim's nodes in the frame of the hub [mm]
     status : (n,) of the contact points
     friction : coefficient
     bound : (n,) of the tangential forces [N]
@@ -68,12 +67,24 @@ class Touching(Loading):
     tangential: Array
     area: Array
     gap: Array
-    rim: Array
     status: NDArray[np.int64]
     friction: float
     bound: Array
     creepage: float
     height: float
+
+    @property
+    def pressure(self) -> Array:
+        """Contact pressure at the vertices (n,), zero where none faces the rim [MPa]."""
+        return self._over_area(self.normal)
+
+    @property
+    def shear(self) -> Array:
+        """Shear on the track at the vertices (n,), against the way of the load [MPa]."""
+        return self._over_area(self.tangential)
+
+    def _over_area(self, force: Array) -> Array:
+        return np.divide(force, self.area, out=np.zeros_like(force), where=self.area > 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +192,6 @@ class RollingWheel:
             tangential=every[1],
             area=geometry.area,
             gap=gap,
-            rim=(self._compliance[1] @ self._known.on_wheel).reshape(-1, 2).T,
             status=self._known.status,
             friction=self._friction,
             bound=bound,

@@ -188,6 +188,8 @@ def test_the_audit_finds_what_is_wrong(broken, figure):
         ({"track": "long"}, "track"),
         ({"track": 0.0}, "track"),
         ({"element_size": 0.01}, "element_size"),
+        ({"radius": 335.5, "element_size": 4.151}, "element_size"),
+        ({"yield_stress": 3e4, "element_size": 10.0}, "load_ratio"),
     ],
 )
 def test_bad_input_is_named(fields, name):

@@ -15,10 +15,13 @@ from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from solver.contact.state import Converged
     from solver.contact.system import System
+    from solver.fem.discretisation import Discretisation
 
 _LARGE_STRAIN = 0.10
 _SURFACE_SHEAR = 1.1
@@ -32,7 +35,7 @@ _LIMITS = {
     "audit_energy": 1e-5,
 }
 _TURNING = 0.02  # energy error where the directions of contact turn within an increment
-_TRAVELLING = 5e-3  # of the force: the elements integrate a Hertz pressure, which has no slope
+TRAVELLING = 5e-3  # of the force: the elements integrate a Hertz pressure, which has no slope
 _FORCE = 1e-6  # of the force level
 
 
@@ -127,15 +130,22 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
 
 def _discretisation(system: System, states: tuple[Converged, Converged]) -> dict[str, float]:
     """Return the estimated relative errors of stress in the energy norm."""
-    out = {}
-    for kind, converged in zip(("loaded", "residual"), states, strict=True):
-        error, energy = 0.0, 0.0
-        for body in system.model.bodies:
-            stress = system.response(body.name, converged).stress
-            here = error_estimate(system.full(body.name), stress)
-            error, energy = error + here[0], energy + here[1]
-        out[f"audit_error_{kind}"] = float(np.sqrt(error / energy)) if energy else 0.0
-    return out
+    names = [body.name for body in system.model.bodies]
+    return {
+        f"audit_error_{kind}": estimated_error(
+            (system.full(name), system.response(name, converged).stress) for name in names
+        )
+        for kind, converged in zip(("loaded", "residual"), states, strict=True)
+    }
+
+
+def estimated_error(bodies: Iterable[tuple[Discretisation, NDArray[np.float64]]]) -> float:
+    """Return the estimated relative error of the stress of bodies in the energy norm."""
+    error, energy = 0.0, 0.0
+    for body, stress in bodies:
+        here = error_estimate(body, stress)
+        error, energy = error + here[0], energy + here[1]
+    return float(np.sqrt(error / energy)) if energy else 0.0
 
 
 def _violations(
@@ -144,22 +154,26 @@ def _violations(
     loaded: Converged,
     pairs: Sequence[AuditedPair],
 ) -> tuple[str, ...]:
-    scale = loaded.state.force_scale or 1.0
-    limits = _LIMITS | {
-        "audit_tension": _FORCE * scale,
-        "audit_friction_excess": _FORCE * scale,
-        "audit_contact_after_unloading": _FORCE * scale,
-    }
+    limits = limits_at(loaded.state.force_scale or 1.0)
     if any(contact.sliding == "finite" for contact in system.model.contacts):
         limits["audit_energy"] = _TURNING
     if any(body.travelling for body in system.model.bodies):
-        limits["audit_reactions"] = _TRAVELLING
+        limits["audit_reactions"] = TRAVELLING
     yield_stress = max(
         (p.body.material.yield_stress for p in system.parts if not p.body.material.elastic),
         default=1.0,
     )
     found = sum((_beyond(pair.figures, pair.limits) for pair in pairs), ())
     return broken(figures, limits, yield_stress) + found
+
+
+def limits_at(scale: float) -> dict[str, float]:
+    """Return the limits of figures that every kind of run has, for a force level [N]."""
+    return _LIMITS | {
+        "audit_tension": _FORCE * scale,
+        "audit_friction_excess": _FORCE * scale,
+        "audit_contact_after_unloading": _FORCE * scale,
+    }
 
 
 def broken(
@@ -176,7 +190,7 @@ def _beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[
     return tuple(
         f"{name} = {figures[name]:.2e} exceeds {limit:.2e}"
         for name, limit in limits.items()
-        if name in figures and not figures[name] <= limit
+        if not figures[name] <= limit
     )
 
 

@@ -6,14 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.fem.fields import error_estimate
 from solver.materials.radial_return import SQRT23
-from solver.materials.state import PlasticState
+from solver.materials.state import PlasticState, Response
 from solver.results.audit.plain import PlainBody
-from solver.results.audit.report import Audit, broken, warnings
+from solver.results.audit.report import (
+    TRAVELLING,
+    Audit,
+    broken,
+    estimated_error,
+    limits_at,
+    warnings,
+)
 from solver.steady import Touching
 from solver.steady.fields import of_layers, under_load
-from solver.steady.passing import QUIET
+from solver.steady.passing import QUIET, TOLERANCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,15 +30,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LIMITS = {
-    "audit_residual": 1e-6,
-    "audit_reactions": 5e-3,
-    "audit_law": 1e-6,
-    "audit_yield": 1e-6,
+    "audit_reactions": TRAVELLING,
     "audit_inflow": QUIET,
-    "audit_steadiness": 1e-4,
+    "audit_steadiness": TOLERANCE,
 }
-_FORCES = ("audit_tension", "audit_friction_excess", "audit_contact_after_unloading")
-_FORCE = 1e-6  # their limit / force level
 
 
 def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
@@ -56,12 +57,11 @@ def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
         "audit_outflow": way.outflow(),
         "audit_steadiness": 2 * material.shear_modulus * found.left_over / material.yield_stress,
         "audit_contact_after_unloading": float(np.linalg.norm(plain.forces(residual)[~held])),
+        "audit_error_loaded": estimated_error([(track.part, stress)]),
+        "audit_error_residual": estimated_error([(track.part, residual)]),
         **_of_contact(material, found),
     }
-    for name, of in (("loaded", stress), ("residual", residual)):
-        error, energy = error_estimate(track.part, of)
-        figures[f"audit_error_{name}"] = float(np.sqrt(error / energy)) if energy else 0.0
-    limits = _LIMITS | dict.fromkeys(_FORCES, _FORCE * level)
+    limits = {name: at for name, at in (limits_at(level) | _LIMITS).items() if name in figures}
     violations = broken(figures, limits, material.yield_stress)
     return Audit(figures, violations, warnings(figures, float(left.plastic.accumulated.max())))
 
@@ -71,7 +71,6 @@ class _Way:
 
     def __init__(self, track: Track, material: Material, found: Pass) -> None:
         self._material, self._found = material, found
-        rows = len(found.before.depth)
         strain = found.before.strain(track.elasticity)[:, None] + found.strain
         self._strain = np.moveaxis(strain, 2, 0).reshape(4, -1)
         self._after = PlasticState(
@@ -84,7 +83,6 @@ class _Way:
             self._after.accumulated - SQRT23 * multiplier.ravel(),
         )
         self._stress = material.stiffness(4) @ (self._strain - self._after.plastic_strain)
-        self._shape = rows, -1
 
     def misfit(self) -> float:
         """Return how far the increments are from the law [MPa]."""
@@ -97,9 +95,9 @@ class _Way:
 
     def dissipation(self) -> float:
         """Return the least work that an increment turns into heat [N mm/mm3]."""
-        flow = self._after.plastic_strain - self._before.plastic_strain
-        back = self._material.back_stress(self._after)
-        return float(((self._stress - back) * flow).sum(axis=0).min())
+        nothing = np.zeros((4, 4, 0)), np.zeros(0, dtype=bool)
+        response = Response(self._stress, nothing[0], self._after, nothing[1])
+        return float(self._material.dissipation(self._before, response).min())
 
     def inflow(self) -> float:
         """Return the plastic strain gathered in the first column / yield strain."""
@@ -130,14 +128,11 @@ def _of_contact(material: Material, found: Pass) -> dict[str, float]:
         material.shear_strength(PlasticState(found.after.plastic_strain.T, found.after.accumulated))
         .max()
     )  # fmt: skip
-    area = np.where(touching.area > 0, touching.area, np.inf)
     return {
         "audit_tension": _largest(-touching.normal),
         "audit_friction_excess": _largest(
             np.abs(touching.tangential) - np.nan_to_num(touching.bound)
         ),
-        "audit_surface_shear": _largest(np.abs(touching.tangential) / area) / strength,
-        "audit_friction_over_strength": touching.friction
-        * _largest(touching.normal / area)
-        / strength,
+        "audit_surface_shear": _largest(np.abs(touching.shear)) / strength,
+        "audit_friction_over_strength": touching.friction * _largest(touching.pressure) / strength,
     }
