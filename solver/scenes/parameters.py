@@ -6,7 +6,7 @@ import math
 import operator
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Annotated, Any, Literal
@@ -23,18 +23,31 @@ def described(default: Any, description: str) -> Any:
     return field(default=default, metadata={"description": description})
 
 
+def by_accuracy(description: str) -> Any:
+    """Return the field of a number that ``accuracy`` sets where none is given.
+
+    Its default is None; `MaterialParameters.usual` says the number, and no object is built without.
+    """
+    return described(None, f"{description}; left out, `accuracy` sets it")
+
+
 Ratio = Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")]
 Friction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
 HardeningRatio = Annotated[float, Interval(ge=0.0, le=0.9), Unit("1")]
 Fraction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
 Stress = Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")]
 Length = Annotated[float, Interval(gt=0.0, le=1e6), Unit("mm")]
+Accuracy = Literal["draft", "standard", "fine"]
 Poisson = Annotated[float, Interval(ge=0.0, le=0.4999), Unit("1")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaterialParameters:
-    """The material every scene asks for."""
+    """The material every scene asks for, and how accurate the answer is to be."""
+
+    accuracy: Accuracy = described(
+        "standard", "sets mesh and increments together, where they are not given"
+    )
 
     hardening: Hardening = described("none", "hardening rule of the yielding bodies")
     hardening_ratio: HardeningRatio = described(
@@ -47,6 +60,13 @@ class MaterialParameters:
 
     def __post_init__(self) -> None:
         check(self)
+        for name, value in self.usual().items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+
+    def usual(self) -> Mapping[str, float]:
+        """Return the values of the parameters that ``accuracy`` sets."""
+        return {}
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Material:
         """Return the material, with ``stiffness`` times Young's modulus."""
@@ -96,7 +116,7 @@ def check(parameters: Any) -> None:
         value = getattr(parameters, name)
         if isinstance(value, str) and value in choices:
             continue
-        if kinds is tuple:
+        if kinds is tuple or (value is None and name in _left_out(parameters.__class__)):
             continue
         if kinds is str:
             raise ModelError(name, value, "must be one of " + ", ".join(choices))
@@ -130,6 +150,12 @@ def _rules(kind: Any) -> tuple[_Rule, ...]:
         wanted = " or ".join([wanted, *choices])
         rules.append((item.name, kinds, wanted, choices, bounds))
     return tuple(rules)
+
+
+@cache
+def _left_out(kind: Any) -> frozenset[str]:
+    """Return the fields that need not be given and have no default of their own."""
+    return frozenset(item.name for item in fields(kind) if item.default is None)
 
 
 def _taken_apart(hint: Any) -> tuple[Any, tuple[str, ...], tuple[Any, ...]]:

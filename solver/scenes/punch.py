@@ -13,6 +13,7 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -35,7 +36,14 @@ from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.view import View
 from solver.scenes.effort import Effort, lattice
-from solver.scenes.parameters import ContactParameters, Length, Ratio, described
+from solver.scenes.parameters import (
+    Accuracy,
+    ContactParameters,
+    Length,
+    Ratio,
+    by_accuracy,
+    described,
+)
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -43,6 +51,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+_USUAL: Mapping[Accuracy, Mapping[str, float]] = {
+    "draft": {"smallest_element": 5e-3, "growth": 1.6, "load_step": 0.1},
+    "standard": {"smallest_element": 5e-4, "growth": 1.4, "load_step": 0.05},
+    "fine": {"smallest_element": 1e-4, "growth": 1.2, "load_step": 0.025},
+}
+"""What an accuracy sets; errors: docs/accuracy.md."""
 _LARGEST = 0.08  # of a, under the punch
 _PUNCH_LARGEST = 0.25
 _MOST_ELEMENTS = 60_000
@@ -67,17 +81,17 @@ class PunchParameters(ContactParameters):
         1.0, "Young's modulus of the punch / that of the half-plane"
     )
     elastic_punch: bool = described(False, "whether the punch never yields")
-    smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = described(
-        5e-4, "smallest element side, at the corner / a"
+    smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = by_accuracy(
+        "smallest element side, at the corner / a"
     )
-    growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = described(
-        1.4, "ratio of neighbouring element sides away from the corner"
+    growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = by_accuracy(
+        "ratio of neighbouring element sides away from the corner"
     )
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
         "quad8", "element of both bodies"
     )
-    load_step: Annotated[float, Interval(ge=1e-4, le=1.0), Unit("1")] = described(
-        0.05, "largest increment of load_ratio"
+    load_step: Annotated[float, Interval(ge=1e-4, le=1.0), Unit("1")] = by_accuracy(
+        "largest increment of load_ratio"
     )
     unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(5, "increments of unloading")
 
@@ -92,6 +106,10 @@ class PunchParameters(ContactParameters):
                 f"makes {elements} elements with growth {self.growth:g}; at most "
                 f"{_MOST_ELEMENTS} are allowed: raise growth or smallest_element",
             )  # fmt: skip
+
+    def usual(self) -> Mapping[str, float]:
+        """Return the mesh and the increments of an accuracy."""
+        return _USUAL[self.accuracy]
 
 
 def _nodes(parameters: PunchParameters) -> tuple[NDArray[np.float64], ...]:
@@ -239,7 +257,16 @@ PUNCH = Scene(
     summary="elastic-plastic punch pressed on an elastic-plastic half-plane, and released",
     parameters=PunchParameters,
     branch="load_ratio",
-    refining=frozenset({"element", "smallest_element", "growth", "load_step", "unload_steps"}),
+    refining=frozenset(
+        {
+            "accuracy",
+            "element",
+            "smallest_element",
+            "growth",
+            "load_step",
+            "unload_steps",
+        }
+    ),
     model=model,
     program=program,
     view=view,

@@ -272,8 +272,8 @@ ROLLING = Scene(
     method=lambda parameters: without_ends if parameters.endless else by_increments,
     refining=frozenset(
         {
-            "element_size", "growth", "advance_step", "advance_tolerance", "press_steps",
-            "unload_steps",
+            "accuracy", "element_size", "growth", "advance_step", "advance_tolerance",
+            "press_steps", "unload_steps",
         }
     ),
     model=model,

@@ -54,7 +54,8 @@ def without_ends(
     """Roll pass after pass; yield each of the runs, which differ in the number of passes.
 
     Where a pass yields or touches beyond the window of its mesh, all begins again with a larger
-    one. Where no steady pass is found, the runs that are left are rolled by increments.
+    one. Where no steady pass is found, the runs that are left are rolled by increments: a wheel
+    that sinks in without end may still go some way, but no prescribed pressure beyond the limit.
     """
     waiting = list(runs)
     rolled = _Rolled(scene, runs[-1])
@@ -64,7 +65,8 @@ def without_ends(
             yield look
         if not isinstance(rolled.error, WindowTooSmall):
             break
-    if not isinstance(rolled.error, LimitLoad) and waiting and (others := _stepped(waiting)):
+    bears_none = isinstance(rolled.error, LimitLoad) and runs[-1].load == "hertz"
+    if not bears_none and waiting and (others := _stepped(waiting)):
         note = f"{rolled.error}: rolled by increments instead, over {others[0].length:.4g} mm"
         for look in by_increments(scene, others, monitor):
             yield replace(look, notes=(note,))

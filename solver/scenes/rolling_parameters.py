@@ -11,15 +11,21 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.loading.walker import HALVINGS
-from solver.scenes.parameters import ContactParameters, Friction, Length, described
+from solver.scenes.parameters import Accuracy, by_accuracy, described
 from solver.scenes.schedule import Schedule
 from solver.scenes.sequence import OF_A_PASS, block_of
+from solver.scenes.wheel_parameters import WheelParameters
 from solver.steady import MOST_COLUMNS, window_elements
 
 ENDLESS: Literal["endless"] = "endless"
 """What `track` is where passes are steady."""
 Track = Annotated[Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["endless"], Unit("mm")]
 
+_ELEMENTS: Mapping[Accuracy, tuple[int, int]] = {
+    "draft": (8, 4), "standard": (16, 8), "fine": (32, 16)
+}  # fmt: skip
+"""Elements of a half-width: on a track without ends, and on one of given length."""
+_GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.15**0.5}
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
 _SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
 _PERIOD = 6.0  # least length of a track that repeats itself / Hertz half-width
@@ -28,28 +34,9 @@ _MOST_INCREMENTS = 100_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RollingParameters(ContactParameters):
+class RollingParameters(WheelParameters):
     """Parameters of rolling (N, mm, MPa; forces per mm of width)."""
 
-    yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
-        502.0, "uniaxial yield stress Re of the half-space"
-    )
-    load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(
-        1360.0 / 502.0, "peak pressure of the elastic Hertz contact / yield stress"
-    )
-    friction: Friction = described(0.3, "Coulomb friction coefficient")
-    traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
-        0.0,
-        "longitudinal force / full slip force: positive brakes, negative accelerates, 1 is a "
-        "locked wheel",
-    )
-    control: Literal["moment", "creepage"] = described(
-        "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
-    )
-    given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
-        0.0,
-        "1 + R d(rotation) / d(advance) of a wheel that turns as prescribed: positive brakes",
-    )
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "passes over the track")
     sequence: tuple[Mapping[str, float | str], ...] = described(
         (),
@@ -62,13 +49,6 @@ class RollingParameters(ContactParameters):
     heading: Literal["forward", "backward"] = described("forward", "way of the first pass along x")
     load: Literal["contact", "hertz"] = described(
         "contact", "a wheel in true contact, or a translated Hertz pressure"
-    )
-    radius: Length = described(334.92, "radius R of the wheel")
-    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
-        1.0, "Young's modulus of the wheel / that of the half-space"
-    )
-    wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
-        0.0, "angle by which the wheel is turned before it is set down"
     )
     track: Track = described(
         ENDLESS,
@@ -83,14 +63,14 @@ class RollingParameters(ContactParameters):
         "whether the half-space, as deep as the track is long, repeats itself after each track "
         "length, together with its loads",
     )
-    element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
-        1.0, "element side along the track and at the surface"
+    element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = by_accuracy(
+        "element side along the track and at the surface"
     )
-    growth: Annotated[float, Interval(ge=1.0, le=3.0), Unit("1")] = described(
-        1.15, "ratio of neighbouring element sides in depth"
+    growth: Annotated[float, Interval(ge=1.0, le=3.0), Unit("1")] = by_accuracy(
+        "ratio of neighbouring element sides in depth"
     )
-    advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = described(
-        0.5, "advance of the axle in an increment, on a track of given length"
+    advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = by_accuracy(
+        "advance of the axle in an increment, on a track of given length"
     )
     advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
         0.0,
@@ -104,19 +84,13 @@ class RollingParameters(ContactParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        ContactParameters.__post_init__(self)
-        if self.traction and self.frictionless:
-            raise ModelError("traction", self.traction, "must be 0 without friction")
+        WheelParameters.__post_init__(self)
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
         if self.shear_limit and self.load == "hertz":
             allowed = "must be 0: load = hertz prescribes the shear"
             raise ModelError("shear_limit", self.shear_limit, allowed)
-        if prescribed and self.traction:
-            raise ModelError("traction", self.traction, "must be 0 where creepage is given")
-        if self.given_creepage and not prescribed:
-            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
         if self.element_size > self.half_width / 2:
             raise ModelError(
                 "element_size", self.element_size,
@@ -187,6 +161,17 @@ class RollingParameters(ContactParameters):
                 f"{math.floor(max(room, 0.0))} mm beside half-widths of {self.half_width:.4g} mm",
             )  # fmt: skip
 
+    def usual(self) -> Mapping[str, float]:
+        """Return the elements and increments of an accuracy, in lengths of two digits.
+
+        Errors: docs/accuracy.md.
+        """
+        endless, of_length = _ELEMENTS[self.accuracy]
+        side = self.mesh_width / endless if self.endless else self.half_width / of_length
+        h = float(f"{self.element_size or side:.2g}")
+        advance = h / 2 if self.endless else min(h / 2, self.length / 2)
+        return {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
+
     @property
     def endless(self) -> bool:
         """Whether passes are steady."""
@@ -223,27 +208,6 @@ class RollingParameters(ContactParameters):
     def _turning(self) -> float:
         """Largest length of rim / length of track over which it passes."""
         return 1 + max(0.0, -self.given_creepage)
-
-    @property
-    def peak_pressure(self) -> float:
-        """p0 of the elastic Hertz contact [MPa]."""
-        return self.load_ratio * self.yield_stress
-
-    @property
-    def contact_modulus(self) -> float:
-        """E* of wheel and half-space [MPa]."""
-        half = (1 - self.poisson_ratio**2) / self.youngs_modulus
-        return 1 / (half + half / self.wheel_stiffness)
-
-    @property
-    def half_width(self) -> float:
-        """Half-width a = 2 R p0 / E* of the elastic Hertz contact [mm]."""
-        return 2 * self.radius * self.peak_pressure / self.contact_modulus
-
-    @property
-    def force(self) -> float:
-        """Vertical force pi a p0 / 2 [N per mm of width]."""
-        return math.pi * self.half_width * self.peak_pressure / 2
 
     @property
     def block(self) -> tuple[RollingParameters, ...]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.errors import ModelError, NotConverged
+from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.linear.threads import one_thread
 from solver.loading.bearing import too_much_shear
 from solver.materials.material import Material
@@ -19,7 +18,8 @@ from solver.model.model import effective_friction
 from solver.model.motion import Axle
 from solver.scenes.rolling_model import wheel_body
 from solver.steady import Rim, RollingWheel, rolling, track_of
-from solver.steady.passing import PARTS, passing
+from solver.steady.passing import PARTS
+from solver.steady.search import search
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,16 +58,19 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
     Half of Newton's steps lead into the neighbourhood of the solution; there they cost a fifth.
     """
     p = parameters
-    with suppress(NotConverged, ModelError):
+    try:
         coarse = replace(p, element_size=2 * p.element_size, growth=p.growth**2)
         track = track_for(coarse, reach)
         with one_thread():
-            found = passing(
+            found = search(
                 track, p.material(), load_on(track, coarse, coarse.of_pass(0)), track.rows.virgin,
                 _first_guess(coarse, reach), parts=_PARTS, tolerance=_TOLERANCE,
             )  # fmt: skip
-        return track_for(p, reach).rows.interpolated(found.strain, track.rows)
-    return None
+    except LimitLoad:
+        raise
+    except (NotConverged, ModelError):
+        return None
+    return track_for(p, reach).rows.interpolated(found.strain, track.rows)
 
 
 def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:

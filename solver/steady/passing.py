@@ -16,14 +16,14 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
-from solver.steady import sweep
+from solver.steady.flow import Flow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from solver.materials.material import Material
     from solver.steady.layers import Layers
     from solver.steady.load import Load, Loading
-    from solver.steady.rows import Rows
     from solver.steady.track import Track
 
     Array = NDArray[np.float64]
@@ -41,9 +40,6 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-4
 """Deviatoric strain of the residual, times 2 G, over the yield stress, at which a pass is found."""
 
-QUIET = 5e-3
-"""Plastic strain gathered at the ends of the window / yield strain, up to which it is large enough.
-"""
 _FORCING = 0.1
 """Relative error with which Newton's equation is solved."""
 PARTS = 16
@@ -59,9 +55,11 @@ _SHORTEST = 1 / 32
 """Least part of a Newton step."""
 _AWAY = 3.0
 """Growth of the residual that a whole step may cause."""
-_FLOWS, _RUNS = 0.1, 5.0
+_FLOWS, _RUNS = 0.1, 1.0
 """Plastic strain gathered in a pass, above which one that leads nowhere flows without limit, and
 above which any does."""
+_PATIENCE, _PROGRESS = 14, 0.7
+"""After so many steps the residual must be smaller than this part of what it was."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,67 +93,14 @@ class Pass:
     direction: int = 1
 
     @property
+    def gathered(self) -> float:
+        """The most accumulated plastic strain that any point gathers."""
+        return float((self.accumulated - self.before.accumulated[:, None]).max())
+
+    @property
     def left(self) -> Layers:
         """The state that the pass leaves, as one sees it who stands beside the track."""
         return self.after if self.direction == 1 else self.after.mirrored
-
-
-class _Flow:
-    """What material gathers on its way along the rows for given strains, and its derivative."""
-
-    def __init__(
-        self, rows: Rows, material: Material, before: Layers, added: Array, parts: int
-    ) -> None:
-        rule, elasticity = material.hardening_rule, material.elasticity
-        double_shear = 2 * elasticity.shear_modulus
-        self._law = np.array(
-            [
-                double_shear,
-                double_shear + rule.prager_modulus,
-                rule.isotropic_modulus,
-                double_shear + 2 / 3 * rule.modulus,
-                rule.yield_stress,
-            ]
-        )
-        self._rows, self._before = rows, before
-        self._yield_strain = material.yield_stress / material.youngs_modulus
-        at_rest = before.strain(elasticity)[:, None]
-        strain = np.concatenate([at_rest, at_rest + added], axis=1)
-        start = before.plastic_strain, before.accumulated
-        self.plastic, self.total, self._path = sweep.flow(strain, *start, self._law, parts)
-        ends = np.ascontiguousarray(self.plastic[:, -1]), self.total[:, -1].copy()
-        closed = sweep.close(*ends, self._law, elasticity.bulk_modulus)
-        self.after = replace(before, plastic_strain=closed[0], accumulated=closed[1])
-        self._closing = closed[2:]
-        self.force = rows.force(
-            self.plastic - before.plastic_strain[:, None],
-            closed[0] - before.plastic_strain,
-        )
-
-    @property
-    def beyond(self) -> str:
-        """Where the window is too small: rows yield at its end already; empty if nowhere.
-
-        Rows that an earlier pass left on the yield surface flow a little there.
-        """
-        before = self._before.accumulated
-        ahead = (self.total[:, 0] - before).max()
-        below = self.after.accumulated[-1] - before[-1]
-        quiet = QUIET * self._yield_strain
-        return "ahead" if ahead > quiet else "below" if below > quiet else ""
-
-    @property
-    def last_steps(self) -> tuple[Array, Array]:
-        """Multiplier and direction of flow in the last increment before each column."""
-        last = self._path[:, :, -1]
-        return last[..., 4], last[..., :4]
-
-    def along(self, added: Array) -> Array:
-        """Return the nodal forces (m,) for a change of the strains."""
-        plastic, total = sweep.flow_along(added, self._law, self._path)
-        ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
-        closed = sweep.close_along(*ends, self._law, *self._closing)
-        return self._rows.force(plastic, closed)
 
 
 def passing(
@@ -198,14 +143,14 @@ def passing(
     def at(added: Array) -> _At:
         nonlocal solves
         solves += 1
-        flow = _Flow(rows, material, before, added, parts)
+        flow = Flow(rows, material, before, added, parts)
         loading = load.on(solve(flow.force))
         residual = rows.strain(loading.u) - added
         return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
 
     nothing = np.zeros(len(track.operator.kept))
     here = at(rows.strain(load.on(nothing).u) if guess is None else guess)
-    start = here.size
+    start, sizes = here.size, [here.size]
     for step in range(_STEPS):
         left_over = _deviation(here.residual)
         if left_over * double_shear < tolerance * material.yield_stress:
@@ -238,15 +183,19 @@ def passing(
             (scale * here.residual).ravel(), rtol=_FORCING, restart=krylov, maxiter=1,
         )  # fmt: skip
         there = _along(at, here, found.reshape(shape) / scale)
-        gathered = float((there.flow.total - before.accumulated[:, None]).max())
+        gathered = there.flow.gathered
         stalled = krylov == _MOST_KRYLOV and missed and there.size > _STALLED * here.size
-        unsolved = here.size > _FAR_FROM * start and gathered > _FLOWS
-        if gathered > _RUNS or (stalled and unsolved):
+        unsolved = here.size > _FAR_FROM * start
+        if gathered > _RUNS or (stalled and unsolved and gathered > _FLOWS):
             raise LimitLoad("plastic strain grows without bound in a steady pass")
         if missed:
             krylov = min(2 * krylov, _MOST_KRYLOV)
         here = there
-    raise NotConverged(f"no steady pass was found in {_STEPS} steps of Newton's method")
+        sizes.append(here.size)
+        earlier = min(sizes[:-_PATIENCE], default=np.inf)
+        if unsolved and min(sizes[-_PATIENCE:]) > _PROGRESS * earlier:
+            break
+    raise NotConverged(f"no steady pass was found in {len(sizes)} steps of Newton's method")
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +203,7 @@ class _At:
     """Where Newton's method is: strains, what they make, the residual and its norm."""
 
     added: Array
-    flow: _Flow
+    flow: Flow
     loading: Loading
     residual: Array
     size: float

@@ -8,12 +8,13 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
+from solver.errors import ModelError
 from solver.linear.threads import one_thread
-from solver.steady.passing import PARTS, TOLERANCE, passing
+from solver.steady.passing import PARTS, TOLERANCE
+from solver.steady.search import search
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     import numpy as np
     from numpy.typing import NDArray
@@ -70,24 +71,12 @@ def rolling(
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
         which = id(own), direction
         solve = partial(
-            passing, track, material, own, state if direction == 1 else state.mirrored,
+            search, track, material, own, state if direction == 1 else state.mirrored,
             parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
         )  # fmt: skip
         with one_thread():
-            found = _found(solve, guesses.get(which, guess))
+            found = solve(guesses.get(which, guess))
         found = replace(found, direction=direction)
         guesses[which] = guess = found.strain
         state = found.left
         yield found
-
-
-def _found(solve: Callable[[Array | None], Pass], guess: Array | None) -> Pass:
-    """Return a pass from a guess, or from the elastic one where that leads nowhere."""
-    try:
-        return solve(guess)
-    except (LimitLoad, WindowTooSmall):
-        raise
-    except NotConverged:
-        if guess is None:
-            raise
-        return solve(None)

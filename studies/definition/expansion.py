@@ -126,10 +126,10 @@ class Expansion:
         return self._run.id_of((axis.run, each.entries) for axis, each in self._at(index))
 
     def _parameters(self, index: tuple[int, ...]) -> Any:
-        typed = dict(self._typed)
+        values = dict(self._typed)
         for axis, setting in self._at(index):
-            typed.update(zip(axis.names, setting.typed, strict=True))
-        return self._scene.parameters(**typed)
+            values.update(zip(axis.names, setting.typed, strict=True))
+        return self._scene.parameters(**values)
 
     def _axis(self, settings: list[dict[str, Any]]) -> _Axis:
         known = parameters_of(self._scene)

@@ -37,7 +37,8 @@ class Parameter:
 
     Attributes
     ----------
-    name, unit, default, description : as declared; the default as JSON holds it
+    name, unit, default, description : as declared; the default as JSON holds it, None where
+        the scene's parameter object chooses the value by others
     schema : JSON Schema of what is allowed
     """
 
@@ -73,8 +74,8 @@ class Parameter:
         return self._type.dump_python(typed, mode="json")
 
     def typed(self, value: Any) -> Any:
-        """Return a normalised value as the scene's parameter object holds it."""
-        return self._type.validate_python(value)
+        """Return a normalised value, None where left out, as the parameter object takes it."""
+        return None if value is None else self._type.validate_python(value)
 
     def in_range(self, value: Any) -> bool:
         """Tell whether `value` lies in the declared range, whatever the other parameters are."""
@@ -120,7 +121,7 @@ def parameters_of(scene: Scene) -> dict[str, Parameter]:
         found[field.name] = Parameter(
             name=field.name,
             unit=next((mark.unit for mark in marks if isinstance(mark, Unit)), ""),
-            default=in_range.dump_python(field.default, mode="json"),
+            default=_plain(in_range, field.default),
             description=field.metadata.get("description", ""),
             schema=in_range.json_schema(),
             _type=TypeAdapter(_bare(hint)),
@@ -141,14 +142,38 @@ def build(scene: Scene, values: Mapping[str, Any]) -> Any:
     return scene.parameters(**{name: known[name].typed(value) for name, value in values.items()})
 
 
+def completed(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return normalised values; those left out (None) are what the parameter object chooses."""
+    left_out = [name for name, value in values.items() if value is None]
+    chosen = build(scene, values) if left_out else None
+    return dict(values) | {name: getattr(chosen, name) for name in left_out}
+
+
+def defaults(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all defaults; where the parameter object chooses, what it chooses beside `values`."""
+    declared = {name: parameter.default for name, parameter in parameters_of(scene).items()}
+    left_out = {name: None for name, default in declared.items() if default is None}
+    known = {name: value for name, value in values.items() if name in declared}
+    chosen = completed(scene, {**declared, **known, **left_out})
+    return declared | {name: chosen[name] for name in left_out}
+
+
 def scene_schema(name: str) -> dict[str, Any]:
     """Return the JSON Schema of a scene's parameters, each with its ``unit``."""
     scene = scene_named(name)
     schema = TypeAdapter(scene.parameters).json_schema()
     for parameter in parameters_of(scene).values():
+        own = schema["properties"][parameter.name]
         if parameter.unit:
-            schema["properties"][parameter.name]["unit"] = parameter.unit
+            own["unit"] = parameter.unit
+        if parameter.default is None:  # no value of its own, so that none may be written
+            del own["default"]
     return {**schema, "additionalProperties": False}
+
+
+def _plain(kind: TypeAdapter[Any], default: Any) -> Any:
+    """Return a default as JSON holds it; None where the parameter object chooses the value."""
+    return None if default is None else kind.dump_python(default, mode="json")
 
 
 def _bare(hint: Any) -> Any:

@@ -293,8 +293,8 @@ def _absent(name: str, kind: np.dtype[Any]) -> Any:
 
 
 def _axis_array(values: Sequence[Any]) -> np.ndarray:
-    """Return numbers as numbers and anything else as text."""
+    """Return numbers as numbers, left-out ones as NaN, and anything else as text."""
+    values = [np.nan if value is None else value for value in values]
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.asarray(values)
-    texts = [value if isinstance(value, str) else json.dumps(value) for value in values]
-    return np.array(texts, dtype=object)
+    return np.array([v if isinstance(v, str) else json.dumps(v) for v in values], dtype=object)

@@ -13,7 +13,7 @@ from solver.results.quantities import QUANTITIES
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import USUAL_AXES, Case
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import completed, parameters_of
 from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES, SYMMETRIC
 from studies.storage.provenance import provenance
 
@@ -126,7 +126,7 @@ def _frame(
             "message": (sweep, text, attributes_of("message")),
         },
         coords={name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep},
-        attrs=provenance(title, scene, case.values) | {"id": case.id},
+        attrs=provenance(title, scene, completed(scene, case.values)) | {"id": case.id},
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from solver.scenes import SCENES
-from studies.definition.parameters import parameters_of, scene_named
+from studies.definition.parameters import Parameter, parameters_of, scene_named
 from studies.definition.vocabulary import OK, STATUSES
 from studies.views.columns import aligned, in_blocks, stacked
 from studies.views.reading import flags, sweep_axes, sweep_coordinates
@@ -123,8 +123,12 @@ def scene_table(name: str) -> str:
     scene = scene_named(name)
     known = parameters_of(scene).values()
     lines = [["parameter", "default", "allowed", "meaning"]]
-    lines += [[each.name, _text(each.default), each.allowed, each.description] for each in known]
+    lines += [[each.name, _usual(each), each.allowed, each.description] for each in known]
     return f"{scene.name}: {scene.summary}\n\n{aligned(lines)}"
+
+
+def _usual(parameter: Parameter) -> str:
+    return "by accuracy" if parameter.default is None else _text(parameter.default)
 
 
 def _parameters(dataset: xr.Dataset) -> dict[str, Any]:

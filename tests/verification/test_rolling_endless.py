@@ -160,7 +160,7 @@ def test_all_runs_with_one_mesh_share_it():
             lambda p: replace(p, loading=replace(p.loading, force=p.loading.force * 0.9)),
             "audit_residual",
         ),
-        (lambda p: replace(p, accumulated=p.accumulated + 1e-4), "audit_inflow"),
+        (lambda p: replace(p, accumulated=p.accumulated + 1e-2), "audit_inflow"),
         (lambda p: replace(p, left_over=1e-4), "audit_steadiness"),
         (
             lambda p: replace(p, loading=replace(p.loading, normal=p.loading.normal - 1.0)),
@@ -252,7 +252,7 @@ def test_the_state_is_that_of_the_whole_sequence():
 )
 def test_bad_sequences_are_named(sequence, name):
     with pytest.raises(ModelError) as caught:
-        RollingParameters(sequence=sequence)
+        RollingParameters(sequence=sequence, element_size=1.0)
     assert caught.value.field == name
 
 

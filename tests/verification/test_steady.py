@@ -16,7 +16,7 @@ from solver.materials import PlasticState
 from solver.results.sliding_limits import melan_limit
 from solver.steady import Track, rolling, track_of
 from solver.steady.fields import under_load
-from solver.steady.passing import _Flow
+from solver.steady.flow import Flow
 
 YIELD = 502.0
 K = YIELD / sqrt(3)
@@ -121,10 +121,10 @@ def test_the_derivative_of_the_flow_is_that_of_differences():
     step = 1e-6
 
     def force(strain):
-        return _Flow(rows, material, rows.virgin, strain, 4).force
+        return Flow(rows, material, rows.virgin, strain, 4).force
 
     differences = (force(loaded + step * change) - force(loaded - step * change)) / (2 * step)
-    exact = _Flow(rows, material, rows.virgin, loaded, 4).along(change)
+    exact = Flow(rows, material, rows.virgin, loaded, 4).along(change)
     assert np.linalg.norm(exact - differences) < 1e-4 * np.linalg.norm(differences)
 
 

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 from solver.contact.problem import OPEN, STICK
+from solver.errors import LimitLoad
+from solver.results.audit import audit_pass
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import rim_of
 from solver.steady import RollingWheel, rolling, track_of
@@ -140,3 +142,25 @@ def test_passes_of_a_wheel_shake_down_below_the_limit_and_ratchet_above():
     ]
     assert grown[0] < 2e-3
     assert grown[1] > 0.05
+
+
+# -- more shear than the material bears ------------------------------------------------------------
+
+
+def locked(pressure, friction):
+    """The first pass of a locked wheel, coarsely, without hardening."""
+    _, place, material, load = wheel(pressure=pressure, size=2.0, friction=friction, creepage=1.0)
+    return next(iter(rolling(place, material, load, [1]))), material, place
+
+
+def test_a_locked_wheel_flattens_its_contact_until_the_surface_bears_the_shear():
+    found, material, place = locked(2.3, 0.5)  # 1.15 times what the surface bears
+    touching = found.loading
+    assert touching.tangential.sum() == pytest.approx(-0.5 * touching.normal.sum(), rel=1e-9)
+    assert not audit_pass(place, material, found).violations
+    assert found.gathered > 0.05  # far beyond what elastic strains would make
+
+
+def test_without_hardening_a_locked_wheel_has_its_limit():
+    with pytest.raises(LimitLoad, match="a steady pass adds more than 30% plastic strain"):
+        locked(4.3, 0.5)

@@ -41,9 +41,10 @@ _DECLARED = [
     ),
     declare(
         "audit_inflow",
-        "plastic strain gathered where material enters the window of a steady pass / yield strain",
+        "plastic strain gathered where material enters the window of a steady pass / the most that "
+        "the pass gathers, at least 0.05 yield strains",
     ),
-    declare("audit_outflow", "plastic strain gathered behind that window / yield strain"),
+    declare("audit_outflow", "plastic strain gathered behind that window / the same"),
     declare(
         "audit_steadiness",
         "difference between the strain that material meets in a steady pass and that of "

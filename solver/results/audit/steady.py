@@ -19,7 +19,8 @@ from solver.results.audit.report import (
 )
 from solver.steady import Touching
 from solver.steady.fields import of_layers, under_load
-from solver.steady.passing import QUIET, TOLERANCE
+from solver.steady.flow import INFLOW, LEAST
+from solver.steady.passing import TOLERANCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 _LIMITS = {
     "audit_reactions": TRAVELLING,
-    "audit_inflow": QUIET,
+    "audit_inflow": INFLOW,
     "audit_steadiness": TOLERANCE,
 }
 
@@ -100,18 +101,20 @@ class _Way:
         return float(self._material.dissipation(self._before, response).min())
 
     def inflow(self) -> float:
-        """Return the plastic strain gathered in the first column / yield strain."""
+        """Return the plastic strain gathered in the first column / that of the pass."""
         found = self._found
-        return _largest(found.accumulated[:, 0] - found.before.accumulated) / self._yield_strain
+        return _largest(found.accumulated[:, 0] - found.before.accumulated) / self._gathered
 
     def outflow(self) -> float:
-        """Return the plastic strain gathered behind the window / yield strain."""
+        """Return the plastic strain gathered behind the window / that of the pass."""
         found = self._found
-        return _largest(found.after.accumulated - found.accumulated[:, -1]) / self._yield_strain
+        return _largest(found.after.accumulated - found.accumulated[:, -1]) / self._gathered
 
     @property
-    def _yield_strain(self) -> float:
-        return self._material.yield_stress / self._material.youngs_modulus
+    def _gathered(self) -> float:
+        """The most plastic strain that the pass gathers, or what is nothing to speak of."""
+        yield_strain = self._material.yield_stress / self._material.youngs_modulus
+        return max(LEAST * yield_strain, self._found.gathered)
 
 
 def _largest(values: Array) -> float:

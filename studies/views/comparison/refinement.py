@@ -10,7 +10,7 @@ import xarray as xr
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
-from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.parameters import Parameter, defaults, parameters_of
 
 _HALVINGS = 4.0
 """Two halvings: an order of convergence needs three sizes, each half of the one before."""
@@ -44,11 +44,11 @@ def sizes_of(scene: Scene) -> tuple[Size, ...]:
     A size is a number that can be made smaller again and again and is never zero. A ratio of
     neighbouring sides is none, since it ends at 1, nor is a tolerance that 0 switches off.
     """
-    known = parameters_of(scene)
+    known, usual = parameters_of(scene), defaults(scene, {})
     return tuple(
         Size(_axis(name), name)
         for name, parameter in known.items()
-        if name in scene.refining and _shrinks(parameter)
+        if name in scene.refining and _shrinks(parameter, usual[name])
     )
 
 
@@ -57,9 +57,9 @@ def _axis(parameter: str) -> str:
     return taken if taken in QUANTITIES else parameter
 
 
-def _shrinks(parameter: Parameter) -> bool:
-    """Tell whether a parameter is a number above zero whose default may be halved twice."""
+def _shrinks(parameter: Parameter, usual: Any) -> bool:
+    """Tell whether a parameter is a number above zero whose usual value may be halved twice."""
     schema = parameter.schema
     least, above = schema.get("minimum", -1.0), schema.get("exclusiveMinimum", -1.0)
     positive = schema.get("type") == "number" and (least > 0.0 or above >= 0.0)
-    return positive and bool(max(least, above) <= parameter.default / _HALVINGS)
+    return positive and bool(max(least, above) <= usual / _HALVINGS)

@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from studies.definition.parameters import parameters_of, plain, scene_named
+from studies.definition.parameters import defaults, parameters_of, plain, scene_named
 
 _STAY = "\N{NO-BREAK SPACE}"
 
@@ -55,6 +55,7 @@ def setting(run: xr.Dataset) -> str:
     scene = run.attrs["scene"]
     known = parameters_of(scene_named(scene))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
+    usual = defaults(scene_named(scene), given)
     state = [words(given["state"])] if "state" in given and "state" not in run.coords else []
     place = [
         named(
@@ -68,7 +69,7 @@ def setting(run: xr.Dataset) -> str:
     others = [
         named(name, value, known[name].unit)
         for name, value in given.items()
-        if name in known and name not in {"state", *run.coords} and value != known[name].default
+        if name in known and name not in {"state", *run.coords} and value != usual[name]
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)

@@ -14,7 +14,7 @@ from solver.results.record import Record, Status
 from solver.scenes import SCENES, Scene
 from studies import Store, Study
 from studies.command.cli import main
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import defaults, parameters_of
 from studies.definition.vocabulary import STATUSES
 from studies.errors import StudyError
 from studies.storage.combine import combine
@@ -163,8 +163,8 @@ def test_a_level_that_is_neither_swept_nor_fixed_is_the_default_of_the_scene(
     with xr.open_dataset(path) as stored:
         bare = stored.load().assign_attrs(parameters="{}")
     bare.to_netcdf(tmp_path / "b.nc")
-    known = parameters_of(SCENES["rolling"])
-    level = (known["element_size"].default, known["advance_step"].default)
+    usual = defaults(SCENES["rolling"], {})
+    level = (usual["element_size"], usual["advance_step"])
     assert read_profiles([tmp_path / "b.nc"], {}).levels == [level]
 
 
@@ -267,7 +267,7 @@ def test_two_problems_in_one_data_set_are_refused_unless_one_is_chosen(tmp_path:
     ("fixed", "told"),
     [
         ({"track": 24.0}, "track 24, not endless"),
-        ({"periodic": True}, "periodic True, not False"),
+        ({"until": "decided"}, "until decided, not passes"),
         ({"traction": 0.5, "growth": 1.5}, "traction 0.5, not 0;"),
     ],
 )
@@ -339,9 +339,9 @@ def test_studies_of_convergence_refine_depth_with_length_and_nothing_else(name: 
 
 
 def test_an_advance_that_was_chosen_by_the_run_is_its_increment(tmp_path: Path) -> None:
-    dataset = data_set({"A": 1}, fixed={"advance_tolerance": 0.01})
+    dataset = data_set({"A": 1}, fixed={"advance_tolerance": 0.01, "track": 24.0})
     dataset["advance"] = xr.full_like(dataset["status"], 0.25, dtype=float)
-    usual = written(data_set({"A": 1}), tmp_path / "a.nc")
+    usual = written(data_set({"A": 1}, fixed={"track": 24.0}), tmp_path / "a.nc")
     computed = read_profiles([usual, written(dataset, tmp_path / "b.nc")], {})
     assert computed.axes == ("element_size", "advance")
     assert computed.levels == [(1.0, 1.0), (1.0, 0.25)]

@@ -1,0 +1,76 @@
+"""Parameters of a wheel that presses and drives: the elastic Hertz contact that they stand for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Interval, Unit
+
+from solver.errors import ModelError
+from solver.scenes.parameters import ContactParameters, Friction, Length, described
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelParameters(ContactParameters):
+    """Material, load and wheel of rolling (N, mm, MPa; forces per mm of width)."""
+
+    yield_stress: Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")] = described(
+        502.0, "uniaxial yield stress Re of the half-space"
+    )
+    load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(
+        1360.0 / 502.0, "peak pressure of the elastic Hertz contact / yield stress"
+    )
+    friction: Friction = described(0.3, "Coulomb friction coefficient")
+    traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
+        0.0,
+        "longitudinal force / full slip force: positive brakes, negative accelerates, 1 is a "
+        "locked wheel",
+    )
+    control: Literal["moment", "creepage"] = described(
+        "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
+    )
+    given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
+        0.0,
+        "1 + R d(rotation) / d(advance) of a wheel that turns as prescribed: positive brakes",
+    )
+    radius: Length = described(334.92, "radius R of the wheel")
+    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
+        1.0, "Young's modulus of the wheel / that of the half-space"
+    )
+    wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
+        0.0, "angle by which the wheel is turned before it is set down"
+    )
+
+    def __post_init__(self) -> None:
+        # zero-argument super() does not see the class that dataclass(slots=True) makes
+        ContactParameters.__post_init__(self)
+        if self.traction and self.frictionless:
+            raise ModelError("traction", self.traction, "must be 0 without friction")
+        prescribed = self.control == "creepage"
+        if prescribed and self.traction:
+            raise ModelError("traction", self.traction, "must be 0 where creepage is given")
+        if self.given_creepage and not prescribed:
+            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
+
+    @property
+    def peak_pressure(self) -> float:
+        """p0 of the elastic Hertz contact [MPa]."""
+        return self.load_ratio * self.yield_stress
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of wheel and half-space [MPa]."""
+        half = (1 - self.poisson_ratio**2) / self.youngs_modulus
+        return 1 / (half + half / self.wheel_stiffness)
+
+    @property
+    def half_width(self) -> float:
+        """Half-width a = 2 R p0 / E* of the elastic Hertz contact [mm]."""
+        return 2 * self.radius * self.peak_pressure / self.contact_modulus
+
+    @property
+    def force(self) -> float:
+        """Vertical force pi a p0 / 2 [N per mm of width]."""
+        return math.pi * self.half_width * self.peak_pressure / 2

@@ -1,0 +1,99 @@
+"""A steady pass from whatever guess there is: directly, or eased by hardening that fades away.
+
+Where friction asks for more shear than the material bears, the contact must flatten until it does,
+and strain is not small: Newton's method does not come upon such a pass of a material that hardens
+little. The same load on a material that hardens leads there, as its strain grows step by step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from solver.errors import LimitLoad, NotConverged, WindowTooSmall
+from solver.steady.passing import PARTS, TOLERANCE, passing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.materials.material import Material
+    from solver.steady.layers import Layers
+    from solver.steady.load import Load
+    from solver.steady.passing import Pass
+    from solver.steady.track import Track
+
+    Array = NDArray[np.float64]
+
+_HARDEST, _SOFTEST = 0.024, 1e-4
+"""Slopes of the uniaxial curve / Young's modulus, from which hardening fades away, and to which."""
+_SHARE, _SLOWEST = 1 / 3, 0.8
+"""Ratio of one slope to the one before: at first, and where a pass is hard to find."""
+_LARGE = 0.3
+"""Plastic strain gathered, above which a load is at its limit: less hardening makes it more."""
+_PARTS, _TOLERANCE = 8, 2e-3
+"""How exactly these passes are found."""
+
+
+def search(
+    track: Track,
+    material: Material,
+    load: Load,
+    before: Layers,
+    guess: Array | None = None,
+    *,
+    parts: int = PARTS,
+    tolerance: float = TOLERANCE,
+) -> Pass:
+    """Return the steady pass that `passing` finds, from the guess or from another one."""
+
+    def exactly(guess: Array | None) -> Pass:
+        return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
+
+    def eased(ratio: float, guess: Array | None) -> Pass:
+        harder = replace(material, hardening="kinematic", hardening_ratio=ratio)
+        return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
+
+    try:
+        return exactly(guess)
+    except WindowTooSmall:
+        raise
+    except NotConverged as error:
+        if before.accumulated.any() and (guess is None or isinstance(error, LimitLoad)):
+            raise
+    if before.accumulated.any():  # hardening would know of what was gathered without it
+        return exactly(None)
+    return _fading(eased, exactly, material.hardening_ratio if material.hardens else 0.0)
+
+
+def _fading(
+    eased: Callable[[float, Array | None], Pass],
+    exactly: Callable[[Array | None], Pass],
+    own: float,
+) -> Pass:
+    """Return the pass to which those of fading hardening lead, in smaller steps where they must."""
+    ratio, share = _HARDEST, _SHARE
+    found: Pass | None = None
+    while True:
+        guess = found.strain if found else None
+        last = ratio <= max(own, _SOFTEST)
+        try:
+            found = exactly(guess) if last else eased(ratio, guess)
+        except WindowTooSmall:
+            raise
+        except NotConverged:
+            if found is None or share > _SLOWEST:
+                raise
+            ratio, share = ratio / share, share**0.5
+        else:
+            if last:
+                return found
+            if found.gathered > _LARGE:
+                raise LimitLoad(
+                    f"a steady pass adds more than {_LARGE:.0%} plastic strain, even to a material "
+                    f"that hardens by {ratio:.2g} of Young's modulus"
+                )
+            share = max(share**2, _SHARE)
+        ratio *= share

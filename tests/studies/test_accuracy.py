@@ -1,0 +1,114 @@
+"""Accuracy: one word sets mesh and increments, a given number overrides, files hold numbers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import SCENES
+from solver.errors import ModelError
+from studies import Store, Study, open_netcdf, open_study, run_study
+from studies.definition.parameters import completed, defaults, parameters_of, scene_schema
+from studies.errors import StudyError
+from studies.views.comparison.problem import run_parameters
+
+LEVELS = ("draft", "standard", "fine")
+BY_ACCURACY = [
+    ("punch", {}, {"smallest_element", "growth", "load_step"}),
+    ("rolling", {}, {"element_size", "growth", "advance_step"}),
+    ("rolling", {"track": 50.0}, {"element_size", "growth", "advance_step"}),
+]
+
+
+@pytest.mark.parametrize(("scene", "fixed", "names"), BY_ACCURACY)
+def test_every_number_that_is_left_out_is_set_and_none_grows_with_accuracy(
+    scene: str, fixed: dict[str, Any], names: set[str]
+) -> None:
+    left_out = {name for name, each in parameters_of(SCENES[scene]).items() if each.default is None}
+    assert left_out == names
+    kind = SCENES[scene].parameters
+    draft, standard, fine = (kind(accuracy=level, **fixed) for level in LEVELS)
+    assert standard == kind(**fixed)
+    for name in names:
+        assert getattr(draft, name) >= getattr(standard, name) >= getattr(fine, name) > 0, name
+    assert any(getattr(draft, name) > getattr(standard, name) for name in names)
+    assert any(getattr(standard, name) > getattr(fine, name) for name in names)
+    assert {"accuracy", *names} <= SCENES[scene].refining
+
+
+def test_elements_follow_the_contact() -> None:
+    kind = SCENES["rolling"].parameters
+    for load_ratio in (0.5, 1.0, 3.0):
+        p = kind(load_ratio=load_ratio)
+        assert p.element_size == pytest.approx(p.half_width / 16, rel=0.05)
+        assert kind(load_ratio=load_ratio, track=20.0).advance_step == pytest.approx(
+            p.half_width / 16, rel=0.05
+        )
+
+
+def test_a_given_number_overrides() -> None:
+    p = SCENES["rolling"].parameters(accuracy="fine", element_size=1.0)
+    assert (p.element_size, p.advance_step) == (1.0, 0.5)
+    assert SCENES["punch"].parameters(accuracy="draft", growth=1.5).growth == 1.5
+
+
+def test_a_given_number_out_of_range_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"element_size = -1.0: must be greater than 0"):
+        SCENES["rolling"].parameters(element_size=-1.0)
+    with pytest.raises(ModelError, match="accuracy = 'exact': must be one of draft, standard"):
+        SCENES["punch"].parameters(accuracy="exact")
+
+
+def test_the_schema_has_no_default_for_what_accuracy_sets() -> None:
+    properties = scene_schema("rolling")["properties"]
+    assert "default" not in properties["element_size"]
+    assert properties["element_size"]["type"] == "number"
+    assert properties["accuracy"]["default"] == "standard"
+    with pytest.raises(StudyError, match=r"parameters\.growth"):
+        Study.from_dict({"name": "n", "scene": "punch", "parameters": {"growth": None},
+                         "sweep": {"friction": [0.0]}})  # fmt: skip
+
+
+def test_what_is_left_out_is_completed_beside_the_other_values() -> None:
+    scene = SCENES["rolling"]
+    values = completed(scene, {"load_ratio": 1.0, "element_size": None, "growth": 1.2})
+    assert values["element_size"] == scene.parameters(load_ratio=1.0).element_size
+    assert values["growth"] == 1.2
+    assert defaults(scene, {"accuracy": "draft", "element_size": 3.0})["element_size"] == 1.0
+
+
+def test_a_sweep_of_accuracy_stores_the_numbers_of_each_run(tmp_path: Path) -> None:
+    study = Study.from_dict(
+        {
+            "name": "levels",
+            "scene": "rolling",
+            "parameters": {"load": "hertz", "load_ratio": 1.0},
+            "sweep": {
+                "accuracy": ["draft", "standard"],
+                "spacing": {"usual": {"passes": 1}, "steep": {"passes": 1, "growth": 1.3}},
+            },
+        }
+    )
+    store = Store(tmp_path)
+    outcome = run_study(study, store, workers=1)
+    assert outcome.ok, outcome.failed
+    own = SCENES["rolling"].parameters(load="hertz", load_ratio=1.0)
+    combined = open_study(outcome.dataset)
+    np.testing.assert_array_equal(combined["growth"], [np.nan, 1.3])
+    found = run_parameters(combined.isel(accuracy=[1], spacing=[0]))
+    assert (found["element_size"], found["growth"]) == (own.element_size, own.growth)
+    sizes = set()
+    for case in study.cases():
+        with open_netcdf(store.run_path(case.id)) as run:
+            written = json.loads(run.attrs["parameters"])
+        assert None not in written.values()
+        sizes.add((written["accuracy"], written["element_size"], written["growth"]))
+    draft = SCENES["rolling"].parameters(load="hertz", load_ratio=1.0, accuracy="draft")
+    assert sizes == {
+        ("draft", draft.element_size, draft.growth), ("draft", draft.element_size, 1.3),
+        ("standard", own.element_size, own.growth), ("standard", own.element_size, 1.3),
+    }  # fmt: skip
