@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import null_space
 
-from solver.contact.carrying import Carrier
 from solver.contact.interface import interface_of, surfaces_of
 from solver.contact.state import ContactState, State
 from solver.errors import ModelError
@@ -111,11 +110,6 @@ class System:
     def moves(self) -> bool:
         """Whether a load moves along a body."""
         return any(part.moves for part in self.parts)
-
-    @cached_property
-    def carrier(self) -> Carrier:
-        """What predicts states under loads that move."""
-        return Carrier(self)
 
     @property
     def has_amplitude(self) -> bool:

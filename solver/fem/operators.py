@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from solver.linear import solvers as linear
+from solver.linear.solvers import Begun
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,8 +21,11 @@ if TYPE_CHECKING:
 class Operator(Protocol):
     """The inverse of a part's stiffness, its pins held."""
 
-    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return displacements (n,) for nodal forces (n,)."""
+    def begin(self, force: NDArray[np.float64]) -> Begun:
+        """Return the displacements for nodal forces (n,), those of contact yet to change.
+
+        The unknowns kept and the change are (n,), and mean something on contact surfaces alone.
+        """
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on unknowns of contact surfaces."""
@@ -56,6 +60,7 @@ class Analysed:
     Attributes
     ----------
     part : the body
+    contact : active unknowns on its contact surfaces, kept
     kept : (n,) position of each unknown among those kept, -1 for the others
     solver : of the active unknowns
     """
@@ -63,8 +68,9 @@ class Analysed:
     def __init__(self, part: Stiff, contact: NDArray[np.int64], name: str) -> None:
         self.part = part
         kept = np.isin(part.active, contact)
+        self.contact = part.active[kept]
         self.kept = np.full(part.n, -1)
-        self.kept[part.active[kept]] = np.arange(kept.sum())
+        self.kept[self.contact] = np.arange(len(self.contact))
         self.solver = linear.analyse(part.pattern, name, np.flatnonzero(kept))
 
 
@@ -75,12 +81,19 @@ class Factored:
         self._analysed = analysed
         analysed.solver.factorise(data)
 
-    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def begin(self, force: NDArray[np.float64]) -> Begun:
         """See `Operator`."""
-        part = self._analysed.part
-        u = np.zeros(part.n)
-        u[part.active] = self._analysed.solver.solve(force[part.active])
-        return u[part.copied]
+        part, contact = self._analysed.part, self._analysed.contact
+        begun = self._analysed.solver.begin(force[part.active])
+        motion = np.zeros(part.n)
+        motion[contact] = begun.kept
+
+        def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+            u = np.zeros(part.n)
+            u[part.active] = begun.finish(change[contact])
+            return u[part.copied]
+
+        return Begun(motion[part.copied], finish)
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
@@ -143,9 +156,10 @@ class Dense:
         self._inverse = np.zeros((n, n))
         self._inverse[np.ix_(active, active)] = 0.5 * (inverse + inverse.T)
 
-    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def begin(self, force: NDArray[np.float64]) -> Begun:
         """See `Operator`."""
-        return np.asarray(self._inverse @ force)
+        u = self._inverse @ force
+        return Begun(u, lambda change: u + self._inverse @ change)
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""

@@ -110,15 +110,35 @@ class Pardiso:
         if not len(self._kept):
             self._call(_SOLVE, b, x)
             return x
+        half = self.forward(b)
+        return self.backward(half, half[self._kept])
+
+    def forward(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the right-hand side (n,) or (n, k) with all unknowns eliminated but those kept.
+
+        Its values on these are the right-hand side of the Schur complement.
+        """
         half = np.zeros_like(b)
         self._call(_FORWARD, b, half)
-        half[self._kept] = cho_solve(self._schur, half[self._kept])
+        return half
+
+    def on_kept(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the kept unknowns (m,) for the right-hand side of the Schur complement."""
+        return np.asarray(cho_solve(self._schur, right, check_finite=False))
+
+    def backward(
+        self, half: NDArray[np.float64], right: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the solution after `forward`, ``right`` (m,) in the place of its kept part."""
+        half = half.copy(order="F")
+        half[self._kept] = self.on_kept(right)
+        x = np.zeros_like(half)
         self._call(_BACKWARD, half, x)
         return x
 
     def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return ``rows F rows'``, F (m, m) the inverse matrix's part on the kept unknowns."""
-        half = solve_triangular(self._schur[0], rows.T, lower=True)
+        half = solve_triangular(self._schur[0], rows.T, lower=True, check_finite=False)
         return np.asarray(half.T @ half)
 
     def _call(self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64]) -> None:

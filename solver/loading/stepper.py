@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.carrying import MEMORY
 from solver.contact.state import Converged, Energy, State
 from solver.errors import LimitLoad, NotConverged
 from solver.fem.fields import elastic_energy
+from solver.linear.threads import one_thread
+from solver.loading.carrying import MEMORY, Carrier
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
@@ -49,6 +50,7 @@ class Stepper:
         self.control = control
         self.place: Callable[[float], str] = "load factor {:.6g}".format
         self._report = report or (lambda: None)
+        self._carrier = Carrier(system)
         self._clock = clock.process_time()
 
     def rest(self, state: State, tally: Tally | None = None) -> Point:
@@ -158,12 +160,14 @@ class Stepper:
         if not self.system.moves:
             guess = extrapolate(past, now, time)
             return guess, guess is not None
-        guess = self.system.carrier.carried(past, now, time)
+        with one_thread():
+            guess = self._carrier.carried(past, now, time)
         return guess or self.system.moved(now, time), guess is not None
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began."""
-        return replace(now, energy=worked(self.system.parts, before, now))
+        with one_thread():
+            return replace(now, energy=worked(self.system.parts, before, now))
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
         way = f"between {self.place(reached)} and {self.place(attempted)}"

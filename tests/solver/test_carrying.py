@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.contact.carrying import Carrier
 from solver.contact.system import System
 from solver.fem.following import Following
+from solver.loading.carrying import Carrier
 from solver.loading.control import Control
 from solver.loading.walker import Walker
 from solver.scenes.rolling import ROLLING
@@ -77,9 +77,9 @@ def test_a_change_of_the_track_moves_by_whole_elements_and_tears_none():
 def test_nothing_is_carried_along_where_no_earlier_increment_is_like_the_next():
     system, (outcome,) = walked(advance_step=3.0)
     middle, last = outcome.points["mid_track"], outcome.points["loaded"]
-    assert system.carrier.carried((), middle.state, last.state.time) is None
+    assert Carrier(system).carried((), middle.state, last.state.time) is None
     past = (middle.start,)
     state = middle.state
     on = 2 * state.time - middle.start.time
-    assert system.carrier.carried(past, state, on) is not None
-    assert system.carrier.carried(past, state, on + 1.0) is None
+    assert Carrier(system).carried(past, state, on) is not None
+    assert Carrier(system).carried(past, state, on + 1.0) is None

@@ -82,3 +82,21 @@ def test_unknown_solver_is_refused_by_name():
     _, upper = matrix(n=3)
     with pytest.raises(ModelError, match="linear_solver"):
         linear.analyse(upper, "umfpack")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("shift", [0.0, 0.51])
+def test_a_solution_begun_is_finished_for_any_change_on_the_kept_unknowns(name, shift):
+    """Positive definite by halves, indefinite by two whole solutions."""
+    A, upper = matrix(shift=shift)
+    kept = np.array([3, 17, 18, 400, 899])
+    b, change = np.random.default_rng(5).standard_normal((2, A.shape[0]))
+    changed = b.copy()
+    changed[kept] += change[kept]
+    solver = linear.analyse(upper, name, kept)
+    solver.factorise(upper.data)
+    begun = solver.begin(b)
+    size = np.abs(solver.solve(b)).max()
+    assert np.abs(A @ begun.finish(change[kept]) - changed).max() < 1e-9 * size
+    assert np.abs(A @ begun.finish(0 * kept) - b).max() < 1e-9 * size
+    assert np.abs(begun.kept - solver.solve(b)[kept]).max() < 1e-9 * size
