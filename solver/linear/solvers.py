@@ -134,7 +134,7 @@ class PardisoSolver:
         right = half[self._kept]
 
         def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self._definite.backward(half, right + change)
+            return self._definite.backward(half, self._definite.on_kept(right + change))
 
         return Begun(self._definite.on_kept(right), finish)
 

@@ -212,8 +212,10 @@ class Increment:
         for blend in blends:
             try:
                 operators = [
-                    o.tangent(response, blend)
-                    for o, response in zip(self.system.operators, responses, strict=True)
+                    o.tangent(response, blend, candidates.touched(number))
+                    for number, (o, response) in enumerate(
+                        zip(self.system.operators, responses, strict=True)
+                    )
                 ]
                 step = newton_step(self.system, residuals, operators, candidates, self.contact)
             except Singular:
