@@ -12,8 +12,9 @@ From the last converged state, at the current displacements:
 5. line search on the plastic residual, contact forces interpolated
 6. converged when the residual, contact forces included, and the contact conditions vanish
 
-Without an extrapolated guess the first iteration uses the elastic operator: after a reversal of
-load a plastic tangent of the step before would diverge.
+Without a prediction (a line through the last two states, or an earlier increment carried along with
+a load that moves) the first iteration uses the elastic operator: after a reversal of load a plastic
+tangent of the step before would diverge.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class Increment:
 
     Parameters
     ----------
-    guess : state to iterate from, usually extrapolated; ``start`` when absent
+    guess : state to iterate from, usually predicted; ``start`` when absent
     contact : False takes the bodies apart
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
