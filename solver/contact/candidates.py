@@ -83,6 +83,13 @@ class Candidates:
             return np.zeros((len(self.motion), *u.shape[1:]))
         return np.asarray(rows.block @ u[rows.dofs])
 
+    def touched(self, part: int) -> NDArray[np.int64]:
+        """Return the unknowns of a part that contact forces act on."""
+        rows = self.rows[part]
+        if rows is None:
+            return np.zeros(0, dtype=np.int64)
+        return rows.dofs[rows.block.any(axis=0)]
+
     def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
         """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""
         W = np.zeros((len(self.motion), len(self.motion)))

@@ -11,8 +11,8 @@ from scipy import linalg, sparse
 from solver.fem import kinematics
 from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
-from solver.fem.part import Part
-from solver.fem.surface import pressure_forces, travelling_forces
+from solver.fem.part import Part, same_unknowns
+from solver.fem.surface import edges_of, pressure_forces, shortest, travelling_forces
 from solver.mesh.elements import element_type
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class Discretisation(Nodes, Part):
 
     def __init__(self, body: Body) -> None:
         super().__init__(body)
+        self.nodes = self.X
         kind = element_type(body.element)
         nodes = self.same[self.basis.element_dofs]
         self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
@@ -98,6 +99,26 @@ class Discretisation(Nodes, Part):
         if self.body.travelling is None:
             return super().external(time)
         return travelling_forces(self, self.body.travelling, time)
+
+    @property
+    def side(self) -> float:
+        """Shortest element side that a load of its own moves over [mm]; inf without such a load."""
+        if self.body.travelling is None:
+            return super().side
+        return shortest(self.X, edges_of(self, self.body.travelling.boundary))
+
+    def way(self, before: float, after: float) -> float:
+        """Return the way along x of its travelling pressure between two times [mm]."""
+        position = self.body.travelling.position if self.body.travelling else None
+        return position.at(after) - position.at(before) if position else 0.0
+
+    def sources(self, way: float) -> NDArray[np.int64]:
+        """Return for each unknown the one that lies ``way`` [mm] behind it along x, or -1."""
+        places = self.nodes - np.array([[way], [0.0]])
+        if self.period:
+            start = self.nodes[0].min()
+            places[0] = start + (places[0] - start) % self.period
+        return same_unknowns(self.nodes, places)[self.copied]
 
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""

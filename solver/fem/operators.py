@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from solver.fem.region import box_around, inside
 from solver.linear import solvers as linear
+from solver.linear.solvers import Begun
+from solver.linear.window import Windowed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
 
+    from solver.fem.region import Box
     from solver.materials.state import Response
+
+
+_WINDOWS = 4
+"""Windows kept in memory: a load that moves leaves them one by one."""
+_SMALL = 0.25
+"""Elements of a window / of the body, above which a window saves too little."""
 
 
 class Operator(Protocol):
     """The inverse of a part's stiffness, its pins held."""
 
-    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return displacements (n,) for nodal forces (n,)."""
+    def begin(self, force: NDArray[np.float64]) -> Begun:
+        """Return the displacements for nodal forces (n,), those of contact yet to change.
+
+        The unknowns kept and the change are (n,), and mean something on contact surfaces alone.
+        """
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on unknowns of contact surfaces."""
@@ -31,12 +45,16 @@ class Stiff(Protocol):
     """A part whose stiffness is assembled.
 
     The unknowns ``active`` of all ``n`` are solved for; ``copied`` (n,) gives for each unknown the
-    one whose value it takes; ``pattern`` is the upper triangle on the active ones.
+    one whose value it takes; ``pattern`` is the upper triangle on the active ones. ``X`` are the
+    nodes, ``dofs`` (n_elements, m) the unknowns of each element, ``points`` its points.
     """
 
     n: int
     active: NDArray[np.int64]
     copied: NDArray[np.int64]
+    X: NDArray[np.float64]
+    dofs: NDArray[np.int64]
+    points: NDArray[np.float64]
 
     @property
     def pattern(self) -> sparse.csr_array:
@@ -56,16 +74,41 @@ class Analysed:
     Attributes
     ----------
     part : the body
+    contact : active unknowns on its contact surfaces, kept
     kept : (n,) position of each unknown among those kept, -1 for the others
     solver : of the active unknowns
+
+    Parameters
+    ----------
+    window : (n,) unknowns between which alone the stiffness changes; all by default
     """
 
-    def __init__(self, part: Stiff, contact: NDArray[np.int64], name: str) -> None:
+    def __init__(
+        self,
+        part: Stiff,
+        contact: NDArray[np.int64],
+        name: str,
+        window: NDArray[np.bool_] | None = None,
+    ) -> None:
         self.part = part
         kept = np.isin(part.active, contact)
+        if window is not None:
+            kept &= window[part.active]
+        self.contact = part.active[kept]
         self.kept = np.full(part.n, -1)
-        self.kept[part.active[kept]] = np.arange(kept.sum())
-        self.solver = linear.analyse(part.pattern, name, np.flatnonzero(kept))
+        self.kept[self.contact] = np.arange(len(self.contact))
+        self.solver: linear.LinearSolver
+        if window is None:
+            self.solver = linear.analyse(part.pattern, name, np.flatnonzero(kept))
+        else:
+            elastic = part.pattern.copy()
+            elastic.data = part.elastic_data
+            self.solver = Windowed(elastic, window[part.active], np.flatnonzero(kept))
+
+    def keeps(self, touched: NDArray[np.int64]) -> bool:
+        """Whether all active ones of some unknowns (m,) are kept."""
+        active = np.isin(touched, self.part.active)
+        return bool((self.kept[touched[active]] >= 0).all())
 
 
 class Factored:
@@ -75,12 +118,19 @@ class Factored:
         self._analysed = analysed
         analysed.solver.factorise(data)
 
-    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def begin(self, force: NDArray[np.float64]) -> Begun:
         """See `Operator`."""
-        part = self._analysed.part
-        u = np.zeros(part.n)
-        u[part.active] = self._analysed.solver.solve(force[part.active])
-        return u[part.copied]
+        part, contact = self._analysed.part, self._analysed.contact
+        begun = self._analysed.solver.begin(force[part.active])
+        motion = np.zeros(part.n)
+        motion[contact] = begun.kept
+
+        def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+            u = np.zeros(part.n)
+            u[part.active] = begun.finish(change[contact])
+            return u[part.copied]
+
+        return Begun(motion[part.copied], finish)
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
@@ -99,8 +149,11 @@ class PartOperators(Protocol):
     def elastic(self) -> Operator:
         """The elastic one."""
 
-    def tangent(self, response: Response, blend: float) -> Operator:
-        """Return that of ``(1 - blend) tangent + blend elastic stiffness``."""
+    def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
+        """Return that of ``(1 - blend) tangent + blend elastic stiffness``.
+
+        ``touched`` are the unknowns that contact forces act on.
+        """
 
 
 class Operators:
@@ -115,6 +168,7 @@ class Operators:
         self._part = part
         self._contact = contact
         self._name = linear_solver
+        self._windows: OrderedDict[Box, tuple[NDArray[np.bool_], Analysed | None]] = OrderedDict()
 
     @cached_property
     def elastic(self) -> Operator:
@@ -125,14 +179,35 @@ class Operators:
     def _analysed(self) -> Analysed:
         return Analysed(self._part, self._contact, self._name)
 
-    def tangent(self, response: Response, blend: float) -> Operator:
+    def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
         if blend >= 1 or not response.yielding.any():
             return self.elastic
         data = self._part.tangent_data(response)
         if blend:
             data = (1 - blend) * data + blend * self._part.elastic_data
-        return Factored(self._analysed, data)
+        return Factored(self._around(response, touched), data)
+
+    def _around(self, response: Response, touched: NDArray[np.int64]) -> Analysed:
+        """Return the pattern for a window where the body yields and touches, or the whole one."""
+        if linear.chosen(self._name) != "pardiso" or not len(touched):
+            return self._analysed
+        yielding = response.yielding.reshape(self._part.points.shape[1:]).any(axis=1)
+        nodes = np.concatenate([self._part.dofs[yielding].ravel(), touched]) // 2
+        box = box_around(self._part.X[:, nodes])
+        if box not in self._windows:
+            within = inside(box, self._part.points.mean(axis=2))
+            window = np.zeros(self._part.n, dtype=bool)
+            window[self._part.dofs[within]] = True
+            small = within.mean() < _SMALL
+            new = Analysed(self._part, self._contact, self._name, window) if small else None
+            self._windows[box] = within, new
+            while len(self._windows) > _WINDOWS:
+                self._windows.popitem(last=False)
+        self._windows.move_to_end(box)
+        within, found = self._windows[box]
+        known = found is not None and within[yielding].all() and found.keeps(touched)
+        return found if found is not None and known else self._analysed
 
 
 class Dense:
@@ -143,9 +218,10 @@ class Dense:
         self._inverse = np.zeros((n, n))
         self._inverse[np.ix_(active, active)] = 0.5 * (inverse + inverse.T)
 
-    def solve(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def begin(self, force: NDArray[np.float64]) -> Begun:
         """See `Operator`."""
-        return np.asarray(self._inverse @ force)
+        u = self._inverse @ force
+        return Begun(u, lambda change: u + self._inverse @ change)
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Operator`."""
@@ -158,7 +234,7 @@ class Fixed:
     def __init__(self, operator: Operator) -> None:
         self.elastic = operator
 
-    def tangent(self, response: Response, blend: float) -> Operator:
+    def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
         """Return the elastic operator."""
-        del response, blend
+        del response, blend, touched
         return self.elastic

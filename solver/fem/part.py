@@ -6,14 +6,29 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy import sparse
 
     from solver.fem.operators import PartOperators
     from solver.fem.surface import Surface
     from solver.materials.state import PlasticState, Response
     from solver.model.body import Body
+
+
+_SAME = 1e-6
+"""Distance / size of a body, below which two places are the same."""
+
+
+def same_unknowns(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the unknowns (2 n,) of the nodes (2, m) at places (2, n), -1 where no node is."""
+    near = _SAME * float(np.ptp(nodes, axis=1).max())
+    _, at = cKDTree(nodes.T).query(places.T, distance_upper_bound=near)
+    found = at < nodes.shape[1]
+    unknowns = np.stack([2 * at, 2 * at + 1], axis=1)
+    return np.asarray(np.where(found[:, None], unknowns, -1).ravel(), dtype=np.int64)
 
 
 class Part(ABC):
@@ -22,8 +37,10 @@ class Part(ABC):
     Attributes
     ----------
     n : number of unknowns ``u``
+    nodes : (2, n_nodes) positions of the nodes that the unknowns belong to, node by node [mm]
     body : as declared
     load_vector : (n,) nodal forces of the body's pressures at load factor one [N]
+    copied : (n,) for each unknown the one whose value it takes
     free : unknowns that no support holds
     active : those of them that are not pinned to hold its rigid motions
     rigid : (n, n_rigid) rigid motions that the supports leave free
@@ -32,8 +49,10 @@ class Part(ABC):
     """
 
     n: int
+    nodes: NDArray[np.float64]
     body: Body
     load_vector: NDArray[np.float64]
+    copied: NDArray[np.int64]
     free: NDArray[np.int64]
     active: NDArray[np.int64]
     rigid: NDArray[np.float64]
@@ -59,6 +78,10 @@ class Part(ABC):
         self, time: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:
         """Return external minus internal forces (n,), contact forces left out [N]."""
+
+    @abstractmethod
+    def elastic_matrix(self) -> sparse.csr_array:
+        """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
 
     @abstractmethod
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
@@ -105,6 +128,25 @@ class Part(ABC):
         """Return the unknowns with prescribed motions at their values for a time."""
         del time
         return u
+
+    @property
+    def side(self) -> float:
+        """Shortest element side that a load of its own moves over [mm]; inf without such a load."""
+        return np.inf
+
+    def way(self, before: float, after: float) -> float:
+        """Return the way along x [mm] of the load of a part that moves, between two times."""
+        del before, after
+        return 0.0
+
+    def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
+        """Return the way of a load over this part [mm], as its unknowns were and are."""
+        del before, after
+        return way
+
+    def sources(self, way: float) -> NDArray[np.int64]:
+        """Return for each unknown the one that lies ``way`` [mm] behind it along x, or -1."""
+        return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
     def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
         """Return the point (x, y) that a step (n,) strains most [mm]; NaN without points."""

@@ -85,6 +85,8 @@ class Substructure(Part):
         kept = self._condensed.kept
         self.elastic = slice(len(kept))
         self.n = len(kept)
+        self.nodes = whole.X[:, nodes]
+        self.copied = np.arange(self.n)
         self.load_vector = self._condensed.load_vector
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
@@ -118,6 +120,11 @@ class Substructure(Part):
         force = self.external(time)
         force[self.elastic] -= self._condensed.stiffness @ u[self.elastic]
         return force
+
+    def elastic_matrix(self) -> sparse.csr_array:
+        """Return the condensed stiffness on all unknowns (n, n), supports not applied."""
+        rest = np.zeros((self.n - len(self._condensed.kept),) * 2)
+        return sparse.csr_array(sparse.block_diag([self._condensed.stiffness, rest]))
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""

@@ -47,9 +47,19 @@ class Surface:
         return np.append(self.edges[:, 0], self.edges[-1, 1])
 
     @property
+    def shortest_edge(self) -> float:
+        """Length of the shortest edge between its ends [mm]."""
+        return shortest(self.X, self.edges)
+
+    @property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()
+
+
+def shortest(X: NDArray[np.float64], edges: NDArray[np.int64]) -> float:
+    """Return the length of the shortest edge between its ends [mm], nodes at X (2, n_nodes)."""
+    return float(np.linalg.norm(X[:, edges[:, 1]] - X[:, edges[:, 0]], axis=0).min())
 
 
 def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:

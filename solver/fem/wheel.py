@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from solver.fem.part import same_unknowns
 from solver.fem.substructure import Substructure
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Wheel(Substructure):
         self.axle = axle
         self._hub = self.n
         self.n += 3
+        self.copied = np.arange(self.n)
         self.load_vector = np.zeros(self.n)
         free = [_Y] if axle.rotation is not None else [_Y, _TURN]
         self.rigid = np.zeros((self.n, len(free)))
@@ -136,6 +138,28 @@ class Wheel(Substructure):
         else:
             out[turn] = self.radius * self.axle.rotation.at(time)
         return out
+
+    def way(self, before: float, after: float) -> float:
+        """Return the way of the axle between two times [mm]."""
+        return self.axle.position.at(after) - self.axle.position.at(before)
+
+    def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
+        """Return the way of the contact along the rim [mm]: none where the wheel is locked."""
+        del way
+        return self.hub(before).arc - self.hub(after).arc
+
+    def sources(self, way: float) -> NDArray[np.int64]:
+        """Return for each unknown the one an arc ``way`` [mm] behind it, those of the hub itself.
+
+        Displacements keep their directions: over a side the frame turns by less than a prediction
+        is exact.
+        """
+        angle = way / self.radius
+        c, s = np.cos(angle), np.sin(angle)
+        centre = self.centre[:, None]
+        places = np.array([[c, s], [-s, c]]) @ (self.nodes - centre) + centre
+        rim = same_unknowns(self.nodes, places)
+        return np.concatenate([rim, self._hub + np.arange(3)])
 
     def lowered(self, u: NDArray[np.float64], by: float) -> NDArray[np.float64]:
         """Return ``u`` with the hub lowered [mm]."""

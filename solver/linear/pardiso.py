@@ -90,15 +90,20 @@ class Pardiso:
 
     def factorise(self, data: NDArray[np.float64]) -> None:
         """Factorise the matrix with these values on the analysed pattern."""
-        self._data = np.ascontiguousarray(data, dtype=float)
-        m = len(self._kept)
-        schur = np.zeros((m, m)) if m else np.zeros(1)
-        self._call(_FACTORISE, np.zeros(1), schur)
-        if m:
+        schur = self.eliminate(data)
+        if len(self._kept):
             try:
                 self._schur = cho_factor(schur, lower=True)
             except LinAlgError as failure:
                 raise PardisoError(_FACTORISE, NOT_POSITIVE) from failure
+
+    def eliminate(self, data: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Eliminate all unknowns but those kept; return the Schur complement (m, m) on these."""
+        self._data = np.ascontiguousarray(data, dtype=float)
+        m = len(self._kept)
+        schur = np.zeros((m, m)) if m else np.zeros(1)
+        self._call(_FACTORISE, np.zeros(1), schur)
+        return schur
 
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for ``b`` (n,) or (n, k)."""
@@ -110,15 +115,33 @@ class Pardiso:
         if not len(self._kept):
             self._call(_SOLVE, b, x)
             return x
+        half = self.forward(b)
+        return self.backward(half, self.on_kept(half[self._kept]))
+
+    def forward(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the right-hand side (n,) or (n, k) with all unknowns eliminated but those kept.
+
+        Its values on these are the right-hand side of the Schur complement.
+        """
         half = np.zeros_like(b)
         self._call(_FORWARD, b, half)
-        half[self._kept] = cho_solve(self._schur, half[self._kept])
+        return half
+
+    def on_kept(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the kept unknowns (m,) for the right-hand side of the Schur complement."""
+        return np.asarray(cho_solve(self._schur, right, check_finite=False))
+
+    def backward(self, half: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the solution after `forward`, given the unknowns ``kept`` (m,)."""
+        half = half.copy(order="F")
+        half[self._kept] = kept
+        x = np.zeros_like(half)
         self._call(_BACKWARD, half, x)
         return x
 
     def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return ``rows F rows'``, F (m, m) the inverse matrix's part on the kept unknowns."""
-        half = solve_triangular(self._schur[0], rows.T, lower=True)
+        half = solve_triangular(self._schur[0], rows.T, lower=True, check_finite=False)
         return np.asarray(half.T @ half)
 
     def _call(self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64]) -> None:

@@ -8,6 +8,7 @@ variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides this c
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -18,6 +19,8 @@ from solver.errors import ModelError
 from solver.linear import pardiso
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 SOLVERS = ("auto", "pardiso", "superlu")
@@ -36,8 +39,25 @@ class LinearSolver(Protocol):
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for ``b`` (n,) or (n, k)."""
 
+    def begin(self, b: NDArray[np.float64]) -> Begun:
+        """Return the solution for ``b`` (n,), as far as its kept unknowns need it."""
+
     def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return ``rows A^-1 rows'`` for ``rows`` (k, m) on the m unknowns kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """A solution whose right-hand side may still change on the kept unknowns.
+
+    Attributes
+    ----------
+    kept : (m,) the kept unknowns, without a change
+    finish : (change (m,) of the right-hand side there) -> solution (n,)
+    """
+
+    kept: NDArray[np.float64]
+    finish: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 class SuperLU:
@@ -64,6 +84,10 @@ class SuperLU:
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `LinearSolver`."""
         return np.asarray(self._factor.solve(np.ascontiguousarray(b)))
+
+    def begin(self, b: NDArray[np.float64]) -> Begun:
+        """See `LinearSolver`."""
+        return _twice(self, b, self._kept)
 
     def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `LinearSolver`."""
@@ -102,11 +126,34 @@ class PardisoSolver:
         """See `LinearSolver`."""
         return self._current.solve(b)
 
+    def begin(self, b: NDArray[np.float64]) -> Begun:
+        """See `LinearSolver`."""
+        if self._current is not self._definite or not len(self._kept):
+            return _twice(self, b, self._kept)
+        half = self._definite.forward(b)
+        right = half[self._kept]
+
+        def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self._definite.backward(half, self._definite.on_kept(right + change))
+
+        return Begun(self._definite.on_kept(right), finish)
+
     def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `LinearSolver`."""
         if self._current is self._definite:
             return self._definite.compliance(rows)
         return _compliance(self, rows, self._upper.shape[0], self._kept)
+
+
+def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]) -> Begun:
+    """Return a solution that is finished by a second one."""
+
+    def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+        changed = b.copy()
+        changed[kept] += change
+        return solver.solve(changed)
+
+    return Begun(solver.solve(b)[kept], finish)
 
 
 def _compliance(

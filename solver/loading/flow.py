@@ -77,10 +77,19 @@ def softer(
     )
 
 
-def mechanism(
-    parts: Sequence[Part], step: Sequence[NDArray[np.float64]], responses: Sequence[Response]
+def adrift(
+    parts: Sequence[Part],
+    time: float,
+    step: Sequence[NDArray[np.float64]],
+    responses: Sequence[Response],
 ) -> bool:
-    """Whether a step is a plastic mechanism of one of the parts that move in it."""
+    """Whether a step is a plastic mechanism of a part that moves in it, though no body has a load.
+
+    Overlapping bodies push each other apart by a given distance. Plastic flow can do this in
+    many ways, and rounding would choose one of them and its size.
+    """
+    if any(part.external(time).any() for part in parts):
+        return False
     tangent, elastic = _forms(parts, step, responses).T
     moves = elastic > _MOVES * elastic.sum()
     return bool((tangent < _MECHANISM * elastic)[moves].any())

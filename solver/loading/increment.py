@@ -12,8 +12,9 @@ From the last converged state, at the current displacements:
 5. line search on the plastic residual, contact forces interpolated
 6. converged when the residual, contact forces included, and the contact conditions vanish
 
-Without an extrapolated guess the first iteration uses the elastic operator: after a reversal of
-load a plastic tangent of the step before would diverge.
+Without a prediction (a line through the last two states, or an earlier increment carried along with
+a load that moves) the first iteration uses the elastic operator: after a reversal of load a plastic
+tangent of the step before would diverge.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
-from solver.loading.flow import Flow, mechanism, softer
+from solver.loading.flow import Flow, adrift, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts
@@ -61,7 +62,7 @@ class Increment:
 
     Parameters
     ----------
-    guess : state to iterate from, usually extrapolated; ``start`` when absent
+    guess : state to iterate from, usually predicted; ``start`` when absent
     contact : False takes the bodies apart
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
@@ -95,6 +96,7 @@ class Increment:
         self._pivoted = 0
         self._blended = 0
         self._drifted = False
+        self._stiff: dict[bytes, NDArray[np.float64]] = {}
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -185,8 +187,18 @@ class Increment:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             return 0.0, float(overlap < -self.system.touching), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
-        W = candidates.compliance([o.elastic for o in self.system.operators])
-        return scale, norm(out) / scale, candidates.violation(1 / np.diag(W)) / scale
+        return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
+
+    def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Return the elastic stiffness of the contact points [N/mm], as where they were first met.
+
+        It is a scale: how the rows turn within an increment does not matter.
+        """
+        key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
+        if key not in self._stiff:
+            W = candidates.compliance([o.elastic for o in self.system.operators])
+            self._stiff[key] = 1 / np.diag(W)
+        return self._stiff[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -201,13 +213,15 @@ class Increment:
         for blend in blends:
             try:
                 operators = [
-                    o.tangent(response, blend)
-                    for o, response in zip(self.system.operators, responses, strict=True)
+                    o.tangent(response, blend, candidates.touched(number))
+                    for number, (o, response) in enumerate(
+                        zip(self.system.operators, responses, strict=True)
+                    )
                 ]
                 step = newton_step(self.system, residuals, operators, candidates, self.contact)
             except Singular:
                 continue
-            if step is not None and blend == 0 and self._adrift(step, responses):
+            if step and not blend and adrift(self.system.parts, self.time, step.u, responses):
                 self._drifted = True
             elif step is not None:
                 self._pivoted += step.pivoted
@@ -216,15 +230,6 @@ class Increment:
         raise IncrementFailed(
             "no contact forces were found that balance this load" + apart(self.system, candidates)
         )
-
-    def _adrift(self, step: Step, responses: Sequence[Response]) -> bool:
-        """Whether a step is a plastic mechanism although the bodies have no load.
-
-        Overlapping bodies push each other apart by a given distance. Plastic flow can do this in
-        many ways, and rounding would choose one of them and its size.
-        """
-        loaded = any(part.external(self.time).any() for part in self.system.parts)
-        return not loaded and mechanism(self.system.parts, step.u, responses)
 
     # -- 5: line search ------------------------------------------------------------------------
 

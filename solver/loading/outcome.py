@@ -59,10 +59,10 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A converged state, the one before it for extrapolation, and the cost so far."""
+    """A converged state, those before it in their order, to predict from, and the cost so far."""
 
     now: Converged
-    before: State | None
+    past: tuple[State, ...]
     tally: Tally
 
 

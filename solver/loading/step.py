@@ -57,8 +57,9 @@ def newton_step(
     balanced = [r + c for r, c in zip(residuals, held, strict=True)]
     W = candidates.compliance(operators)
     motion = candidates.motion - W @ candidates.forces
-    for i, (operator, r) in enumerate(zip(operators, balanced, strict=True)):
-        motion += candidates.of_part(i, operator.solve(r))
+    begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
+    for i, part in enumerate(begun):
+        motion += candidates.of_part(i, part.kept)
     floating = [part.rigid if contact else part.rigid[:, :0] for part in system.parts]
     solution = solve_contact(
         ContactProblem(
@@ -76,8 +77,7 @@ def newton_step(
     change = on_parts(system, candidates, solution.forces - candidates.forces)
     rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
     u = tuple(
-        operator.solve(r + c) + R @ q
-        for operator, r, c, R, q in zip(operators, balanced, change, floating, rigid, strict=True)
+        part.finish(c) + R @ q for part, c, R, q in zip(begun, change, floating, rigid, strict=True)
     )
     if not all(np.isfinite(du).all() for du in u):
         return None

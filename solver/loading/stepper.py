@@ -11,13 +11,15 @@ import numpy as np
 from solver.contact.state import Converged, Energy, State
 from solver.errors import LimitLoad, NotConverged
 from solver.fem.fields import elastic_energy
+from solver.linear.threads import one_thread
+from solver.loading.carrying import MEMORY, Carrier
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
 from solver.loading.program import ROUNDING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from solver.contact.state import ContactState
     from solver.contact.system import System
@@ -48,6 +50,7 @@ class Stepper:
         self.control = control
         self.place: Callable[[float], str] = "load factor {:.6g}".format
         self._report = report or (lambda: None)
+        self._carrier = Carrier(system)
         self._clock = clock.process_time()
 
     def rest(self, state: State, tally: Tally | None = None) -> Point:
@@ -55,7 +58,7 @@ class Stepper:
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         stresses = zip(self.system.parts, at_rest.responses, strict=True)
         energy = Energy(stored=sum(elastic_energy(part, r.stress) for part, r in stresses))
-        return Point(replace(at_rest, state=state, energy=energy), None, tally or Tally())
+        return Point(replace(at_rest, state=state, energy=energy), (), tally or Tally())
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
@@ -77,14 +80,14 @@ class Stepper:
             )
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
         pushed = self._worked(point.now, pushed)
-        return Point(pushed, None, self._timed(point.tally.plus(pushed)))
+        return Point(pushed, (), self._timed(point.tally.plus(pushed)))
 
     def again(self, point: Point, time: float) -> Point:
         """Return the first point of a further lap: wheels are set down, the rest waits for it."""
         state = point.now.state
         if self.system.moves:
             return self.begin(state, time, point.tally)
-        return replace(point, now=replace(point.now, state=replace(state, time=time)), before=None)
+        return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`."""
@@ -95,7 +98,7 @@ class Stepper:
             close = abs(target - state.time) <= abs(step) * (1 + ROUNDING)
             time = target if close else state.time + step
             together = contact or time != target
-            guess = self._predict(point.before, state, time) if together else None
+            guess, trusted = self._predict(point.past, state, time) if together else (None, False)
             try:
                 converged = Increment(
                     self.system,
@@ -103,19 +106,20 @@ class Stepper:
                     time,
                     guess=guess,
                     contact=together,
-                    elastic_first=guess is None or self.system.moves,
+                    elastic_first=not trusted,
                     patient=abs(time - state.time) < 2 * least * (1 - ROUNDING),
                     tolerances=self.control.tolerances,
                 ).solve()
             except IncrementFailed as failure:
                 tally = replace(point.tally, cuts=point.tally.cuts + 1)
-                point = replace(point, tally=self._timed(tally), before=None)
+                point = replace(point, tally=self._timed(tally), past=())
                 step = (time - state.time) / 2
                 if abs(step) < least * (1 - ROUNDING):
                     raise PathEnded(self._ended(failure, state.time, time), point) from failure
                 continue
             converged = self._worked(point.now, converged)
-            point = Point(converged, state, self._timed(point.tally.plus(converged)))
+            past = (*point.past[1 - MEMORY :], state)
+            point = Point(converged, past, self._timed(point.tally.plus(converged)))
             if converged.strayed:
                 error = NotConverged(f"{self.place(time)}: {converged.strayed}", state.time, time)
                 raise PathEnded(error, point)
@@ -144,19 +148,26 @@ class Stepper:
             return None
         converged = self._worked(point.now, converged)
         self._report()
-        return Point(converged, None, self._timed(point.tally.plus(converged)))
+        return Point(converged, (), self._timed(point.tally.plus(converged)))
 
-    def _predict(self, before: State | None, now: State, time: float) -> State | None:
-        """Return the state an increment iterates from, or None for the last converged one.
+    def _predict(self, past: Sequence[State], now: State, time: float) -> tuple[State | None, bool]:
+        """Return the state to iterate from, None for the last one, and whether it is a prediction.
 
         Under a load that moves along a body the next state is not on the line through the last two:
-        then only the prescribed motions go on.
+        where no earlier increment can be carried along with the load, only prescribed motions go
+        on.
         """
-        return self.system.moved(now, time) if self.system.moves else extrapolate(before, now, time)
+        if not self.system.moves:
+            guess = extrapolate(past, now, time)
+            return guess, guess is not None
+        with one_thread():
+            guess = self._carrier.carried(past, now, time)
+        return guess or self.system.moved(now, time), guess is not None
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began."""
-        return replace(now, energy=worked(self.system.parts, before, now))
+        with one_thread():
+            return replace(now, energy=worked(self.system.parts, before, now))
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
         way = f"between {self.place(reached)} and {self.place(attempted)}"
@@ -172,10 +183,11 @@ class Stepper:
         return replace(tally, seconds=tally.seconds + spent)
 
 
-def extrapolate(before: State | None, now: State, time: float) -> State | None:
-    """Return the state at ``time`` on the line through two states, or None at a reversal."""
-    if before is None or now.time == before.time:
+def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:
+    """Return the state at ``time`` on the line through the last two, or None at a reversal."""
+    if not past or now.time == past[-1].time:
         return None
+    before = past[-1]
     share = (time - now.time) / (now.time - before.time)
     if share <= 0:
         return None

@@ -11,6 +11,7 @@ from scipy import sparse
 from solver.errors import ModelError
 from solver.linear import pardiso
 from solver.linear import solvers as linear
+from solver.linear.window import Windowed
 
 NAMES = ["superlu", *(["pardiso"] if pardiso.library() else [])]
 
@@ -82,3 +83,52 @@ def test_unknown_solver_is_refused_by_name():
     _, upper = matrix(n=3)
     with pytest.raises(ModelError, match="linear_solver"):
         linear.analyse(upper, "umfpack")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("shift", [0.0, 0.51])
+def test_a_solution_begun_is_finished_for_any_change_on_the_kept_unknowns(name, shift):
+    """Positive definite by halves, indefinite by two whole solutions."""
+    A, upper = matrix(shift=shift)
+    kept = np.array([3, 17, 18, 400, 899])
+    b, change = np.random.default_rng(5).standard_normal((2, A.shape[0]))
+    changed = b.copy()
+    changed[kept] += change[kept]
+    solver = linear.analyse(upper, name, kept)
+    solver.factorise(upper.data)
+    begun = solver.begin(b)
+    size = np.abs(solver.solve(b)).max()
+    assert np.abs(A @ begun.finish(change[kept]) - changed).max() < 1e-9 * size
+    assert np.abs(A @ begun.finish(0 * kept) - b).max() < 1e-9 * size
+    assert np.abs(begun.kept - solver.solve(b)[kept]).max() < 1e-9 * size
+
+
+def test_a_window_gives_what_the_whole_matrix_gives():
+    """Only entries between unknowns of the window change; the grid is 30 by 30."""
+    if pardiso.library() is None:
+        pytest.skip("MKL is not installed")
+    A, upper = matrix()
+    at = np.arange(A.shape[0])
+    window = (at % 30 < 12) & (at // 30 < 9)
+    kept = np.array([3, 17 + 30 - 15, 185])
+    assert window[kept].all()
+    solver = Windowed(upper, window, kept)
+    random = np.random.default_rng(6)
+    b, change = random.standard_normal((2, len(at)))
+    rows = random.standard_normal((2, 3))
+    row, column = upper.tocoo().coords
+    for grown in (0.0, 4.0):
+        diagonal = (row == column) & window[row]
+        data = upper.data + np.where(diagonal, grown * np.sin(row), 0.0) ** 2
+        solver.factorise(data)
+        full = A + sparse.diags_array(np.where(window, grown * np.sin(at), 0.0) ** 2)
+        exact = np.linalg.inv(full.toarray())
+        assert np.abs(solver.solve(b) - exact @ b).max() < 1e-12 * np.abs(exact @ b).max()
+        begun = solver.begin(b)
+        changed = b.copy()
+        changed[kept] += change[kept]
+        size = np.abs(exact @ changed).max()
+        assert np.abs(begun.kept - (exact @ b)[kept]).max() < 1e-12 * size
+        assert np.abs(begun.finish(change[kept]) - exact @ changed).max() < 1e-12 * size
+        W = rows @ exact[np.ix_(kept, kept)] @ rows.T
+        assert np.abs(solver.compliance(rows) - W).max() < 1e-12 * np.abs(W).max()

@@ -1,0 +1,121 @@
+"""What a moving load changes, carried along with it: the next increment is like an earlier one.
+
+Under a load that moves steadily an increment changes the bodies as an earlier one did, farther on.
+Nodes meet nodes again when the load has passed a whole element side. The change is therefore taken
+from an increment so many sides back, and moved by these sides: no value
+is interpolated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.problem import OPEN
+from solver.fem.following import Following
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.interface import Interface
+    from solver.contact.state import ContactState, State
+    from solver.contact.system import System
+
+    Numbers = NDArray[np.int64]
+
+MEMORY = 8
+"""States before the last that are kept: most increments to an element side."""
+_OFF = 0.1
+"""Way of the load / element side, up to which it may differ from a whole number of sides."""
+
+
+class Carrier:
+    """Predicts the states of a system whose loads move, from those before."""
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._sides = [part.side for part in system.parts]
+        for number, _, surface in (side for i in system.interfaces for side in i.sides):
+            self._sides[number] = min(self._sides[number], surface.shortest_edge)
+        self._known: dict[tuple[int, int], Following] = {}
+
+    def carried(self, past: Sequence[State], now: State, time: float) -> State | None:
+        """Return the state predicted for ``time``, or None where no earlier increment is like it.
+
+        ``past`` are the states before ``now``, in their order. Prescribed motions are those at
+        ``time``.
+        """
+        for before, after in reversed(list(pairwise([*past, now]))):
+            way = self._way(before.time, now.time)
+            if way and np.isclose(self._way(after.time, time), way):
+                steps = self._steps(before, now, way)
+                if steps is not None:
+                    return self._system.moved(self._moved(before, after, now, steps), time)
+        return None
+
+    def _way(self, before: float, after: float) -> float:
+        """Return the way of the loads between two times [mm]; 0 where they differ."""
+        ways = {part.way(before, after) for part in self._system.parts if part.moves}
+        return ways.pop() if len(ways) == 1 else 0.0
+
+    def _steps(self, before: State, now: State, way: float) -> list[int] | None:
+        """Return how many sides of each part a load has passed; None if not a whole number."""
+        steps = []
+        for part, side, u0, u1 in zip(
+            self._system.parts, self._sides, before.u, now.u, strict=True
+        ):
+            passed = part.passed(u0, u1, way) / side
+            if abs(passed - round(passed)) > _OFF:
+                return None
+            steps.append(round(passed))
+        return steps if any(steps) else None
+
+    def _moved(self, before: State, after: State, now: State, steps: Sequence[int]) -> State:
+        """Return ``now`` after another increment like that from ``before`` to ``after``."""
+        following = [self._following(number, count) for number, count in enumerate(steps)]
+        each = zip(now.u, before.u, after.u, following, strict=True)
+        u = tuple(n + follow.carried(a - b) for n, b, a, follow in each)
+        contacts = tuple(
+            _follow(b, a, n, _on_vertices(interface, following[interface.slave].source))
+            for b, a, n, interface in zip(
+                before.contacts, after.contacts, now.contacts, self._system.interfaces, strict=True
+            )
+        )
+        return replace(now, u=u, contacts=contacts)
+
+    def _following(self, number: int, steps: int) -> Following:
+        """Return what carries changes of a part along by so many sides."""
+        if (number, steps) not in self._known:
+            way = steps * self._sides[number] if steps else 0.0
+            self._known[number, steps] = Following(self._system.parts[number], way)
+        return self._known[number, steps]
+
+
+def _on_vertices(interface: Interface, sources: Numbers) -> Numbers:
+    """Return for each slave vertex the one so many sides back, -1 where there is none."""
+    surface = interface.slave_surface
+    nodes = surface.nodes[surface.vertices]
+    vertex = np.full(len(sources) // 2 + 1, -1)
+    vertex[nodes] = np.arange(len(nodes))
+    return np.asarray(vertex[sources[2 * nodes] // 2])
+
+
+def _follow(
+    before: ContactState, after: ContactState, now: ContactState, source: Numbers
+) -> ContactState:
+    """Return the contact ``now`` after another increment like an earlier one, moved."""
+    known = source >= 0
+    status = np.where(known, after.status[source], OPEN)
+    normal = now.normal + np.where(known, (after.normal - before.normal)[source], 0.0)
+    shear = now.tangential + np.where(known, (after.tangential - before.tangential)[source], 0.0)
+    return replace(
+        now,
+        normal=np.where(status == OPEN, 0.0, np.maximum(normal, 0.0)),
+        tangential=np.where(status == OPEN, 0.0, shear),
+        status=status,
+    )
