@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_SHARES = (0.8, 0.9, 0.95)
+"""Of a load, by which one approaches it."""
 EXACT_AFTER = 4
 REPEATED = 1e-5
 """After so many passes the tolerance is this one: small changes of many passes add up."""
@@ -70,24 +73,37 @@ def rolling(
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
         which = id(own), direction
         solve = partial(
-            passing, track, material, own, state if direction == 1 else state.mirrored,
+            passing, track, material, before=state if direction == 1 else state.mirrored,
             parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
         )  # fmt: skip
         with one_thread():
-            found = _found(solve, guesses.get(which, guess))
+            found = _found(solve, own, guesses.get(which, guess))
         found = replace(found, direction=direction)
         guesses[which] = guess = found.strain
         state = found.left
         yield found
 
 
-def _found(solve: Callable[[Array | None], Pass], guess: Array | None) -> Pass:
-    """Return a pass from a guess, or from the elastic one where that leads nowhere."""
+def _found(solve: Callable[..., Pass], load: Load, guess: Array | None) -> Pass:
+    """Return a pass from a guess, or from the elastic one, or from lighter loads.
+
+    Newton's method may lose its way where much flows at once, and take that for a limit. It is one
+    only where lighter loads do not lead to the load.
+    """
     try:
-        return solve(guess)
-    except (LimitLoad, WindowTooSmall):
+        return solve(load, guess=guess)
+    except WindowTooSmall:
         raise
-    except NotConverged:
-        if guess is None:
-            raise
-        return solve(None)
+    except NotConverged as failure:
+        if guess is not None and not isinstance(failure, LimitLoad):
+            with suppress(NotConverged):
+                return solve(load)
+        guess = None
+        for share in _SHARES:
+            try:
+                guess = solve(load.lighter(share), guess=guess).strain
+            except WindowTooSmall:
+                raise
+            except NotConverged:
+                raise failure from None
+        return solve(load, guess=guess)

@@ -140,3 +140,17 @@ def test_passes_of_a_wheel_shake_down_below_the_limit_and_ratchet_above():
     ]
     assert grown[0] < 2e-3
     assert grown[1] > 0.05
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_lighter_load_is_one_of_less_force(share):
+    parameters, place, _, load = wheel(share=share)
+    nothing = np.zeros(len(place.operator.kept))
+    touching, whole = load.lighter(0.8).on(nothing), load.on(nothing)
+    # normals are tilted by up to a / R = 0.03, a little more under more force
+    one, other = (t.normal.sum() / parameters.force for t in (touching, whole))
+    assert (one, other) == (pytest.approx(0.8, rel=1e-3), pytest.approx(1.0, rel=1e-3))
+    drive = share * FRICTION * parameters.force
+    assert -touching.tangential.sum() == pytest.approx(0.8 * drive, abs=1e-3 * parameters.force)
+    given = place.hertz(500.0, 0.1)
+    np.testing.assert_allclose(given.lighter(0.8).on(nothing).u, 0.8 * given.u, rtol=1e-12)
