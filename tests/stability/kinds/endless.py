@@ -163,9 +163,7 @@ def judged(passed: Passed) -> dict[str, Figure]:
 
 def _honest(p: RollingParameters) -> Callable[[str], bool] | None:
     """Return how passes may end without an answer."""
-    if not bears(p):
-        return given_up
-    return tells("window is too small") if flows_ahead(p) else None
+    return None if bears(p) and not flows_ahead(p) else given_up
 
 
 def scenes(count: int = COUNT) -> list[Scene]:

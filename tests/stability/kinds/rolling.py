@@ -125,7 +125,7 @@ def judge(rolled: Rolled) -> dict[str, Figure]:
     """
     p, record = rolled.parameters, rolled.record
     force = p.force
-    way = p.traction * p.friction * force
+    way = p.directions[-1] * p.traction * p.friction * force
     figures = {"audit": Figure(float(record.status is not Status.OK), 0.0)}
     if record.status is not Status.OK:
         return figures
@@ -176,7 +176,7 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
     turning = -float((arm[0] * force[1] - arm[1] * force[0]).sum())
     figures = {"vertical force": Figure(abs(float(force[1].sum()) / p.force + 1), 1e-7)}
     if p.friction and p.traction:
-        wanted = p.radius * p.traction * p.friction * p.force
+        wanted = p.directions[-1] * p.radius * p.traction * p.friction * p.force
         miss = abs(turning + wanted) / (p.radius * p.force)
         figures["moment"] = Figure(miss, 0.02 * p.half_width / p.radius)
     return figures
