@@ -13,11 +13,13 @@ from solver.contact.interface import interface_of, surfaces_of
 from solver.contact.state import ContactState, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
+from solver.fem.fields import recovery
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.sparse import csr_array
 
     from solver.contact.state import Converged
     from solver.fem.part import Part
@@ -155,6 +157,10 @@ class System:
         """Return the motion of the first wheel, where there is one."""
         both = zip(self.parts, converged.state.u, strict=True)
         return next((part.hub(u) for part, u in both if isinstance(part, Wheel)), None)
+
+    def recovery(self, name: str) -> csr_array:
+        """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
+        return recovery(self.full(name))
 
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from solver.fem.fields import Sampler, recovery
+from solver.fem.fields import Sampler
 from solver.tensors import to_tensor, von_mises
 
 if TYPE_CHECKING:
@@ -46,6 +46,9 @@ class Bodies(Protocol):
     def full(self, name: str) -> Discretisation:
         """Return a body."""
 
+    def recovery(self, name: str) -> csr_array:
+        """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
+
     def response(self, name: str, converged: Any) -> Response:
         """Return stress and internal variables at the points of a body."""
 
@@ -66,7 +69,7 @@ class Nodal:
     def of_points(self, body: str, points: Array) -> Array:
         """Return recovered nodal values (..., n_nodes) of point values (..., n_points)."""
         if body not in self._recovery:
-            self._recovery[body] = recovery(self.system.full(body))
+            self._recovery[body] = self.system.recovery(body)
         return np.asarray((self._recovery[body] @ points.T).T)
 
     def stress(self, body: str, converged: Solved) -> Array:

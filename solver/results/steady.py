@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from solver.contact.state import State
+from solver.fem.fields import recovery
 from solver.fem.wheel import Hub
 from solver.materials.state import PlasticState, Response
 from solver.steady import Touching
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LOADED, _RELEASED = 0.0, 1.0
+_LEVEL = 1e-6
+"""Difference of depth / depth of the first row, up to which points and nodes are on one line."""
 _MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
 
 
@@ -69,6 +74,23 @@ class HalfPlane:
         """Return the body."""
         del name
         return self._part
+
+    def recovery(self, name: str) -> csr_array:
+        """Return the matrix (n_nodes, n_points) from values at points to those at nodes.
+
+        At the surface stress goes with the plastic strain, which may change much between the first
+        two rows of points: there the nodes have the values of the first row.
+        """
+        del name
+        part = self._part
+        matrix = recovery(part).tolil()
+        points, y = part.points.reshape(2, -1), part.X[1]
+        first = np.flatnonzero(points[1] > points[1].max() * (1 + _LEVEL))
+        top = np.flatnonzero(y > y.max() - _LEVEL * abs(points[1].max()))
+        nearest = cKDTree(points[0, first, None]).query(part.X[0, top, None], k=2)[1]
+        matrix[top] = 0.0
+        matrix[top[:, None], first[nearest]] = 0.5
+        return csr_array(matrix)
 
     def response(self, name: str, converged: Standing) -> Response:
         """Return stress and internal variables at the points."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
+_ROUNDING = 1e-12
 _HUB = 0.3  # radius of the rigid hub / R
 
 
@@ -50,5 +51,9 @@ def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
 
 
 def rim_elements(reach: float, h: float) -> int:
-    """Return the number of elements of side ``h`` along the part of the rim that may touch."""
-    return 2 * math.ceil(reach / h)
+    """Return the number of elements of side ``h`` along the part of the rim that may touch.
+
+    A reach of a whole number of sides has as many elements, however the quotient is rounded: a
+    steady pass takes rim and track to have sides of one length.
+    """
+    return 2 * math.ceil(reach / h * (1 - _ROUNDING))

@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 INFLOW = 0.1
-"""Plastic strain gathered at the ends of the window / that of the pass, up to which the window is
-large enough. Rows that an earlier pass left at yield flow as soon as the load comes near, however
-large the window is; 5 % then change stress by 1 % of the yield stress."""
+"""Plastic strain gathered where the window begins / that of the pass, up to which it is large
+enough. Rows that an earlier pass left at yield flow as soon as the load comes near, however large
+the window is; 5 % then change stress by 1 % of the yield stress."""
 LEAST = 0.05
-"""Plastic strain / yield strain, up to which a pass gathers nothing to speak of."""
+"""Plastic strain / yield strain, up to which a pass gathers nothing to speak of. Its tenth is too
+much for the deepest row."""
 
 
 class Flow:
@@ -72,8 +73,10 @@ class Flow:
         before = self._before.accumulated
         ahead = (self.total[:, 0] - before).max()
         below = self.after.accumulated[-1] - before[-1]
-        quiet = INFLOW * max(LEAST * self._yield_strain, self.gathered)
-        return "ahead" if ahead > quiet else "below" if below > quiet else ""
+        nothing = LEAST * self._yield_strain
+        if ahead > INFLOW * max(nothing, self.gathered):
+            return "ahead"
+        return "below" if below > INFLOW * nothing else ""
 
     @property
     def last_steps(self) -> tuple[Array, Array]:

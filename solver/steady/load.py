@@ -36,6 +36,9 @@ class Load(Protocol):
     def on(self, u: Array) -> Loading:
         """Return the load on a track that has these displacements (m,) without it."""
 
+    def lighter(self, share: float) -> Load:
+        """Return the same load with a share of its forces."""
+
 
 @dataclass(frozen=True, slots=True)
 class Given:
@@ -47,3 +50,7 @@ class Given:
     def on(self, u: Array) -> Loading:
         """See `Load`."""
         return Loading(self.force, u + self.u, lambda change: change)
+
+    def lighter(self, share: float) -> Given:
+        """See `Load`."""
+        return Given(share * self.force, share * self.u)

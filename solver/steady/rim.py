@@ -14,6 +14,7 @@ from solver.fem.wheel import Wheel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.fem.surface import Surface
     from solver.model.body import Body
 
     Array = NDArray[np.float64]
@@ -51,3 +52,17 @@ class Rim:
         """Displacements of the rim for forces on it (n, n), over its unknowns [mm/N]."""
         dofs = self.surface.dofs
         return self.wheel.operators([], "auto").elastic.compliance(dofs, np.eye(len(dofs)))
+
+
+def flowed(surface: Surface, way: int) -> Array:
+    """Return the matrix from a nodal field to its change over one element, from upstream.
+
+    ``way`` is +1 for a chain of edges that goes downstream. Where the chain begins upstream there
+    is no change.
+    """
+    chain = np.append(surface.edges[:, [0, 2]].ravel(), surface.edges[-1, 1])
+    chain = chain if way > 0 else chain[::-1]
+    change = np.zeros((surface.X.shape[1],) * 2)
+    change[chain[2:], chain[2:]] = 1.0
+    change[chain[2:], chain[:-2]] = -1.0
+    return np.asarray(np.kron(change, np.eye(2)), dtype=float)

@@ -1,13 +1,16 @@
-"""A steady pass from whatever guess there is: directly, or eased by hardening that fades away.
+"""A steady pass from whatever guess there is: directly, or by way of passes easier to find.
 
-Where friction asks for more shear than the material bears, the contact must flatten until it does,
-and strain is not small: Newton's method does not come upon such a pass of a material that hardens
-little. The same load on a material that hardens leads there, as its strain grows step by step.
+Newton's method may lose its way where much flows at once, and take that for a limit. Where friction
+asks for more shear than the material bears, the contact must flatten until it does, and strain is
+not small. The same load on a material that hardens leads there, as its strain grows while hardening
+fades away. On a track that was rolled before, lighter loads do.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
@@ -33,6 +36,8 @@ _SHARE, _SLOWEST = 1 / 3, 0.8
 """Ratio of one slope to the one before: at first, and where a pass is hard to find."""
 _LARGE = 0.3
 """Plastic strain gathered, above which a load is at its limit: less hardening makes it more."""
+_SHARES = (0.8, 0.9, 0.95)
+"""Of a load, by which one approaches it."""
 _PARTS, _TOLERANCE = 8, 2e-3
 """How exactly these passes are found."""
 
@@ -49,7 +54,7 @@ def search(
 ) -> Pass:
     """Return the steady pass that `passing` finds, from the guess or from another one."""
 
-    def exactly(guess: Array | None) -> Pass:
+    def exactly(load: Load, guess: Array | None = None) -> Pass:
         return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
 
     def eased(ratio: float, guess: Array | None) -> Pass:
@@ -57,15 +62,19 @@ def search(
         return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
 
     try:
-        return exactly(guess)
+        return exactly(load, guess)
     except WindowTooSmall:
         raise
     except NotConverged as error:
-        if before.accumulated.any() and (guess is None or isinstance(error, LimitLoad)):
-            raise
-    if before.accumulated.any():  # hardening would know of what was gathered without it
-        return exactly(None)
-    return _fading(eased, exactly, material.hardening_ratio if material.hardens else 0.0)
+        failure = error
+    if not before.accumulated.any():
+        own = material.hardening_ratio if material.hardens else 0.0
+        return _fading(eased, partial(exactly, load), own)
+    # hardening would know of the strain that was gathered without it
+    if guess is not None and not isinstance(failure, LimitLoad):
+        with suppress(NotConverged):
+            return exactly(load)
+    return _approached(exactly, load, failure)
 
 
 def _fading(
@@ -92,8 +101,21 @@ def _fading(
                 return found
             if found.gathered > _LARGE:
                 raise LimitLoad(
-                    f"a steady pass adds more than {_LARGE:.0%} plastic strain, even to a material "
-                    f"that hardens by {ratio:.2g} of Young's modulus"
+                    "plastic strain grows without bound: a steady pass adds more than "
+                    f"{_LARGE:.0%}, even if the material hardens by {ratio:.2g} of Young's modulus"
                 )
             share = max(share**2, _SHARE)
         ratio *= share
+
+
+def _approached(exactly: Callable[..., Pass], load: Load, failure: NotConverged) -> Pass:
+    """Return the pass to which lighter loads lead; raise ``failure`` where they do not."""
+    guess: Array | None = None
+    for share in _SHARES:
+        try:
+            guess = exactly(load.lighter(share), guess).strain
+        except WindowTooSmall:
+            raise
+        except NotConverged:
+            raise failure from None
+    return exactly(load, guess)

@@ -16,6 +16,7 @@ J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,12 +27,12 @@ from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem
 from solver.errors import NotConverged, WindowTooSmall
 from solver.steady.load import Loading
+from solver.steady.rim import flowed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.problem import ContactSolution
-    from solver.fem.surface import Surface
     from solver.steady.rim import Rim
     from solver.steady.track import Track
 
@@ -149,7 +150,7 @@ class RollingWheel:
         surface = track.surface
         self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
         self._compliance = track.response[track.at_surface], rim.compliance
-        self._flowed = _flowed(surface, +1), _flowed(rim.surface, -1)
+        self._flowed = flowed(surface, +1), flowed(rim.surface, -1)
         self._turning = rim.arms.T.ravel()
         self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
         self._known = _Known(
@@ -159,6 +160,14 @@ class RollingWheel:
             tilt=0.0,
             status=np.full(len(surface.vertices), OPEN),
         )
+
+    def lighter(self, share: float) -> RollingWheel:
+        """See `Load`."""
+        other = copy(self)
+        other._force *= share
+        if other._drive is not None:
+            other._drive *= share
+        return other
 
     def on(self, u: Array) -> Touching:
         """See `Load`.
@@ -281,17 +290,3 @@ class RollingWheel:
         whole = np.zeros(self._track.part.n)
         whole[self._track.surface.dofs] = force
         return whole
-
-
-def _flowed(surface: Surface, way: int) -> Array:
-    """Return the matrix from a nodal field to its change over one element, from upstream.
-
-    ``way`` is +1 for a chain of edges that goes downstream. Where the chain begins upstream there
-    is no change.
-    """
-    chain = np.append(surface.edges[:, [0, 2]].ravel(), surface.edges[-1, 1])
-    chain = chain if way > 0 else chain[::-1]
-    change = np.zeros((surface.X.shape[1],) * 2)
-    change[chain[2:], chain[2:]] = 1.0
-    change[chain[2:], chain[:-2]] = -1.0
-    return np.asarray(np.kron(change, np.eye(2)), dtype=float)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tests.benchmarks import figures, hertz, punch, steady
+from tests.benchmarks import figures, hertz, punch, skips, steady
 from tests.benchmarks.measure import REPEATS, Point
 from tests.benchmarks.report import conditions, table, write_csv
 
@@ -31,7 +31,10 @@ def run(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--quick", action="store_true", help="coarse, once each: under a minute")
     parser.add_argument("--out", type=Path, default=Path("out/benchmarks"), help="folder to write")
     parser.add_argument(
-        "--only", nargs="+", choices=("hertz", "punch", "steady"), help="problems to measure"
+        "--only",
+        nargs="+",
+        choices=("hertz", "punch", "steady", "skips"),
+        help="problems to measure",
     )
     given = parser.parse_args(arguments)
     if given.quick:
@@ -42,6 +45,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
         "hertz": lambda: of_hertz(given.out, hertz.ELEMENTS, meshes, repeats),
         "punch": lambda: of_punch(given.out, plan, repeats),
         "steady": lambda: of_steady(given.out, quick=given.quick, repeats=repeats),
+        "skips": lambda: of_skips(repeats),
     }
     benchmark(given.out, [problems[name] for name in given.only or problems])
 
@@ -100,6 +104,14 @@ def of_steady(out: Path, *, quick: bool, repeats: int) -> list[str]:
         figures.draw(own, measures, steady.SERIES, title, out / f"steady-{load}.png")
         lines += [f"Steady pass, {load}: errors of residual sigma_x / Re against the finest run"]
         lines += [*table(own, tuple(measures)), ""]
+    return lines
+
+
+def of_skips(repeats: int) -> list[str]:
+    """Measure what leaving out saves, and return its table."""
+    lines = [f"{'left out':<22}{'with it [s]':>12}{'without [s]':>12}{'ratio':>8}{'apart':>10}"]
+    for what, whole, short, miss in skips.measure(repeats):
+        lines.append(f"{what:<22}{whole:>12.2f}{short:>12.2f}{whole / short:>8.1f}{miss:>10.1e}")
     return lines
 
 

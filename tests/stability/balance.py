@@ -98,11 +98,13 @@ def tilt(solution: Solution) -> tuple[float, float]:
     across, along = 0.0, 0.0
     for pair in solution.system.model.contacts:
         if pair.sliding == "finite":
-            nodes = _chain(solution.system, pair.slave)
-            x = solution.nodes(pair.slave[0])[0, nodes]
-            u = solution.displacement(pair.slave[0], "loaded")[:, nodes]
-            theta = float(np.abs(np.diff(u[1]) / np.diff(x)).max())
-            moved = float(np.abs(u[0]).max() / np.ptp(x))
+            theta, moved = 0.0, 0.0
+            for side in (pair.slave, pair.master):
+                nodes = _chain(solution.system, side)
+                x = solution.nodes(side[0])[0, nodes]
+                u = solution.displacement(side[0], "loaded")[:, nodes]
+                theta = max(theta, float(np.abs(np.diff(u[1]) / np.diff(x)).max()))
+                moved = max(moved, float(np.abs(u[0]).max() / np.ptp(x)))
             across = max(across, theta**2 + pair.friction * theta)
             along = max(along, theta + pair.friction * moved)
     return across, along

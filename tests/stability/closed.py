@@ -106,18 +106,23 @@ class Column:
             share /= share[-1]
         x, y = self.at[0] + self.width * share, self.at[1] + np.linspace(low, high, ny + 1)
         mesh = grid(x, y, "tri" if self.element.startswith("tri") else "quad")
-        if not self.perturb:
-            return mesh
-        rng = np.random.default_rng(self.seed + body)
-        p = mesh.p.copy()
-        inside = np.setdiff1d(np.arange(p.shape[1]), mesh.boundary_nodes())
-        size = np.array([[self.width / nx], [(high - low) / ny]])
-        p[:, inside] += self.perturb * size * rng.uniform(-1, 1, (2, len(inside)))
-        return replace(mesh, doflocs=p)
+        return crooked(mesh, self.perturb, self.cells[body], self.seed + body)
 
     def solve(self, load: float = 1.0, control: PathControl = QUICK) -> Solution:
         """Return the solution."""
         return solve(self.model(), load=load, control=control)
+
+
+def crooked(mesh: Mesh, share: float, cells: tuple[int, int], seed: int) -> Mesh:
+    """Return a grid, its nodes within moved by a share of its mean elements."""
+    if not share:
+        return mesh
+    rng = np.random.default_rng(seed)
+    p = mesh.p.copy()
+    inside = np.setdiff1d(np.arange(p.shape[1]), mesh.boundary_nodes())
+    size = np.ptp(p, axis=1)[:, None] / np.array(cells)[:, None]
+    p[:, inside] += share * size * rng.uniform(-1, 1, (2, len(inside)))
+    return replace(mesh, doflocs=p)
 
 
 def uniaxial(column: Column, sigma: float) -> Array:

@@ -7,6 +7,24 @@ from collections.abc import Sequence
 
 from tests.stability.trial import Figure, Trial, Verdict
 
+COUNTED: dict[str, tuple[Verdict, ...]] = {
+    "ok": (Verdict.ANSWER,),
+    "limit": (Verdict.LIMIT,),
+    "declared": (Verdict.HONEST,),
+    "refused": (Verdict.REFUSED,),
+    "unexplained": (Verdict.NOT_CONVERGED, Verdict.FALSE_REFUSAL, Verdict.UNCLEAR),
+    "wrong": (Verdict.WRONG, Verdict.FALSE_LIMIT, Verdict.CRASHED),
+    "hung": (Verdict.HUNG,),
+}
+"""Columns of counts: ``declared`` did not converge for a reason that its family tells before,
+``unexplained`` did not converge, or was refused, without one."""
+
+
+def counts(family: str, trials: Sequence[Trial]) -> str:
+    """Return a line: how many scenes came to what, and their CPU time."""
+    numbers = "".join(f"{sum(t.verdict in v for t in trials):>13}" for v in COUNTED.values())
+    return f"{family:<12}{numbers}{sum(t.seconds for t in trials):>9.1f}"
+
 
 def summary(trials: Sequence[Trial]) -> list[str]:
     """Return lines: verdicts by family, effort, the worst figures of the oracles."""
@@ -34,7 +52,7 @@ def summary(trials: Sequence[Trial]) -> list[str]:
 
 def describe(trial: Trial) -> str:
     """Return how a scene ended and what it is."""
-    return f"{trial.name}: {trial.verdict.value}: {trial.message}\n    {trial.scene.what}"
+    return f"{trial.name}: {trial.verdict.value}: {trial.message}\n    {trial.what}"
 
 
 def _families(trials: Sequence[Trial]) -> dict[str, list[Trial]]:

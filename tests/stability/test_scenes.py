@@ -6,15 +6,24 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.stability.families import NAMES
+from tests.stability.families import EVERY, FAMILIES, NAMES
 from tests.stability.table import describe
 from tests.stability.trial import Trial
 
 Trials = Callable[[str], Trial]
 
 
-def test_there_are_three_hundred_scenes() -> None:
-    assert len(NAMES) == len(set(NAMES)) == 300
+def test_there_are_a_thousand_scenes_of_which_the_test_suite_runs_three_hundred() -> None:
+    assert len(EVERY) == len(set(EVERY)) >= 1000
+    assert 300 <= len(NAMES) <= 350
+    assert set(NAMES) <= set(EVERY)
+
+
+@pytest.mark.parametrize("family", [f for f, own in FAMILIES.items() if own.long > own.short])
+def test_a_scene_is_the_same_however_many_there_are(family: str) -> None:
+    few, many = (FAMILIES[family].make(count) for count in (3, FAMILIES[family].short))
+    assert [s.what for s in few] == [s.what for s in many[:3]]
+    assert len({s.what for s in many}) == len(many)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -89,7 +89,7 @@ class Trial:
     """The end of a scene."""
 
     name: str
-    scene: Scene
+    what: str
     verdict: Verdict
     message: str
     seconds: float
@@ -138,7 +138,7 @@ def attempt(name: str, scene: Scene, patience: float = PATIENCE) -> Trial:
         verdict, message = Verdict.CRASHED, f"{type(error).__name__}: {error}"
     return Trial(
         name=name,
-        scene=scene,
+        what=scene.what,
         verdict=verdict,
         message=message,
         seconds=time.process_time() - started,

@@ -162,5 +162,19 @@ def test_a_locked_wheel_flattens_its_contact_until_the_surface_bears_the_shear()
 
 
 def test_without_hardening_a_locked_wheel_has_its_limit():
-    with pytest.raises(LimitLoad, match="a steady pass adds more than 30% plastic strain"):
+    with pytest.raises(LimitLoad, match="a steady pass adds more than 30%"):
         locked(4.3, 0.5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_lighter_load_is_one_of_less_force(share):
+    parameters, place, _, load = wheel(share=share)
+    nothing = np.zeros(len(place.operator.kept))
+    touching, whole = load.lighter(0.8).on(nothing), load.on(nothing)
+    # normals are tilted by up to a / R = 0.03, a little more under more force
+    one, other = (t.normal.sum() / parameters.force for t in (touching, whole))
+    assert (one, other) == (pytest.approx(0.8, rel=1e-3), pytest.approx(1.0, rel=1e-3))
+    drive = share * FRICTION * parameters.force
+    assert -touching.tangential.sum() == pytest.approx(0.8 * drive, abs=1e-3 * parameters.force)
+    given = place.hertz(500.0, 0.1)
+    np.testing.assert_allclose(given.lighter(0.8).on(nothing).u, 0.8 * given.u, rtol=1e-12)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from solver import Outcome, Record, Status, System
 from solver.scenes.punch import PUNCH, PunchParameters
 from tests.stability.kinds.collapse import BLOCK_SIZE, PUNCH_HEIGHT, collapse
+from tests.stability.kinds.draws import changed
 from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.punch_oracle import LIMITS, judge
 from tests.stability.trial import Figure, Scene, tells
@@ -106,14 +107,11 @@ def _figures(pressed: Pressed) -> dict[str, Figure]:
 def _scene(p: PunchParameters) -> Scene:
     bounds = collapse(p.state, elastic_punch=p.elastic_punch)
     endless = hardens(p)
-    default = PunchParameters()
-    given = {f.name: getattr(p, f.name) for f in fields(p)}
-    changed = [f"{k}={v!r}" for k, v in given.items() if v != getattr(default, k)]
     certain = float("inf") if endless or p.element in LOCKING else bounds.certain * MESH_ALLOWANCE
     # beyond collapse, a path may end without having seen the mechanism
     beyond = not endless and p.load_ratio > bounds.certain
     return Scene(
-        what=", ".join(changed),
+        what=changed(p),
         run=partial(press, p),
         judge=_figures,
         load=p.load_ratio,
@@ -123,6 +121,6 @@ def _scene(p: PunchParameters) -> Scene:
     )
 
 
-def scenes() -> list[Scene]:
+def scenes(count: int = COUNT) -> list[Scene]:
     """Return the extreme punches."""
-    return [_scene(p) for p in extreme_scenes()]
+    return [_scene(p) for p in extreme_scenes(count)]

@@ -53,14 +53,14 @@ class Cycles:
     down: list[Converged]
 
 
-def bend(model: Model, steps: int, low: float) -> Cycles:
+def bend(model: Model, steps: int, low: float, times: int = TIMES) -> Cycles:
     """Load the model and release it, again and again, without taking the bodies apart."""
     system = System(model)
     stepper = Stepper(system, Control())
     point = stepper.rest(system.initial())
     up, down = [], []
     try:
-        for _ in range(TIMES):
+        for _ in range(times):
             for load in np.linspace(low, 1, steps + 1)[1:]:
                 point = stepper.reach(point, float(load))
             up.append(point.now)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
@@ -14,6 +14,8 @@ from solver import LimitLoad, NotConverged, Record, Status, System
 from solver.contact.state import Converged, State
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_parameters import RollingParameters
+from tests.stability.kinds.bearing import BORNE, NEAR
+from tests.stability.kinds.draws import changed
 from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure, Scene, tells
@@ -33,13 +35,6 @@ HEAVY = 4.0
 SOFTEST = 6.0
 """Largest load without hardening: beyond it strains pass 100 %, and a wheel on eight points of
 contact digs a furrow that no figure here can judge."""
-
-BORNE = 1 / (1 + math.pi / 2)
-"""Most traction over vertical force that a surface without hardening bears: k times a width that
-bears (1 + pi / 2) k beside it (A.P. Green, J. Mech. Phys. Solids 2 (1954) 197-211)."""
-NEAR = 0.75
-"""Of it. A wheel that sinks in leans on what is before it and needs more than its traction tells:
-that there is an equilibrium is certain only well below."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +125,7 @@ def judge(rolled: Rolled) -> dict[str, Figure]:
     """
     p, record = rolled.parameters, rolled.record
     force = p.force
-    way = p.traction * p.friction * force
+    way = p.directions[-1] * p.traction * p.friction * force
     figures = {"audit": Figure(float(record.status is not Status.OK), 0.0)}
     if record.status is not Status.OK:
         return figures
@@ -181,7 +176,7 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
     turning = -float((arm[0] * force[1] - arm[1] * force[0]).sum())
     figures = {"vertical force": Figure(abs(float(force[1].sum()) / p.force + 1), 1e-7)}
     if p.friction and p.traction:
-        wanted = p.radius * p.traction * p.friction * p.force
+        wanted = p.directions[-1] * p.radius * p.traction * p.friction * p.force
         miss = abs(turning + wanted) / (p.radius * p.force)
         figures["moment"] = Figure(miss, 0.02 * p.half_width / p.radius)
     return figures
@@ -223,18 +218,13 @@ def _honest(p: RollingParameters) -> Callable[[str], bool] | None:
     return (lambda text: any(way(text) for way in ways)) if ways else None
 
 
-def scenes() -> list[Scene]:
+def scenes(count: int = COUNT) -> list[Scene]:
     """Return the wheels."""
     rng = np.random.default_rng(SEED)
-    made = [parameters_of(number, rng) for number in range(COUNT)]
-    default = RollingParameters()
+    made = [parameters_of(number, rng) for number in range(count)]
     return [
         Scene(
-            what=", ".join(
-                f"{f.name}={getattr(p, f.name)!r}"
-                for f in fields(p)
-                if getattr(p, f.name) != getattr(default, f.name)
-            ),
+            what=changed(p),
             run=partial(roll, p),
             judge=judge,
             refusal=off_the_rim if p.load_ratio >= HEAVY else None,

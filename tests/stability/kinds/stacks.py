@@ -196,11 +196,17 @@ def _with_pads(stack: Stack) -> Stack:
     return replace(stack, layers=(first, *wide), pads=True)
 
 
-def scenes() -> list[Scene]:
-    """Return the stacks, some with two bodies side by side, some with the slave below."""
+def _arranged(number: int, stack: Stack) -> Stack:
+    """Return some of the stacks with two bodies side by side, some with the slave below."""
+    if number % COUNT in (7, 10, 16, 25) and stack.state != "axisymmetric":
+        return _with_pads(stack)
+    if number % COUNT in (26, 27):
+        return replace(stack, slave_below=True, sliding="small")
+    return stack
+
+
+def scenes(count: int = COUNT) -> list[Scene]:
+    """Return the stacks."""
     rng = np.random.default_rng(SEED)
-    stacks = [random_stack(number, rng) for number in range(COUNT)]
-    for k in (7, 10, 16, 25):
-        stacks[k] = _with_pads(stacks[k])
-    stacks[-2:] = [replace(s, slave_below=True, sliding="small") for s in stacks[-2:]]
-    return [stack.scene() for stack in stacks]
+    stacks = [random_stack(number, rng) for number in range(count)]
+    return [_arranged(number, stack).scene() for number, stack in enumerate(stacks)]
