@@ -22,7 +22,7 @@ ENDLESS: Literal["endless"] = "endless"
 Track = Annotated[Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["endless"], Unit("mm")]
 
 _ELEMENTS: Mapping[Accuracy, tuple[int, int]] = {
-    "draft": (8, 4), "standard": (20, 8), "fine": (40, 16)
+    "draft": (8, 4), "standard": (16, 8), "fine": (32, 16)
 }  # fmt: skip
 """Elements of a half-width: on a track without ends, and on one of given length."""
 _GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.15**0.5}

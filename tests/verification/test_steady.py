@@ -108,9 +108,8 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(hardening, shear):
 
     state.plastic_strain[:, rows.points] = np.moveaxis(one.plastic_strain, 2, 0)
     stress = material.stiffness(4) @ (part.strain(u) - state.plastic_strain)
-    correction = part.strain(whole.begin(forces - part.internal_force(stress))).finish(
-        np.zeros(part.n)
-    )
+    residual = forces - part.internal_force(stress)
+    correction = part.strain(whole.begin(residual).finish(np.zeros(part.n)))
     assert stiff * abs(correction).max() < 1e-6
 
 
