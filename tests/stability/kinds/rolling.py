@@ -175,7 +175,7 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
     arm = track.X[:, nodes] + u - hub[:, None]
     turning = -float((arm[0] * force[1] - arm[1] * force[0]).sum())
     figures = {"vertical force": Figure(abs(float(force[1].sum()) / p.force + 1), 1e-7)}
-    if p.friction and p.traction:
+    if p.friction and p.traction and not p.guided:
         wanted = p.directions[-1] * p.radius * p.traction * p.friction * p.force
         miss = abs(turning + wanted) / (p.radius * p.force)
         figures["moment"] = Figure(miss, 0.02 * p.half_width / p.radius)
