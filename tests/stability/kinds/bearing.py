@@ -65,10 +65,9 @@ def _borne(p: RollingParameters) -> bool:
         ratio = p.friction * (1.0 if p.guided else abs(p.traction))
         if ratio > NEAR * BORNE and shear > NEAR * k:
             return False
+        return math.pi / 4 * p.peak_pressure < k * (2 + math.pi)
     m = min(shear / k, 1.0)
     strip = k * (1 + math.pi / 2 + math.acos(m) + math.sqrt(1 - m**2))
-    if p.load == "contact":
-        return math.pi / 4 * p.peak_pressure < strip
     return m < NEAR and p.peak_pressure < NEAR * strip
 
 
