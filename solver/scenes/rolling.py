@@ -52,11 +52,11 @@ ADVANCE_ERROR = declare(
 SURFACE = {
     "x": declare(
         "surface_residual_x",
-        "residual stress xx at the surface, mid-track, extrapolated to its nodes", "MPa",
+        "residual stress xx at the surface, mid-track, recovered at its nodes", "MPa",
     ),
     "z": declare(
         "surface_residual_z",
-        "residual stress zz at the surface, mid-track, extrapolated to its nodes", "MPa",
+        "residual stress zz at the surface, mid-track, recovered at its nodes", "MPa",
     ),
 }  # fmt: skip
 FIRST_ROW = {

@@ -24,7 +24,7 @@ MEASURES = {
     load: {f"{depth:g} mm": f"residual sigma_x at {depth:g} mm / Re" for depth in DEPTHS}
     for load in LOADS
 }
-"""Residual stress, linear between rows of points, and from the first two to the surface."""
+"""Residual stress, linear between rows of points; at the surface that of the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,5 +97,4 @@ def _rolled(case: Case, load: str) -> tuple[Track, np.ndarray, np.ndarray]:
 def _profile(rolled: tuple[Track, np.ndarray, np.ndarray]) -> np.ndarray:
     """Return the stress at the depths that are compared."""
     _, depth, stress = rolled
-    surface = stress[0] - depth[0] * (stress[1] - stress[0]) / (depth[1] - depth[0])
-    return np.interp(DEPTHS, np.append(0.0, depth), np.append(surface, stress))
+    return np.interp(DEPTHS, depth, stress)
