@@ -6,7 +6,7 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -75,15 +75,19 @@ def without_ends(
 
 
 def _stepped(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
-    """Return the runs on a track with ends, none if that would take too many increments."""
-    length = _BY_INCREMENTS * runs[-1].half_width
-    if runs[-1].passes > _MOST_BY_INCREMENTS:
+    """Return the runs on a track with ends, none if that would take too many increments.
+
+    Their elements are as large as those of such a track are, or as those of the run, if larger.
+    """
+    last = runs[-1]
+    if last.passes > _MOST_BY_INCREMENTS:
         return []
+    ends: dict[str, Any] = {"track": _BY_INCREMENTS * last.half_width, "until": "passes"}
+    usual: dict[str, Any] = dict.fromkeys(("element_size", "advance_step"))
     with suppress(ModelError):
-        return [
-            replace(run, track=length, until="passes", advance_step=run.element_size / 2)
-            for run in runs
-        ]
+        own = replace(last, **ends, **usual)
+        h = max(own.element_size, last.element_size)
+        return [replace(run, **ends, element_size=h, advance_step=h / 2) for run in runs]
     return []
 
 
