@@ -67,7 +67,9 @@ def without_ends(
             break
     bears_none = isinstance(rolled.error, LimitLoad) and runs[-1].load == "hertz"
     if not bears_none and waiting and (others := _stepped(waiting)):
-        note = f"{rolled.error}: rolled by increments instead, over {others[0].length:.4g} mm"
+        length, side = others[0].length, others[0].element_size
+        note = f"{rolled.error}: rolled by increments instead, over {length:.4g} mm"
+        note += f" with elements of {side:.3g} mm"
         for look in by_increments(scene, others, monitor):
             yield replace(look, notes=(note,))
         return

@@ -26,6 +26,7 @@ _ELEMENTS: Mapping[Accuracy, tuple[int, int]] = {
 }  # fmt: skip
 """Elements of a half-width: on a track without ends, and on one of given length."""
 _GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.15**0.5}
+_LARGEST = 100.0  # element side [mm]
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
 _SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
 _PERIOD = 6.0  # least length of a track that repeats itself / Hertz half-width
@@ -168,7 +169,7 @@ class RollingParameters(WheelParameters):
         """
         endless, of_length = _ELEMENTS[self.accuracy]
         side = self.mesh_width / endless if self.endless else self.half_width / of_length
-        h = float(f"{self.element_size or side:.2g}")
+        h = self.element_size or float(f"{min(side, _LARGEST):.2g}")
         advance = h / 2 if self.endless else min(h / 2, self.length / 2)
         return {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
 

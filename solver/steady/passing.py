@@ -195,7 +195,7 @@ def passing(
         earlier = min(sizes[:-_PATIENCE], default=np.inf)
         if unsolved and min(sizes[-_PATIENCE:]) > _PROGRESS * earlier:
             break
-    raise NotConverged(f"no steady pass was found in {len(sizes)} steps of Newton's method")
+    raise NotConverged(f"no steady pass was found in {len(sizes) - 1} steps of Newton's method")
 
 
 @dataclass(frozen=True, slots=True)

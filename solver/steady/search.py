@@ -8,7 +8,6 @@ fades away. On a track that was rolled before, lighter loads do.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -67,13 +66,17 @@ def search(
         raise
     except NotConverged as error:
         failure = error
-    if not before.accumulated.any():
-        own = material.hardening_ratio if material.hardens else 0.0
+    own = material.hardening_ratio if material.hardens else 0.0
+    # on a track that was rolled, hardening would know of the strain that was gathered without it
+    if own < _HARDEST and not before.accumulated.any():
         return _fading(eased, partial(exactly, load), own)
-    # hardening would know of the strain that was gathered without it
     if guess is not None and not isinstance(failure, LimitLoad):
-        with suppress(NotConverged):
+        try:
             return exactly(load)
+        except WindowTooSmall:
+            raise
+        except NotConverged as error:
+            failure = error
     return _approached(exactly, load, failure)
 
 
@@ -109,7 +112,7 @@ def _fading(
 
 
 def _approached(exactly: Callable[..., Pass], load: Load, failure: NotConverged) -> Pass:
-    """Return the pass to which lighter loads lead; raise ``failure`` where they do not."""
+    """Return the pass to which lighter loads lead; raise ``failure`` where one is not found."""
     guess: Array | None = None
     for share in _SHARES:
         try:

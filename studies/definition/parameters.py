@@ -65,6 +65,8 @@ class Parameter:
         StudyError
             naming `field`, when the value has the wrong type or is not finite
         """
+        if value is None and self.default is None:  # left out, as a stored study has it
+            return None
         try:
             typed = self._type.validate_json(json.dumps(value, allow_nan=False), strict=True)
         except (ValidationError, ValueError, TypeError, RecursionError):

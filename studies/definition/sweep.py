@@ -119,6 +119,8 @@ def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
     for position, value in enumerate(values):
         field = f"sweep.{parameter.name}[{position}]"
         normal = parameter.normalise(value, field)
+        if normal is None:
+            raise parameter.refusal(field, value)
         first = seen.setdefault(canonical(normal), position)
         if first != position:
             raise StudyError(field, value, f"occurs already at position {first}: keep one")

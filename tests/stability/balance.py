@@ -101,9 +101,11 @@ def tilt(solution: Solution) -> tuple[float, float]:
             theta, moved = 0.0, 0.0
             for side in (pair.slave, pair.master):
                 nodes = _chain(solution.system, side)
-                x = solution.nodes(side[0])[0, nodes]
+                x, y = solution.nodes(side[0])[:2, nodes]
                 u = solution.displacement(side[0], "loaded")[:, nodes]
-                theta = max(theta, float(np.abs(np.diff(u[1]) / np.diff(x)).max()))
+                theta = max(
+                    theta, float(np.abs(np.diff(u[1]) / np.hypot(np.diff(x), np.diff(y))).max())
+                )
                 moved = max(moved, float(np.abs(u[0]).max() / np.ptp(x)))
             across = max(across, theta**2 + pair.friction * theta)
             along = max(along, theta + pair.friction * moved)

@@ -15,6 +15,7 @@ from studies import Store, Study, open_netcdf, open_study, run_study
 from studies.definition.parameters import completed, defaults, parameters_of, scene_schema
 from studies.errors import StudyError
 from studies.views.comparison.problem import run_parameters
+from studies.views.plots.captions import setting
 
 LEVELS = ("draft", "standard", "fine")
 BY_ACCURACY = [
@@ -68,9 +69,8 @@ def test_the_schema_has_no_default_for_what_accuracy_sets() -> None:
     assert "default" not in properties["element_size"]
     assert properties["element_size"]["type"] == "number"
     assert properties["accuracy"]["default"] == "standard"
-    with pytest.raises(StudyError, match=r"parameters\.growth"):
-        Study.from_dict({"name": "n", "scene": "punch", "parameters": {"growth": None},
-                         "sweep": {"friction": [0.0]}})  # fmt: skip
+    with pytest.raises(StudyError, match=r"sweep\.growth\[1\]"):
+        Study.from_dict({"name": "n", "scene": "punch", "sweep": {"growth": [1.4, None]}})
 
 
 def test_what_is_left_out_is_completed_beside_the_other_values() -> None:
@@ -93,6 +93,7 @@ def test_a_sweep_of_accuracy_stores_the_numbers_of_each_run(tmp_path: Path) -> N
             },
         }
     )
+    assert Study.known(study.to_dict()).id == Study.from_dict(study.to_dict()).id == study.id
     store = Store(tmp_path)
     outcome = run_study(study, store, workers=1)
     assert outcome.ok, outcome.failed
@@ -101,6 +102,8 @@ def test_a_sweep_of_accuracy_stores_the_numbers_of_each_run(tmp_path: Path) -> N
     np.testing.assert_array_equal(combined["growth"], [np.nan, 1.3])
     found = run_parameters(combined.isel(accuracy=[1], spacing=[0]))
     assert (found["element_size"], found["growth"]) == (own.element_size, own.growth)
+    caption = setting(combined.isel(accuracy=1, spacing=0).squeeze())
+    assert "element" not in caption and "None" not in caption
     sizes = set()
     for case in study.cases():
         with open_netcdf(store.run_path(case.id)) as run:

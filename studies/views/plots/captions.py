@@ -9,6 +9,7 @@ from typing import Any
 
 import xarray as xr
 
+from solver.errors import ModelError
 from studies.definition.parameters import defaults, parameters_of, plain, scene_named
 
 _STAY = "\N{NO-BREAK SPACE}"
@@ -55,7 +56,7 @@ def setting(run: xr.Dataset) -> str:
     scene = run.attrs["scene"]
     known = parameters_of(scene_named(scene))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
-    usual = defaults(scene_named(scene), given)
+    usual = _usual(run, given)
     state = [words(given["state"])] if "state" in given and "state" not in run.coords else []
     place = [
         named(
@@ -69,10 +70,26 @@ def setting(run: xr.Dataset) -> str:
     others = [
         named(name, value, known[name].unit)
         for name, value in given.items()
-        if name in known and name not in {"state", *run.coords} and value != usual[name]
+        if name in known and name not in {"state", *run.coords} and value not in (None, usual[name])
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)
+
+
+def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the defaults of the parameters of a run; of several runs, those that they declare."""
+    scene = scene_named(run.attrs["scene"])
+    known = parameters_of(scene)
+    swept = {
+        str(name): plain(each.item(), known[name].default)
+        for name, each in run.coords.items()
+        if name in known and each.ndim == 0
+    }
+    left_out = {name: None for name, value in swept.items() if value != value}  # NaN
+    try:
+        return defaults(scene, {**given, **swept, **left_out})
+    except ModelError:  # only what is swept makes the parameters go together
+        return {name: parameter.default for name, parameter in known.items()}
 
 
 def wrapped(text: str, width: float, points: int) -> str:
