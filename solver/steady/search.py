@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
 from solver.steady.passing import PARTS, TOLERANCE, passing
@@ -60,24 +60,28 @@ def search(
         harder = replace(material, hardening="kinematic", hardening_ratio=ratio)
         return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
 
-    try:
-        return exactly(load, guess)
-    except WindowTooSmall:
-        raise
-    except NotConverged as error:
-        failure = error
+    found = _tried(exactly, load, guess)
+    if not isinstance(found, NotConverged):
+        return found
     own = material.hardening_ratio if material.hardens else 0.0
     # on a track that was rolled, hardening would know of the strain that was gathered without it
     if own < _HARDEST and not before.accumulated.any():
         return _fading(eased, partial(exactly, load), own)
-    if guess is not None and not isinstance(failure, LimitLoad):
-        try:
-            return exactly(load)
-        except WindowTooSmall:
-            raise
-        except NotConverged as error:
-            failure = error
-    return _approached(exactly, load, failure)
+    if guess is not None and not isinstance(found, LimitLoad):
+        found = _tried(exactly, load)
+        if not isinstance(found, NotConverged):
+            return found
+    return _approached(exactly, load, found)
+
+
+def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
+    """Return a pass, or why it was not found; raise where only a larger window can help."""
+    try:
+        return solve(*given)
+    except WindowTooSmall:
+        raise
+    except NotConverged as failure:
+        return failure
 
 
 def _fading(
@@ -91,23 +95,20 @@ def _fading(
     while True:
         guess = found.strain if found else None
         last = ratio <= max(own, _SOFTEST)
-        try:
-            found = exactly(guess) if last else eased(ratio, guess)
-        except WindowTooSmall:
-            raise
-        except NotConverged:
+        next_one = _tried(exactly, guess) if last else _tried(eased, ratio, guess)
+        if isinstance(next_one, NotConverged):
             if found is None or share > _SLOWEST:
-                raise
+                raise next_one
             ratio, share = ratio / share, share**0.5
+        elif last:
+            return next_one
+        elif next_one.gathered > _LARGE:
+            raise LimitLoad(
+                "plastic strain grows without bound: a steady pass adds more than "
+                f"{_LARGE:.0%}, even if the material hardens by {ratio:.2g} of Young's modulus"
+            )
         else:
-            if last:
-                return found
-            if found.gathered > _LARGE:
-                raise LimitLoad(
-                    "plastic strain grows without bound: a steady pass adds more than "
-                    f"{_LARGE:.0%}, even if the material hardens by {ratio:.2g} of Young's modulus"
-                )
-            share = max(share**2, _SHARE)
+            found, share = next_one, max(share**2, _SHARE)
         ratio *= share
 
 
@@ -115,10 +116,8 @@ def _approached(exactly: Callable[..., Pass], load: Load, failure: NotConverged)
     """Return the pass to which lighter loads lead; raise ``failure`` where one is not found."""
     guess: Array | None = None
     for share in _SHARES:
-        try:
-            guess = exactly(load.lighter(share), guess).strain
-        except WindowTooSmall:
-            raise
-        except NotConverged:
-            raise failure from None
+        found = _tried(exactly, load.lighter(share), guess)
+        if isinstance(found, NotConverged):
+            raise failure
+        guess = found.strain
     return exactly(load, guess)
