@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 from scipy.spatial import cKDTree
 
 from solver.contact.state import State
@@ -83,14 +83,15 @@ class HalfPlane:
         """
         del name
         part = self._part
-        matrix = recovery(part).tolil()
         points, y = part.points.reshape(2, -1), part.X[1]
         first = np.flatnonzero(points[1] > points[1].max() * (1 + _LEVEL))
         top = np.flatnonzero(y > y.max() - _LEVEL * abs(points[1].max()))
         nearest = cKDTree(points[0, first, None]).query(part.X[0, top, None], k=2)[1]
-        matrix[top] = 0.0
-        matrix[top[:, None], first[nearest]] = 0.5
-        return csr_array(matrix)
+        below = np.ones(len(y))
+        below[top] = 0.0
+        halves = np.full(nearest.size, 0.5), (np.repeat(top, 2), first[nearest].ravel())
+        at_surface = csr_array(halves, shape=(len(y), points.shape[1]))
+        return csr_array(diags_array(below) @ recovery(part) + at_surface)
 
     def response(self, name: str, converged: Standing) -> Response:
         """Return stress and internal variables at the points."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,33 @@ if TYPE_CHECKING:
     from solver.steady.track import Track
 
     Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What a load adds when it passes again: ``strain`` as last time, changed as it changed last.
+
+    ``change`` (None after one pass) fades as it did: the ratio to the change before is ``kept``.
+    """
+
+    strain: Array
+    change: Array | None = None
+    kept: float = 0.0
+
+    @property
+    def next(self) -> Array:
+        """The strain that the next pass is expected to add."""
+        return self.strain if self.change is None else self.strain + self.kept * self.change
+
+    def after(self, strain: Array) -> Expected:
+        """Return what is expected after a pass that added this strain."""
+        change = strain - self.strain
+        if self.change is None:
+            return Expected(strain, change)
+        square = float((self.change**2).sum())
+        kept = float((change * self.change).sum()) / square if square else 0.0
+        return Expected(strain, change, min(max(kept, 0.0), 1.0))
+
 
 EXACT_AFTER = 4
 REPEATED = 1e-5
@@ -66,7 +93,7 @@ def rolling(
             "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
     state: Layers = track.rows.virgin
-    guesses: dict[tuple[int, int], Array] = {}
+    expected: dict[tuple[int, int], Expected] = {}
     loads = load if isinstance(load, Iterable) else itertools.repeat(load)
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
         which = id(own), direction
@@ -75,8 +102,9 @@ def rolling(
             parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
         )  # fmt: skip
         with one_thread():
-            found = solve(guesses.get(which, guess))
+            found = solve(expected[which].next if which in expected else guess)
         found = replace(found, direction=direction)
-        guesses[which] = guess = found.strain
+        guess = found.strain
+        expected[which] = expected[which].after(guess) if which in expected else Expected(guess)
         state = found.left
         yield found

@@ -3,7 +3,8 @@
 Newton's method may lose its way where much flows at once, and take that for a limit. Where friction
 asks for more shear than the material bears, the contact must flatten until it does, and strain is
 not small. The same load on a material that hardens leads there, as its strain grows while hardening
-fades away. On a track that was rolled before, lighter loads do.
+fades away, or a heavier load does: where a small part more of load makes the contact sink in, one
+comes back from there. On a track that was rolled before, lighter loads lead there.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
 from solver.steady.passing import PARTS, TOLERANCE, passing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from solver.materials.material import Material
@@ -34,8 +36,9 @@ _HARDEST, _SOFTEST = 0.024, 1e-4
 _SHARE, _SLOWEST = 1 / 3, 0.8
 """Ratio of one slope to the one before: at first, and where a pass is hard to find."""
 _LARGE = 0.3
-"""Plastic strain gathered, above which a load is at its limit: less hardening makes it more."""
-_SHARES = (0.8, 0.9, 0.95)
+"""Plastic strain that a pass gathers, above which a load is at its limit, unless the material
+hardens: less hardening and smaller elements make it more."""
+_LIGHTER, _HEAVIER = (0.8, 0.9, 0.95), (1.1, 1.06, 1.03)
 """Of a load, by which one approaches it."""
 _PARTS, _TOLERANCE = 8, 2e-3
 """How exactly these passes are found."""
@@ -51,27 +54,51 @@ def search(
     parts: int = PARTS,
     tolerance: float = TOLERANCE,
 ) -> Pass:
-    """Return the steady pass that `passing` finds, from the guess or from another one."""
+    """Return the steady pass that `passing` finds, from the guess or from another one.
+
+    Raises
+    ------
+    LimitLoad, WindowTooSmall, NotConverged
+        as `passing` does; a material that hardens little, or not, is at its limit where it adds
+        more than 30 % of plastic strain
+    """
 
     def exactly(load: Load, guess: Array | None = None) -> Pass:
         return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
 
-    def eased(ratio: float, guess: Array | None) -> Pass:
+    def eased(load: Load, ratio: float, guess: Array | None) -> Pass:
         harder = replace(material, hardening="kinematic", hardening_ratio=ratio)
         return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
 
-    found = _tried(exactly, load, guess)
-    if not isinstance(found, NotConverged):
-        return found
     own = material.hardening_ratio if material.hardens else 0.0
+    found = _tried(exactly, load, guess)
     # on a track that was rolled, hardening would know of the strain that was gathered without it
     if own < _HARDEST and not before.accumulated.any():
-        return _fading(eased, partial(exactly, load), own)
-    if guess is not None and not isinstance(found, LimitLoad):
-        found = _tried(exactly, load)
-        if not isinstance(found, NotConverged):
-            return found
-    return _approached(exactly, load, found)
+        if isinstance(found, NotConverged):
+            found = _tried(_fading, partial(eased, load), partial(exactly, load), own, _LARGE)
+        if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
+            above = load.lighter(_HEAVIER[0])
+            begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
+            found = _approached(exactly, load, _HEAVIER[1:], begun, found)
+    else:
+        again = guess is not None and isinstance(found, NotConverged)
+        if again and not isinstance(found, LimitLoad):
+            found = _tried(exactly, load)
+        if isinstance(found, NotConverged):
+            found = _approached(exactly, load, _LIGHTER, None, found)
+    if isinstance(found, NotConverged):
+        raise found
+    if own < _HARDEST and found.gathered > _LARGE:
+        raise _unbounded(own)
+    return found
+
+
+def _unbounded(ratio: float) -> LimitLoad:
+    """Return the limit of a load under which a material of this hardening gathers too much."""
+    even = f", even if the material hardens by {ratio:.2g} of Young's modulus" if ratio else ""
+    return LimitLoad(
+        f"plastic strain grows without bound: a steady pass adds more than {_LARGE:.0%}{even}"
+    )
 
 
 def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
@@ -88,8 +115,12 @@ def _fading(
     eased: Callable[[float, Array | None], Pass],
     exactly: Callable[[Array | None], Pass],
     own: float,
+    largest: float,
 ) -> Pass:
-    """Return the pass to which those of fading hardening lead, in smaller steps where they must."""
+    """Return the pass to which those of fading hardening lead, in smaller steps where they must.
+
+    None of them may gather more than ``largest``.
+    """
     ratio, share = _HARDEST, _SHARE
     found: Pass | None = None
     while True:
@@ -102,22 +133,27 @@ def _fading(
             ratio, share = ratio / share, share**0.5
         elif last:
             return next_one
-        elif next_one.gathered > _LARGE:
-            raise LimitLoad(
-                "plastic strain grows without bound: a steady pass adds more than "
-                f"{_LARGE:.0%}, even if the material hardens by {ratio:.2g} of Young's modulus"
-            )
+        elif next_one.gathered > largest:
+            raise _unbounded(ratio)
         else:
             found, share = next_one, max(share**2, _SHARE)
         ratio *= share
 
 
-def _approached(exactly: Callable[..., Pass], load: Load, failure: NotConverged) -> Pass:
-    """Return the pass to which lighter loads lead; raise ``failure`` where one is not found."""
-    guess: Array | None = None
-    for share in _SHARES:
-        found = _tried(exactly, load.lighter(share), guess)
+def _approached(
+    exactly: Callable[..., Pass],
+    load: Load,
+    shares: tuple[float, ...],
+    begun: Pass | NotConverged | None,
+    failure: NotConverged,
+) -> Pass | NotConverged:
+    """Return the pass to which other shares of its load lead, or ``failure`` if one is not found.
+
+    ``begun`` is the pass from which they begin, None for a track at rest.
+    """
+    found = begun
+    for share in (*shares, 1.0):
         if isinstance(found, NotConverged):
-            raise failure
-        guess = found.strain
-    return exactly(load, guess)
+            return failure
+        found = _tried(exactly, load.lighter(share), None if found is None else found.strain)
+    return failure if found is None else found

@@ -22,7 +22,7 @@ from studies.errors import RunUnreadable
 from studies.storage import dataset as layout
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
-from studies.storage.runfile import opened
+from studies.storage.runfile import global_attributes, opened
 from studies.storage.store import Store, appearing
 
 SAME = 1e-9
@@ -77,16 +77,16 @@ def _combined(
     for run_id in found:
         with opened(store.run_path(run_id)) as run:
             frame.learn(run)
-            ran.add(what_ran(run.attrs))
+            ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    attributes = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
+    told = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
     symmetric = {SYMMETRIC: int(halves == {1})}
     outcomes: dict[str, tuple[str, str]] = {}
     store.clear_directory(target)
     with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
         with h5netcdf.File(disk, "w") as file:
-            file.attrs.update(attributes | symmetric)
+            file.attrs.update(told | symmetric)
             frame.create_axes(file, scene)
             frame.create_fields(file)
             for run_id, index in found.items():

@@ -45,20 +45,19 @@ def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
     sweep = usual_dimensions(scene)
     ones = (1,) * len(sweep)
     status = STATUSES[record.status.code]
-    dataset = _frame(scene, case, sweep, status, record.message)
-    dataset.attrs[SYMMETRIC] = int(record.symmetric)
-    for name, labels in record.coordinates.items():
-        dataset[name] = (name, np.asarray(labels), attributes_of(name))
+    variables: dict[str, tuple[Any, np.ndarray, Mapping[str, Any]]] = {
+        name: (name, np.asarray(labels), attributes_of(name))
+        for name, labels in record.coordinates.items()
+    }
     for name, (dimensions, values) in record.fields.items():
         if unnamed := set(dimensions) - set(record.coordinates):
             raise ValueError(f"{name} has dimensions without coordinates: {sorted(unnamed)}")
-        array = np.asarray(values, dtype=float)
-        dataset[name] = ((*sweep, *dimensions), array.reshape(*ones, *array.shape))
+        array = np.asarray(values, dtype=float).reshape(*ones, *np.shape(values))
+        variables[name] = (*sweep, *dimensions), array, attributes_of(name)
     for name, number in record.scalars.items():
-        dataset[name] = (sweep, _scalar(name, number).reshape(ones))
-    for name in (*record.fields, *record.scalars):
-        dataset[name].attrs.update(attributes_of(name))
-    return dataset
+        variables[name] = sweep, _scalar(name, number).reshape(ones), attributes_of(name)
+    frame = _frame(scene, case, sweep, status, record.message)
+    return frame.assign(variables).assign_attrs({SYMMETRIC: int(record.symmetric)})
 
 
 def broken_dataset(scene: Scene, case: Case, message: str) -> xr.Dataset:

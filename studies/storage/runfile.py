@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
-import h5netcdf
 import h5py
+import netCDF4
 import xarray as xr
-from xarray.backends import H5NetCDFStore
+from xarray.backends import NetCDF4DataStore
 
 from studies.errors import RunUnreadable, StoreFull
 from studies.storage import dataset as layout
@@ -31,6 +31,10 @@ _LINE = re.compile(rb"\nrun ([0-9a-f]{32}) sha256 ([0-9a-f]{64})\n")
 _LENGTH = 110
 _DIGEST = 65
 """Bytes of the whole line, and of what it does not cover itself."""
+_FIRST_BYTES = 1 << 16
+"""Size with which a file in memory begins; it grows."""
+_ONE_AT_A_TIME = Lock()
+"""The netCDF library serves one thread at a time."""
 _NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
 
 
@@ -41,18 +45,16 @@ def sealed(run: xr.Dataset) -> bytes:
 
 
 def _packed(run: xr.Dataset) -> bytes:
-    """Return a run as netCDF, made in memory: HDF5 does not survive a full disk.
-
-    xarray would lock the file across all workers, although nobody else can see it.
-    """
+    """Return a run as netCDF, made in memory: HDF5 does not survive a full disk."""
     stored = layout.encoding(run)
     for name, variable in run.variables.items():
         if variable.ndim and variable.dtype.kind in "fi":
             stored.setdefault(str(name), {})["fletcher32"] = True
-    memory = io.BytesIO()
-    with h5netcdf.File(memory, "w") as file:
-        run.assign_attrs(SEALED).dump_to_store(H5NetCDFStore(file, lock=False), encoding=stored)
-    return memory.getvalue()
+    with _ONE_AT_A_TIME:
+        file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
+        store = NetCDF4DataStore(file, lock=False)
+        run.assign_attrs(SEALED).dump_to_store(store, encoding=stored)
+        return bytes(file.close())
 
 
 def verify(path: Path) -> bool:
@@ -91,7 +93,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
     vouched = verify(path)
     try:
         with h5py.File(path, "r") as run:
-            _compare(run.attrs["id"], path)
+            _compare(global_attributes(run)["id"], path)
             yield run
     except (MemoryError, RunUnreadable, StoreFull):
         raise
@@ -99,6 +101,14 @@ def opened(path: Path) -> Iterator[h5py.File]:
         if vouched:
             raise
         raise RunUnreadable(path.stem, f"{type(error).__name__}: {error}") from None
+
+
+def global_attributes(run: h5py.File) -> dict[str, Any]:
+    """Return the global attributes; h5py gives a text of ASCII letters as bytes."""
+    return {
+        name: value.decode() if isinstance(value, bytes) else value
+        for name, value in run.attrs.items()
+    }
 
 
 def stamp(path: Path) -> dict[str, int]:
@@ -120,7 +130,7 @@ def row(path: Path) -> dict[str, Any]:
             for name, each in wanted.items()
             if not each.is_scale
         }
-        return layout.summary(run.attrs, values) | stamp(path)
+        return layout.summary(global_attributes(run), values) | stamp(path)
 
 
 def _compare(run_id: str, path: Path) -> None:
