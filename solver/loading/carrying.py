@@ -2,8 +2,7 @@
 
 Under a load that moves steadily an increment changes the bodies as an earlier one did, farther on.
 Nodes meet nodes again when the load has passed a whole element side. The change is therefore taken
-from an increment so many sides back, and moved by these sides: no value
-is interpolated.
+from an increment so many sides back, and moved by these sides: no value is interpolated.
 """
 
 from __future__ import annotations
