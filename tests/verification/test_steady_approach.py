@@ -1,4 +1,4 @@
-"""A steady pass that Newton's method does not find at once is approached by lighter loads."""
+"""A steady pass that Newton's method does not find at once is found by way of easier ones."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ import pytest
 
 from solver import LimitLoad
 from solver.errors import NotConverged, WindowTooSmall
+from solver.fem.fields import recovery
+from solver.results.steady import HalfPlane
 from solver.scenes.rolling_grids import wheel_nodes
 from solver.scenes.rolling_parameters import RollingParameters
-from solver.steady.search import _approached
+from solver.steady import track_of
+from solver.steady.rolling import Expected
+from solver.steady.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading
 
 
 class Weight:
@@ -24,14 +28,14 @@ class Weight:
         return Weight(share * self.size)
 
 
-def solver(steps, failures):
-    """A pass that is found from one of at least 0.94 of its load, and fails as told otherwise."""
+def solver(steps, failures, near=0.94):
+    """A pass that is found from one whose load is nearly its own, and fails as told otherwise."""
 
     def solve(load, guess=None):
         steps.append(load.size)
         if load.size in failures:
             raise failures[load.size]
-        if load.size == 1.0 and (guess is None or guess < 0.94):
+        if load.size == 1.0 and (guess is None or abs(1.0 - guess) > 1.0 - near):
             raise LimitLoad("flows without bound")
         return SimpleNamespace(strain=load.size)
 
@@ -41,23 +45,115 @@ def solver(steps, failures):
 LOST = LimitLoad("flows without bound")
 
 
+def approached(solve, shares=_LIGHTER, begun=None):
+    return _approached(solve, Weight(), shares, begun, LOST)
+
+
 def test_lighter_loads_lead_to_what_seemed_a_limit():
     steps = []
-    assert _approached(solver(steps, {}), Weight(), LOST).strain == 1.0
+    assert approached(solver(steps, {})).strain == 1.0
     assert steps == [0.8, 0.9, 0.95, 1.0]
 
 
-def test_it_is_a_limit_where_lighter_loads_do_not_lead_there():
+def test_heavier_loads_lead_down_to_it():
+    steps = []
+    begun = SimpleNamespace(strain=1.1)
+    assert approached(solver(steps, {}), (1.06, 1.03), begun).strain == 1.0
+    assert steps == [1.06, 1.03, 1.0]
+
+
+def test_it_is_a_limit_where_other_loads_do_not_lead_there():
     steps = []
     failures = {0.9: NotConverged("lost")}
-    with pytest.raises(LimitLoad, match="flows without bound"):
-        _approached(solver(steps, failures), Weight(), LOST)
+    assert approached(solver(steps, failures)) is LOST
+    assert steps == [0.8, 0.9]
+    assert approached(solver(steps, {}), (1.06, 1.03), NotConverged("lost")) is LOST
     assert steps == [0.8, 0.9]
 
 
 def test_a_window_that_is_too_small_for_a_lighter_load_is_told():
     with pytest.raises(WindowTooSmall):
-        _approached(solver([], {0.9: WindowTooSmall("below")}), Weight(), LOST)
+        approached(solver([], {0.9: WindowTooSmall("below")}))
+
+
+# -- hardening that fades away ---------------------------------------------------------------------
+
+
+def faded(hardest_to_find=0.0, own=0.0, largest=np.inf, step=0.3):
+    """The ratios tried; a pass is found from one whose hardening is not too much larger."""
+    tried = []
+
+    def eased(ratio, guess):
+        tried.append(ratio)
+        if ratio <= hardest_to_find or (guess is not None and ratio < step * guess):
+            raise NotConverged("lost")
+        return SimpleNamespace(strain=ratio, gathered=0.01 / ratio)
+
+    found = _fading(eased, lambda guess: SimpleNamespace(strain=guess), own, largest)
+    return tried, found.strain
+
+
+def test_hardening_fades_by_thirds_and_the_last_guess_is_the_softest():
+    tried, guess = faded()
+    np.testing.assert_allclose(np.diff(np.log(tried)), np.log(1 / 3))
+    assert tried[0] == _HARDEST
+    assert guess == tried[-1] < 3 * _SOFTEST
+
+
+def test_it_fades_down_to_the_hardening_of_the_material():
+    tried, _ = faded(own=2e-3)
+    assert min(tried) > 2e-3
+
+
+def test_it_fades_more_slowly_where_a_pass_is_hard_to_find():
+    tried, _ = faded(step=0.5)
+    assert tried[1] < 0.5 * tried[0] < tried[2]
+    assert tried[-1] < 3 * _SOFTEST
+
+
+def test_a_pass_that_is_not_found_however_slowly_it_fades_is_told():
+    with pytest.raises(NotConverged, match="lost"):
+        faded(hardest_to_find=1e-3)
+
+
+def test_passes_of_fading_hardening_that_gather_too_much_are_at_their_limit():
+    with pytest.raises(LimitLoad, match=r"30%, even if the material hardens by 0\.0"):
+        faded(largest=1.0)
+
+
+# -- passes that repeat ----------------------------------------------------------------------------
+
+
+def test_a_pass_is_expected_to_go_on_as_those_before():
+    strains = [np.array([1.0, -2.0]) * size for size in (1.0, 1.5, 1.75, 1.875)]
+    expected = Expected(strains[0])
+    np.testing.assert_array_equal(expected.next, strains[0])
+    for strain in strains[1:3]:
+        expected = expected.after(strain)
+    np.testing.assert_allclose(expected.next, strains[3])
+
+
+def test_a_change_that_turns_back_or_grows_is_not_carried_further():
+    turned = Expected(np.ones(1)).after(2 * np.ones(1)).after(np.ones(1))
+    np.testing.assert_array_equal(turned.next, [1.0])
+    grown = Expected(np.ones(1)).after(2 * np.ones(1)).after(5 * np.ones(1))
+    np.testing.assert_array_equal(grown.next, [8.0])
+
+
+# -- what a half-plane is made of ------------------------------------------------------------------
+
+
+def test_nodes_of_the_surface_have_the_values_of_the_first_row():
+    track = track_of(8.0, 4.0, 1.3, RollingParameters().material().elasticity)
+    half_plane = HalfPlane(track, 1)
+    part = half_plane.full("half_space")
+    depth = -part.points[1].ravel()
+    values = half_plane.recovery("half_space") @ depth
+    top = part.X[1] == 0
+    np.testing.assert_allclose(values[top], depth.min())
+    below = recovery(part) @ depth
+    np.testing.assert_allclose(values[~top], below[~top])
+    assert abs(below[top]).max() < 0.1 * depth.min()
 
 
 def test_rim_and_track_have_sides_of_one_length():
