@@ -86,13 +86,15 @@ class Wheel(Substructure):
         c, s = np.cos(angle), np.sin(angle)
         return np.array([[c, -s], [s, c]])
 
-    def _passing(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the motion of material along a rim of constant shape per arc (2, n_nodes)."""
+    def passing(self, surface: Surface, d: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the motion of material per arc (2, n_nodes), along a rim of constant shape.
+
+        ``d`` (2, n_nodes) are the displacements of its nodes in the frame of the hub [mm].
+        """
         x, y = surface.X - self.centre[:, None]
         starts, middles = surface.edges[:, :1], surface.edges[:, 2:]
         chain = np.append(np.hstack([starts, middles]), surface.edges[-1, 1])
         arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(surface.X[:, chain]), axis=0)))
-        d = u[surface.dofs].reshape(-1, 2).T
         out = np.stack([-y, x]) / self.radius
         out[:, chain] += np.gradient(d[:, chain], arc, axis=1)
         return out
@@ -109,7 +111,7 @@ class Wheel(Substructure):
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return derivative rows on rim, hub and rotation, after the numbers of these unknowns.
 
-        Rotation moves the material along the rim, and the shape of the rim stays (`_passing`).
+        Rotation moves the material along the rim, and the shape of the rim stays (`passing`).
         This needs no work in a round elastic wheel and changes no gap: the moment comes from
         friction alone, and its arm is the speed at which material passes. If the wheel turned
         together with its displacements, gaps would change too, and pressure would have a moment.
@@ -119,7 +121,8 @@ class Wheel(Substructure):
         """
         Q = self._frame(u)
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
-        turning = (nodal * (Q @ self._passing(surface, u)).T).sum(axis=(1, 2))
+        d = u[surface.dofs].reshape(-1, 2).T
+        turning = (nodal * (Q @ self.passing(surface, d)).T).sum(axis=(1, 2))
         turning[:gaps] = 0.0
         hub = nodal.sum(axis=1)
         rows = np.hstack([(nodal @ Q).reshape(block.shape), hub, turning[:, None]])

@@ -5,7 +5,7 @@ The *slip* of a contact point is the relative displacement of the two materials 
 advances by one element h: with the tangential row T of the point, its displacement fields u, and S
 the shift of a field by one element upstream,
 
-    slip = T (u - S u) of track and wheel + rigid rolling + h * creepage
+    slip = T (u - S u) of track and wheel + rigid rolling + h * creepage * passing rim
 
 Gap and slip depend linearly on the contact forces through the compliances of the two surfaces. The
 result is the frictional problem of `solver.contact.problem`, with a compliance that is not
@@ -143,7 +143,7 @@ class RollingWheel:
         drive: float | None = None,
         creepage: float = 0.0,
     ) -> None:
-        self._track, self._rim, self._friction, self._force = track, rim.surface, friction, force
+        self._track, self._rim, self._friction, self._force = track, rim, friction, force
         self._drive = drive if friction else None
         self._limit = limit
         self._creepage = creepage
@@ -151,7 +151,7 @@ class RollingWheel:
         self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
         self._compliance = track.response[track.at_surface], rim.compliance
         self._flowed = flowed(surface, +1), flowed(rim.surface, -1)
-        self._turning = rim.arms.T.ravel()
+        self._rolled = rim.rolled(self._length)
         self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
         self._known = _Known(
             on_track=np.zeros(len(surface.dofs)),
@@ -229,7 +229,7 @@ class RollingWheel:
         """Return how gaps and slips depend on displacements, around the contact as known."""
         u = self._compliance[0] @ known.on_track + shape
         d = self._compliance[1] @ known.on_wheel + known.height * self._up
-        surface, rim = self._track.surface, self._rim
+        surface, rim = self._track.surface, self._rim.surface
         pairing = pair(surface, u.reshape(-1, 2).T, rim, d.reshape(-1, 2).T)
         at = np.flatnonzero(pairing.covered > _COVERED)
         normal = [block[at] for block in pairing.normal]
@@ -263,10 +263,10 @@ class RollingWheel:
         track, wheel = geometry.rows
         normal, tangent = wheel[:n], wheel[n:]
         ahead = np.tile([1.0, 0.0], len(shape) // 2)
-        creeping = tangent @ self._turning
+        creeping = tangent @ self._rim.passing(self._compliance[1] @ known.on_wheel)
         offset = geometry.moves[0] @ shape
         offset[:n] += geometry.gap
-        offset[n:] -= self._length * (track[n:] @ ahead + creeping)
+        offset[n:] += tangent @ self._rolled - self._length * (track[n:] @ ahead)
         motions = [np.concatenate([normal @ self._up, np.zeros(n)])]
         balance = [known.tilt - self._force]
         if self._drive is None:
