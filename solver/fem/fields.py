@@ -127,21 +127,6 @@ def _reference(
     return np.asarray(local[:, :, 0])
 
 
-def error_estimate(part: Discretisation, stress: NDArray[np.float64]) -> tuple[float, float]:
-    """Return twice the elastic energy [N mm] of recovered minus computed stress, and of stress.
-
-    O.C. Zienkiewicz, J.Z. Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337-357: the square root of
-    their ratio estimates the relative discretisation error in the energy norm.
-    """
-    smooth = recovery(part) @ stress.T
-    nodes = part.basis.element_dofs
-    shapes = np.array(
-        [np.broadcast_to(np.asarray(b[0]), part.weights.shape) for b in part.basis.basis]
-    )
-    back = np.einsum("iep,iec->cep", shapes, smooth[nodes]).reshape(len(stress), -1)
-    return 2 * elastic_energy(part, back - stress), 2 * elastic_energy(part, stress)
-
-
 def elastic_energy(part: Part, stress: NDArray[np.float64]) -> float:
     """Return the elastic energy of Mandel stress (n_components, n_points) in a part [N mm]."""
     return float(part.body.law.elasticity.energy_density(stress) @ part.volumes)

@@ -6,20 +6,15 @@ what can be told here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from skfem import Mesh, MeshTri2
 
-from solver import Body, ContactPair, Material, Model, Solution, solve
-from solver.mesh import graded, grid, mapped
+from solver import Solution
 from tests.benchmarks.measure import Point, timed
-from tests.verification.closed_forms import HertzLine, plane_strain_modulus
+from tests.verification.hertz_line import exact, press
 
-RADIUS, SIZE = 100.0, 100.0  # mm; a is 1
-E, NU = 2.0e5, 0.3
-MODULUS = plane_strain_modulus(E, NU) / 2
-EXACT = HertzLine(force=np.pi * MODULUS / (4 * RADIUS), radius=RADIUS, modulus=MODULUS)
+EXACT = exact()
 ELEMENTS = ("quad8", "quad9", "quad4", "tri6")
 MEASURES = {
     "pressure": "contact pressure, mean square over 0 < x < a",
@@ -29,18 +24,21 @@ MEASURES = {
 
 
 def measure(elements: Sequence[str], meshes: Sequence[int], repeats: int) -> list[Point]:
-    """Return a point for every element and every number of elements in the half-width."""
+    """Return a point for every element and every number of elements in the half-width.
+
+    Every repeat has a thickness of its own: it changes no stress, but equal elastic bodies would
+    share their condensation, and the repeat would cost nothing.
+    """
     points = []
     for element in elements:
         for n in meshes:
-            run = timed(
-                lambda repeat, n=n, e=element: _press(n, e, thickness=1.0 + repeat), repeats
-            )
+            run = timed(lambda repeat, n=n, e=element: press(n, e, thickness=1.0 + repeat), repeats)
             points.append(
                 Point(
                     problem="hertz",
                     series=element,
                     setting=f"a/{n}",
+                    size=1.0 / n,
                     unknowns=2 * sum(run.result.nodes(b).shape[1] for b in ("cylinder", "plane")),
                     cpu=run.cpu,
                     spread=run.spread,
@@ -49,52 +47,6 @@ def measure(elements: Sequence[str], meshes: Sequence[int], repeats: int) -> lis
                 )
             )
     return points
-
-
-def _press(n: int, element: str, thickness: float) -> Solution:
-    """Press with ``n`` elements in the half-width; the growth of the others halves with theirs.
-
-    Every repeat has a thickness of its own: it changes no stress, but equal elastic bodies would
-    share their condensation, and the repeat would cost nothing.
-    """
-    h, growth = 1.0 / n, 1 + 1.8 / n
-    fine = np.linspace(0.0, 1.5, round(1.5 * n) + 1)
-    x = np.concatenate([fine, fine[-1] + graded(SIZE - fine[-1], h, growth, 10.0)[1:]])
-    y = graded(SIZE, h, growth, 10.0)
-
-    def bulge(p: np.ndarray) -> np.ndarray:
-        profile = np.minimum(p[0] ** 2 / (2 * RADIUS), SIZE / 8)
-        return np.stack([p[0], profile + p[1] * (SIZE - profile) / SIZE])
-
-    cells = "tri" if element.startswith("tri") else "quad"
-    given = {
-        "material": Material(youngs_modulus=E, poisson_ratio=NU),
-        "element": element,
-        "thickness": thickness,
-    }
-    cylinder = Body(
-        name="cylinder",
-        mesh=_curved(grid(x, y, cells), bulge),
-        supports={"left": "x"},
-        pressure={"top": EXACT.force / 2 / SIZE},
-        **given,
-    )
-    plane = Body(
-        name="plane",
-        mesh=grid(x, -y[::-1], cells),
-        supports={"left": "x", "bottom": "y"},
-        **given,
-    )
-    pair = ContactPair(slave=("cylinder", "bottom"), master=("plane", "top"))
-    return solve(Model(bodies=(cylinder, plane), contacts=(pair,)))
-
-
-def _curved(mesh: Mesh, function: Callable[[np.ndarray], np.ndarray]) -> Mesh:
-    if mesh.t.shape[0] == 4:
-        return mapped(mesh, function)
-    curved = MeshTri2.from_mesh(mesh)
-    moved = MeshTri2(doflocs=function(curved.doflocs), t=curved.t, sort_t=False, validate=False)
-    return moved.with_boundaries(dict(mesh.boundaries))
 
 
 def _errors(solution: Solution) -> dict[str, dict[str, float]]:

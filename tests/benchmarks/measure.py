@@ -21,7 +21,8 @@ class Point:
     """A point of a work-precision plot.
 
     ``cpu`` is the median of ``repeats`` runs [s], ``spread`` their range over the median,
-    ``values`` what came out and ``errors`` its distance from the reference, both by name.
+    ``values`` what came out and ``errors`` its distance from the reference, both by name; ``size``
+    that of the element or increment that the series varies, where it has one.
     """
 
     problem: str
@@ -33,6 +34,7 @@ class Point:
     repeats: int
     values: Mapping[str, float]
     errors: Mapping[str, float] = field(default_factory=dict)
+    size: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

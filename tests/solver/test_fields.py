@@ -7,7 +7,8 @@ import pytest
 
 from solver import Body, Material
 from solver.fem.discretisation import Discretisation
-from solver.fem.fields import Sampler, error_estimate, recovery
+from solver.fem.error import ErrorPoints, error_estimate
+from solver.fem.fields import Sampler, recovery
 from solver.mesh import graded, grid, mapped
 from solver.mesh.elements import ELEMENTS
 from solver.tensors import SQRT2, to_tensor, von_mises
@@ -106,6 +107,30 @@ def test_error_estimate_of_a_uniform_stress_is_zero_and_its_energy_exact():
     density = (1.3 * (100.0**2 + 50.0**2 + 20.0**2 + 2 * 30.0**2) - 0.3 * 70.0**2) / 2e5
     assert energy == pytest.approx(2.0 * density, rel=1e-12)
     assert error < 1e-20 * energy
+
+
+@pytest.mark.parametrize(("element", "degree"), [
+    ("quad8", 2), ("quad9", 2), ("tri6", 2), ("quad4", 1), ("tri3", 1),
+])  # fmt: skip
+@pytest.mark.parametrize("deep", [1, 3])
+def test_recovered_stress_is_exact_for_a_polynomial_of_the_degree_of_the_element(
+    element, degree, deep
+):
+    """One row of elements tells nothing of the highest derivative across it: then of x alone."""
+    kind = "tri" if element.startswith("tri") else "quad"
+    mesh = grid(np.linspace(0.0, 2.0, 6), np.linspace(-1.0, 0.0, deep + 1), kind)
+    part = Discretisation(Body(name="square", mesh=mesh, material=STEEL, element=element))
+    across = 0.0 if deep == 1 else 1.0
+
+    def field(x, y):
+        return 3.0 + 2 * x - across * y + (degree - 1) * (x**2 - x * y + across * y**2)
+
+    at = part.points
+    if degree == 1:  # what the elements have is a constant, exact in their middle
+        at = np.broadcast_to(at.mean(axis=2, keepdims=True), at.shape)
+    found = ErrorPoints(part)
+    values = found.recovered(np.stack([field(*at).ravel()] * 4))[1]
+    assert values == pytest.approx(field(*found.x), abs=1e-6)
 
 
 def test_error_estimate_falls_with_the_square_of_the_element():

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from skfem import Mesh, MeshTri2
 
 from solver import Body, Material, System
 from solver.mesh import grid, mapped
@@ -35,17 +37,28 @@ def block(
     return Body(name=name, mesh=grid(x, y, cells(element)), element=element, **fields)
 
 
-def sector(radii: NDArray[np.float64], n_angle: int, **fields) -> Body:
+def bent(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Mesh:
+    """Return a mesh of either cells with quadratic edges, its points moved by ``function``."""
+    if mesh.t.shape[0] == 4:
+        return mapped(mesh, function)
+    curved = MeshTri2.from_mesh(mesh)
+    moved = MeshTri2(doflocs=function(curved.doflocs), t=curved.t, sort_t=False, validate=False)
+    return moved.with_boundaries(dict(mesh.boundaries))
+
+
+def sector(radii: NDArray[np.float64], n_angle: int, element: str = "quad8", **fields) -> Body:
     """Return a quarter of a ring; ``left`` is the bore, ``bottom`` y = 0, ``top`` x = 0."""
 
     def to_ring(p: NDArray[np.float64]) -> NDArray[np.float64]:
         # np.abs: cos(pi/2) is 6e-17, and its sign must not put a node beyond the axis
         return np.abs(p[0] * np.stack([np.cos(p[1]), np.sin(p[1])]))
 
-    mesh = mapped(grid(radii, np.linspace(0.0, np.pi / 2, n_angle + 1)), to_ring)
+    angles = np.linspace(0.0, np.pi / 2, n_angle + 1)
+    mesh = bent(grid(radii, angles, cells(element)), to_ring)
     return Body(
         name="ring",
         mesh=mesh,
+        element=element,
         supports={"bottom": "y", "top": "x"},
         **fields,
     )

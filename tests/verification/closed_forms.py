@@ -44,6 +44,21 @@ class HertzLine:
         """Return the contact pressure at ``x`` from the centre."""
         return self.peak_pressure * np.sqrt(np.maximum(0.0, 1 - (x / self.half_width) ** 2))
 
+    def stress(self, x: Array, depth: Array) -> Array:
+        """Return the stresses xx, yy and xy (3, n) in the half-plane below, y upwards.
+
+        E. McEwen, Phil. Mag. 40 (1949) 454-459, in Johnson's form (4.49).
+        """
+        a, z = self.half_width, depth
+        level = a**2 - x**2 + z**2
+        root = np.hypot(level, 2 * x * z)
+        m2, n2 = (root + level) / 2, (root - level) / 2
+        m, n = np.sqrt(np.maximum(m2, 0.0)), np.sign(x) * np.sqrt(np.maximum(n2, 0.0))
+        share = (z**2 + n2) / (m2 + n2)
+        xx, yy = m * (1 + share) - 2 * z, m * (1 - share)
+        xy = -n * (m2 - z**2) / (m2 + n2)
+        return -self.peak_pressure / a * np.stack([xx, yy, xy])
+
 
 def flat_punch_pressure(x: Array, half_width: float) -> Array:
     """Return pressure / mean pressure under a rigid frictionless flat punch (Johnson, 2.64)."""

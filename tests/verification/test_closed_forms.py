@@ -38,6 +38,32 @@ def test_hertz_half_width_matches_the_gap_of_its_own_displacements():
     assert slope == pytest.approx(1 / hertz.radius, rel=1e-12)
 
 
+def test_hertz_stress_meets_the_surface_and_balances_inside():
+    """No shear at the surface, and minus the pressure across it; div sigma = 0 by differences."""
+    hertz = HertzLine(force=500.0, radius=100.0, modulus=1e5)
+    a, p0 = hertz.half_width, hertz.peak_pressure
+    x = a * np.array([0.0, 0.3, -0.7, 1.5, -3.0])
+    xx, yy, xy = hertz.stress(x, np.full_like(x, 1e-9 * a))
+    assert yy == pytest.approx(-hertz.pressure(x), abs=1e-8 * p0)
+    assert xx == pytest.approx(yy, abs=1e-8 * p0)
+    assert np.abs(xy).max() < 1e-8 * p0
+    h, depth = 1e-4 * a, a * np.array([0.5, 0.2, 1.0, 2.0, 0.7])
+    along = (hertz.stress(x + h, depth) - hertz.stress(x - h, depth)) / (2 * h)
+    up = (hertz.stress(x, depth - h) - hertz.stress(x, depth + h)) / (2 * h)
+    for balance in (along[0] + up[2], along[2] + up[1]):
+        assert np.abs(balance).max() < 1e-6 * p0 / a  # differences: (h / a)^2
+
+
+def test_hertz_shear_is_largest_below_the_middle():
+    """0.300 p0 at 0.786 a (Johnson, section 4.2)."""
+    hertz = HertzLine(force=500.0, radius=100.0, modulus=1e5)
+    depth = hertz.half_width * np.linspace(0.01, 3.0, 3000)
+    xx, yy, _ = hertz.stress(np.zeros_like(depth), depth)
+    shear = (xx - yy) / 2
+    assert shear.max() == pytest.approx(0.300 * hertz.peak_pressure, rel=2e-3)
+    assert depth[shear.argmax()] == pytest.approx(0.786 * hertz.half_width, rel=2e-3)
+
+
 def test_flat_punch_pressure_has_mean_one_and_the_square_root_singularity():
     angle = np.linspace(-pi / 2, pi / 2, 1001)[1:-1]
     x = 3.0 * np.sin(angle)

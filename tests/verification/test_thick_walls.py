@@ -5,36 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import Model, PathControl, solve
-from tests.verification.bodies import polar_stress, sector, steel
-from tests.verification.closed_forms import ThickCylinder, ThickSphere
-
-YIELD = 300.0
-SPHERE = ThickSphere(inner=1.0, outer=2.0, yield_stress=YIELD, front=1.4)
-CYLINDER = ThickCylinder(inner=1.0, outer=2.0, yield_stress=YIELD, front=1.4)
-
-
-def press(state, pressure, poisson_ratio, n_radius, n_angle, element="quad8", steps=1):
-    body = sector(
-        np.linspace(1.0, 2.0, n_radius + 1),
-        n_angle,
-        material=steel(YIELD, poisson_ratio),
-        kinematics=state,
-        element=element,
-        pressure={"left": pressure},
-    )
-    control = PathControl(load_step=1 / steps, unload_steps=1)
-    return solve(Model(bodies=(body,)), control=control)
-
-
-def errors(solution, wall):
-    """Largest error of radial and hoop stress at the points over the yield stress, by stage."""
-    out = {}
-    for stage, exact in (("loaded", wall.loaded), ("unloaded", wall.residual)):
-        stress = solution.system.response("ring", getattr(solution, stage)).stress
-        r, radial, hoop = polar_stress(solution.system, "ring", stress)
-        out[stage] = np.abs(np.stack([radial, hoop]) - np.stack(exact(r))).max() / YIELD
-    return out
+from tests.verification.bodies import polar_stress
+from tests.verification.thick_walls import CYLINDER, SPHERE, YIELD, errors, press
 
 
 @pytest.fixture(scope="module")

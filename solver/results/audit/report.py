@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
-from solver.fem.fields import error_estimate
+from solver.fem.error import error_estimate
 from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
 from solver.results.audit.pairs import AuditedPair

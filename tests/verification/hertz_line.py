@@ -1,0 +1,56 @@
+"""Hertz line contact on matching grids: a cylinder, held by contact alone, on a half-plane."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver import Body, ContactPair, Material, Model, Solution, solve
+from solver.mesh import graded, grid
+from tests.verification.bodies import NU, E, bent, cells
+from tests.verification.closed_forms import HertzLine, plane_strain_modulus
+
+SIZE = 100.0
+"""Width and height of both bodies, and radius of the cylinder [mm]; a is 1."""
+_MODULUS = plane_strain_modulus(E, NU) / 2
+
+
+def exact(size: float = SIZE) -> HertzLine:
+    """Return the closed form of half-planes.
+
+    Bodies of finite size disturb half-width and pressure by (a / size)^2, stress elsewhere by
+    a / size: the load leaves a half-plane through its far end.
+    """
+    return HertzLine(force=np.pi * _MODULUS / (4 * size), radius=size, modulus=_MODULUS)
+
+
+def press(n: int, element: str = "quad8", thickness: float = 1.0, size: float = SIZE) -> Solution:
+    """Press with ``n`` elements in the half-width; the growth of the others halves with theirs."""
+    h, growth = 1.0 / n, 1 + 1.8 / n
+    fine = np.linspace(0.0, 1.5, round(1.5 * n) + 1)
+    x = np.concatenate([fine, fine[-1] + graded(size - fine[-1], h, growth, size / 10)[1:]])
+    y = graded(size, h, growth, size / 10)
+
+    def bulge(p: np.ndarray) -> np.ndarray:
+        profile = np.minimum(p[0] ** 2 / (2 * size), size / 8)
+        return np.stack([p[0], profile + p[1] * (size - profile) / size])
+
+    given = {
+        "material": Material(youngs_modulus=E, poisson_ratio=NU),
+        "element": element,
+        "thickness": thickness,
+    }
+    cylinder = Body(
+        name="cylinder",
+        mesh=bent(grid(x, y, cells(element)), bulge),
+        supports={"left": "x"},
+        pressure={"top": exact(size).force / 2 / size},
+        **given,
+    )
+    plane = Body(
+        name="plane",
+        mesh=grid(x, -y[::-1], cells(element)),
+        supports={"left": "x", "bottom": "y"},
+        **given,
+    )
+    pair = ContactPair(slave=("cylinder", "bottom"), master=("plane", "top"))
+    return solve(Model(bodies=(cylinder, plane), contacts=(pair,)))
