@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from tests.benchmarks import figures, hertz, punch, skips, steady
+from tests.benchmarks import figures, hertz, punch, rolling, skips, steady, walls
 from tests.benchmarks.measure import REPEATS, Point
 from tests.benchmarks.report import conditions, table, write_csv
 
@@ -33,7 +33,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--only",
         nargs="+",
-        choices=("hertz", "punch", "steady", "skips"),
+        choices=("hertz", "walls", "punch", "steady", "rolling", "skips"),
         help="problems to measure",
     )
     given = parser.parse_args(arguments)
@@ -43,8 +43,10 @@ def run(arguments: Sequence[str] | None = None) -> None:
         meshes, plan, repeats = (4, 8, 16, 24), punch.full_plan(), REPEATS
     problems = {
         "hertz": lambda: of_hertz(given.out, hertz.ELEMENTS, meshes, repeats),
+        "walls": lambda: of_walls(given.out, quick=given.quick, repeats=repeats),
         "punch": lambda: of_punch(given.out, plan, repeats),
         "steady": lambda: of_steady(given.out, quick=given.quick, repeats=repeats),
+        "rolling": lambda: of_rolling(given.out, quick=given.quick, repeats=repeats),
         "skips": lambda: of_skips(repeats),
     }
     benchmark(given.out, [problems[name] for name in given.only or problems])
@@ -93,18 +95,52 @@ def of_punch(out: Path, plan: punch.Plan, repeats: int) -> list[str]:
     ]
 
 
+def of_walls(out: Path, *, quick: bool, repeats: int) -> list[str]:
+    """Measure thick walls, draw them, and return their tables."""
+    points = walls.measure(quick, repeats)
+    write_csv(points, out / "walls.csv")
+    lines = []
+    for wall in walls.WALLS:
+        title = f"Thick {wall} beyond yield: residual hoop stress against the closed form"
+        own = [p for p in points if p.setting.endswith(wall)]
+        figures.draw(own, walls.MEASURES, walls.ELEMENTS, title, out / f"walls-{wall}.png")
+        lines += [title, *table(own, tuple(walls.MEASURES), (walls.EFFECTIVITY,)), ""]
+    return lines
+
+
 def of_steady(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure steady passes, draw them, and return their tables."""
     points = steady.measure(quick, repeats)
-    write_csv(points, out / "steady.csv")
     lines = []
     for load, measures in steady.MEASURES.items():
-        own = [p for p in points if p.setting.endswith(load)]
-        title = f"A steady pass, {load}: what mesh and sub-steps cost and give"
-        figures.draw(own, measures, steady.SERIES, title, out / f"steady-{load}.png")
-        lines += [f"Steady pass, {load}: errors of residual sigma_x / Re against the finest run"]
-        lines += [*table(own, tuple(measures)), ""]
+        lines += of_load(out, "steady", load, points, measures, steady.SERIES)
     return lines
+
+
+def of_rolling(out: Path, *, quick: bool, repeats: int) -> list[str]:
+    """Measure rolling by increments, draw it, and return its tables."""
+    points = rolling.measure(quick, repeats)
+    lines = []
+    for load in rolling.loads(quick):
+        lines += of_load(out, "rolling", load, points, rolling.MEASURES, rolling.SERIES)
+    return lines
+
+
+def of_load(
+    out: Path,
+    name: str,
+    load: str,
+    points: Sequence[Point],
+    measures: Mapping[str, str],
+    series: Sequence[str],
+) -> list[str]:
+    """Write and draw the points, and return the table of those of one load."""
+    write_csv(points, out / f"{name}.csv")
+    own = [p for p in points if p.setting.endswith(load)]
+    title = f"{own[0].problem.capitalize()}, {load}: what accuracy costs"
+    figures.draw(own, measures, series, title, out / f"{name}-{load}.png")
+    text = f"{own[0].problem.capitalize()}, {load}: errors of residual sigma_x / Re"
+    return [f"{text} against the finest run", *table(own, tuple(measures)), ""]
 
 
 def of_skips(repeats: int) -> list[str]:

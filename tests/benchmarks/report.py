@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 import platform
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
+
+import numpy as np
 
 from solver import __version__
 from solver.linear import pardiso
@@ -37,19 +40,36 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def table(points: Sequence[Point], measures: Sequence[str]) -> list[str]:
-    """Return one line a point."""
+def table(
+    points: Sequence[Point], measures: Sequence[str], values: Sequence[str] = ()
+) -> list[str]:
+    """Return one line a point; in brackets the order of convergence from the one before."""
     lines = [
         f"{'series':<18}{'setting':<26}{'unknowns':>9}{'CPU s':>8}{'noise':>7}"
         + "".join(f"{name:>29}" for name in measures)
+        + "".join(f"{name:>18}" for name in values)
     ]
-    for p in points:
+    for before, p in zip([None, *points], points, strict=False):
         errors = "".join(
-            f"{p.errors[n]:>29.2e}" if n in p.errors else f"{'-':>29}" for n in measures
+            f"{p.errors[n]:>20.2e}{_order(before, p, n):>9}" if n in p.errors else f"{'-':>29}"
+            for n in measures
         )
+        told = "".join(f"{p.values[n]:>18.3g}" for n in values)
         noise = f"{p.spread:>7.0%}" if p.repeats > 1 else f"{'-':>7}"
-        lines.append(f"{p.series:<18}{p.setting:<26}{p.unknowns:>9}{p.cpu:>8.2f}{noise}{errors}")
+        lines.append(
+            f"{p.series:<18}{p.setting:<26}{p.unknowns:>9}{p.cpu:>8.2f}{noise}{errors}{told}"
+        )
     return lines
+
+
+def _order(before: Point | None, point: Point, measure: str) -> str:
+    """Return the slope of log error over log size between two points of a series, in brackets."""
+    if before is None or before.series != point.series or before.size == point.size:
+        return ""
+    pair = (point.errors[measure], before.errors.get(measure, 0.0), point.size, before.size)
+    if not np.min(pair) > 0:  # one is exact, or the series has no sizes
+        return ""
+    return f"({math.log(pair[0] / pair[1]) / math.log(pair[2] / pair[3]):.1f})"
 
 
 def write_csv(points: Sequence[Point], path: Path) -> None:

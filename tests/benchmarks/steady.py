@@ -29,26 +29,28 @@ MEASURES = {
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One setting of a series: the parameters it changes, and the sub-steps between points."""
+    """One setting of a series: changed parameters, sub-steps between points, element side [mm]."""
 
     series: str
     setting: str
     changes: Mapping[str, float] = field(default_factory=dict)
     parts: int = 16
+    size: float = float("nan")
 
 
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
     """Return the reference, and the cases."""
-    return Case("reference", "finest", _mesh(1.0 if quick else 0.25), 32), tuple(_cases(quick))
+    return Case("reference", "finest", graded_by(1.0 if quick else 0.25), 32), tuple(_cases(quick))
 
 
-def _mesh(h: float) -> dict[str, float]:
+def graded_by(h: float) -> dict[str, float]:
+    """Return elements of side ``h`` [mm] whose sides grow in depth alike."""
     return {"element_size": h, "growth": 1.15**h}
 
 
 def _cases(quick: bool) -> Iterator[Case]:
     for h in (4.0, 2.0) if quick else (4.0, 2.0, 1.0, 0.5):
-        yield Case("mesh", f"{h:g} mm", _mesh(h))
+        yield Case("mesh", f"{h:g} mm", graded_by(h), size=h)
     if quick:
         return
     yield Case("default", "default")
@@ -75,6 +77,7 @@ def measure(quick: bool, repeats: int) -> list[Point]:
                     problem="steady pass",
                     series=case.series,
                     setting=f"{case.setting}, {load}",
+                    size=case.size,
                     unknowns=len(run.result[0].part.free),
                     cpu=run.cpu,
                     spread=run.spread,

@@ -8,10 +8,18 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.benchmarks import punch
-from tests.benchmarks.command import benchmark, of_hertz, of_punch, of_steady
+from tests.benchmarks.command import (
+    benchmark,
+    of_hertz,
+    of_punch,
+    of_rolling,
+    of_steady,
+    of_walls,
+)
 from tests.benchmarks.measure import timed
 
 TINY = punch.Plan(
@@ -28,12 +36,12 @@ TINY = punch.Plan(
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a benchmark of two Hertz meshes and four punches."""
+    """Folder of a benchmark of two Hertz meshes, four punches, and the quick other problems."""
     out = tmp_path_factory.mktemp("benchmarks")
     problems = (
         partial(of_hertz, out, ("quad4",), (4, 8), 1),
         partial(of_punch, out, TINY, 1),
-        partial(of_steady, out, quick=True, repeats=1),
+        *(partial(of, out, quick=True, repeats=1) for of in (of_walls, of_steady, of_rolling)),
     )
     benchmark(out, problems)
     return out
@@ -62,6 +70,30 @@ def test_errors_of_a_steady_pass_fall_with_the_mesh(written: Path) -> None:
         assert fine < 0.8 * coarse, depth
 
 
+def test_errors_of_rolling_by_increments_fall_with_the_mesh(written: Path) -> None:
+    rolling = rows(written / "rolling.csv")
+    coarse, fine = (rolling[f"mesh {h} mm, free"]["error of first row"] for h in (4, 2))
+    assert 0 < fine < 0.8 * coarse
+
+
+def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
+    written: Path,
+) -> None:
+    """By 2 or more where the element is quadratic and does not lock; the table says so."""
+    walls = rows(written / "walls.csv")
+    for name, least in (("quad8 {0} x {0}, cylinder", 1.8), ("quad8 {0} x {0}, sphere", 1.8),
+                        ("quad4 {0} x {0}, cylinder", 0.8)):  # fmt: skip
+        coarse, fine = (walls[name.format(n)]["error of mean"] for n in (8, 16))
+        assert np.log2(coarse / fine) > least, name
+    (line,) = (
+        line
+        for line in (written / "table.txt").read_text().splitlines()
+        if line.startswith("quad8") and "16 x 16, cylinder" in line
+    )
+    coarse, fine = (walls[f"quad8 {n} x {n}, cylinder"]["error of mean"] for n in (8, 16))
+    assert f"({np.log2(coarse / fine):.1f})" in line
+
+
 def test_errors_of_the_punch_are_distances_from_its_references(written: Path) -> None:
     punches = rows(written / "punch.csv")
     finest, mesh, step = (
@@ -87,6 +119,9 @@ def test_every_figure_and_the_table_are_written(written: Path) -> None:
         "punch-element.png",
         "punch-increments.png",
         "punch-solver.png",
+        "walls-cylinder.png",
+        "walls-sphere.png",
+        "rolling-free.png",
         "steady-free.png",
         "steady-braking.png",
     }
