@@ -7,7 +7,17 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from tests.benchmarks import figures, hertz, punch, rolling, skips, steady, walls
+from tests.benchmarks import (
+    accuracy,
+    figures,
+    hertz,
+    punch,
+    rolling,
+    skips,
+    steady,
+    sweep,
+    walls,
+)
 from tests.benchmarks.measure import REPEATS, Point
 from tests.benchmarks.report import conditions, table, write_csv
 
@@ -25,17 +35,17 @@ PUNCH_FIGURES = {
 ALONE = {f"{n} alone": text for n, text in punch.MEASURES.items() if n != "plateau"}
 
 
+NAMES = ("hertz", "walls", "punch", "steady", "rolling", "skips", "accuracy", "sweep")
+SLOW = ("accuracy", "sweep")
+"""Measured where they are named alone."""
+
+
 def run(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark that the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="coarse, once each: under a minute")
     parser.add_argument("--out", type=Path, default=Path("out/benchmarks"), help="folder to write")
-    parser.add_argument(
-        "--only",
-        nargs="+",
-        choices=("hertz", "walls", "punch", "steady", "rolling", "skips"),
-        help="problems to measure",
-    )
+    parser.add_argument("--only", nargs="+", choices=NAMES, help="problems to measure")
     given = parser.parse_args(arguments)
     if given.quick:
         meshes, plan, repeats = (4, 8), punch.quick_plan(), 1
@@ -48,8 +58,11 @@ def run(arguments: Sequence[str] | None = None) -> None:
         "steady": lambda: of_steady(given.out, quick=given.quick, repeats=repeats),
         "rolling": lambda: of_rolling(given.out, quick=given.quick, repeats=repeats),
         "skips": lambda: of_skips(repeats),
+        "accuracy": lambda: of_accuracy(given.out, quick=given.quick, repeats=repeats),
+        "sweep": lambda: of_sweep(quick=given.quick),
     }
-    benchmark(given.out, [problems[name] for name in given.only or problems])
+    names = given.only or [name for name in NAMES if name not in SLOW]
+    benchmark(given.out, [problems[name] for name in names])
 
 
 def benchmark(out: Path, problems: Sequence[Callable[[], list[str]]]) -> None:
@@ -149,6 +162,20 @@ def of_skips(repeats: int) -> list[str]:
     for what, whole, short, miss in skips.measure(repeats):
         lines.append(f"{what:<22}{whole:>12.2f}{short:>12.2f}{whole / short:>8.1f}{miss:>10.1e}")
     return lines
+
+
+def of_accuracy(out: Path, *, quick: bool, repeats: int) -> list[str]:
+    """Measure the levels of `accuracy`, draw them, and return their table."""
+    points = accuracy.measure(quick, repeats)
+    write_csv(points, out / "accuracy.csv")
+    ((measure, text),) = accuracy.MEASURES.items()
+    figures.draw_levels(points, measure, text, out / "accuracy.png")
+    return [text[0].upper() + text[1:], *table(points, (measure,))]
+
+
+def of_sweep(*, quick: bool) -> list[str]:
+    """Measure what a study adds to its runs, and return the table."""
+    return ["A study around its runs", *map(str, sweep.measure(quick))]
 
 
 def verdict(points: Sequence[Point]) -> list[str]:

@@ -55,6 +55,31 @@ def draw(
     figure.savefig(path)
 
 
+def draw_levels(points: Sequence[Point], measure: str, text: str, path: Path) -> None:
+    """Write a PNG with a line for every series, its points named by their settings."""
+    figure = Figure(figsize=(6.4, 4.4), dpi=130, layout="constrained")
+    panel = figure.subplots()
+    names = list(dict.fromkeys(p.series for p in points))
+    for k, name in enumerate(names):
+        _line(panel, [p for p in points if p.series == name], measure, k)
+    for p in points:
+        panel.annotate(
+            p.setting,
+            (p.cpu, p.errors[measure]),
+            xytext=(6, 6),
+            textcoords="offset points",
+            fontsize=9,
+            color=COLOURS[names.index(p.series) % len(COLOURS)],
+        )
+    panel.set(xscale="log", yscale="log", xlabel="processor time of a run [s]", ylabel=text)
+    panel.margins(x=0.15, y=0.12)
+    panel.grid(which="major", alpha=0.35)
+    _ticks(panel.xaxis, *panel.get_xlim())
+    _ticks(panel.yaxis, *panel.get_ylim())
+    panel.legend()
+    figure.savefig(path)
+
+
 def _line(panel: Axes, points: Sequence[Point], measure: str, k: int) -> None:
     points = [p for p in points if measure in p.errors]
     if points:

@@ -63,34 +63,33 @@ def _cases(quick: bool) -> Iterator[Case]:
 
 
 def measure(quick: bool, repeats: int) -> list[Point]:
-    """Return a point for every case and load; errors are those against the reference."""
+    """Return a point for every case and load; errors are those against the first, the reference."""
     reference, cases = plan(quick)
     points = []
     for load in loads(quick):
-        exact = _values(rolled(_parameters(reference, load)))
+        exact = _point(reference, load, 1)
+        points.append(exact)
         for case in cases:
-            p = _parameters(case, load)
-            run = timed(lambda repeat, p=p: rolled(p), repeats)
-            found = _values(run.result)
-            points.append(
-                Point(
-                    problem="rolling",
-                    series=case.series,
-                    setting=f"{case.setting}, {load}",
-                    size=case.size,
-                    unknowns=int(run.result.scalars["degrees_of_freedom"]),
-                    cpu=run.cpu,
-                    spread=run.spread,
-                    repeats=run.repeats,
-                    values=found,
-                    errors={n: abs(found[n] - exact[n]) / p.yield_stress for n in found},
-                )
-            )
+            p = _point(case, load, repeats)
+            errors = {n: abs(v - exact.values[n]) / BASE.yield_stress for n, v in p.values.items()}
+            points.append(replace(p, errors=errors))
     return points
 
 
-def _parameters(case: Case, load: str) -> RollingParameters:
-    return replace(BASE, **LOADS[load], **case.changes)
+def _point(case: Case, load: str, repeats: int) -> Point:
+    p = replace(BASE, **LOADS[load], **case.changes)
+    run = timed(lambda _: rolled(p), repeats)
+    return Point(
+        problem="rolling",
+        series=case.series,
+        setting=f"{case.setting}, {load}",
+        size=case.size,
+        unknowns=int(run.result.scalars["degrees_of_freedom"]),
+        cpu=run.cpu,
+        spread=run.spread,
+        repeats=run.repeats,
+        values=_values(run.result),
+    )
 
 
 def rolled(parameters: RollingParameters) -> Record:

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.benchmarks import punch
+from tests.benchmarks import accuracy, punch, sweep
 from tests.benchmarks.command import (
     benchmark,
+    of_accuracy,
     of_hertz,
     of_punch,
     of_rolling,
@@ -34,6 +35,9 @@ TINY = punch.Plan(
 )
 
 
+QUICK = (of_walls, of_steady, of_rolling, of_accuracy)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a benchmark of two Hertz meshes, four punches, and the quick other problems."""
@@ -41,7 +45,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     problems = (
         partial(of_hertz, out, ("quad4",), (4, 8), 1),
         partial(of_punch, out, TINY, 1),
-        *(partial(of, out, quick=True, repeats=1) for of in (of_walls, of_steady, of_rolling)),
+        *(
+            partial(of, out, quick=True, repeats=1)
+            for of in (of_walls, of_steady, of_rolling, of_accuracy)
+        ),
     )
     benchmark(out, problems)
     return out
@@ -94,6 +101,32 @@ def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
     assert f"({np.log2(coarse / fine):.1f})" in line
 
 
+def test_a_level_of_accuracy_has_an_error_against_a_finer_run(written: Path) -> None:
+    """Draft against standard, from 1 mm down and at the first row: some percent."""
+    (draft,) = rows(written / "accuracy.csv").values()
+    assert 1.0 < draft["error of largest"] < 15.0
+
+
+def test_levels_are_those_that_the_scenes_give() -> None:
+    for problem in accuracy.PROBLEMS.values():
+        for level in accuracy.LEVELS:
+            found = accuracy.at_level(problem.parameters, level)
+            given = {name: getattr(found, name) for name in found.usual()}
+            assert found.accuracy == level
+            assert given == dict(found.usual())
+        # the reference is finer than any level
+        for name, value in problem.finest.items():
+            assert value < getattr(found, name) or name == "unload_steps", name
+
+
+def test_many_paths_are_counted_and_their_memory_is_seen(tmp_path: Path) -> None:
+    figures = {figure.what: figure.value for figure in sweep.many(tmp_path, 8)}
+    memory = [value for what, value in figures.items() if what.startswith("peak memory")]
+    assert len(memory) == 8
+    assert figures["8 paths that cost nothing, 2 workers"] > 0
+    assert len(list((tmp_path / "many" / "runs").glob("*.nc"))) == 8
+
+
 def test_errors_of_the_punch_are_distances_from_its_references(written: Path) -> None:
     punches = rows(written / "punch.csv")
     finest, mesh, step = (
@@ -122,6 +155,7 @@ def test_every_figure_and_the_table_are_written(written: Path) -> None:
         "walls-cylinder.png",
         "walls-sphere.png",
         "rolling-free.png",
+        "accuracy.png",
         "steady-free.png",
         "steady-braking.png",
     }
