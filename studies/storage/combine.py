@@ -22,7 +22,7 @@ from studies.errors import RunUnreadable
 from studies.storage import dataset as layout
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
-from studies.storage.runfile import global_attributes, opened
+from studies.storage.runfile import global_attributes, opened, variables
 from studies.storage.store import Store, appearing
 
 SAME = 1e-9
@@ -157,7 +157,7 @@ class _Frame:
 
     def learn(self, run: h5py.File) -> None:
         """Take in the grids and variables of one run."""
-        for name, variable in run.items():
+        for name, variable in variables(run).items():
             if name in self.usual or name in self.fields or name in self.small:
                 continue
             if variable.is_scale:
@@ -221,7 +221,7 @@ class _Frame:
 
     def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Put the values of one run in their place."""
-        for name, variable in run.items():
+        for name, variable in variables(run).items():
             if name in self.fields:
                 inner, _ = self.fields[name]
                 whole = np.full(self._inner_shape(inner), np.nan)

@@ -33,6 +33,8 @@ _DIGEST = 65
 """Bytes of the whole line, and of what it does not cover itself."""
 _FIRST_BYTES = 1 << 16
 """Size with which a file in memory begins; it grows."""
+_ORDER = "variables"
+"""Attribute with the names of the variables in their order, which netCDF loses in memory."""
 _ONE_AT_A_TIME = Lock()
 """The netCDF library serves one thread at a time."""
 _NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
@@ -53,7 +55,8 @@ def _packed(run: xr.Dataset) -> bytes:
     with _ONE_AT_A_TIME:
         file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
         store = NetCDF4DataStore(file, lock=False)
-        run.assign_attrs(SEALED).dump_to_store(store, encoding=stored)
+        order = {_ORDER: " ".join(map(str, run.variables))}
+        run.assign_attrs(SEALED | order).dump_to_store(store, encoding=stored)
         return bytes(file.close())
 
 
@@ -111,6 +114,12 @@ def global_attributes(run: h5py.File) -> dict[str, Any]:
     }
 
 
+def variables(run: h5py.File) -> dict[str, h5py.Dataset]:
+    """Return the variables by name, in the order in which they were given."""
+    names = global_attributes(run).get(_ORDER)
+    return {name: run[name] for name in (names.split() if names else run)}
+
+
 def stamp(path: Path) -> dict[str, int]:
     """Return length and time of change [ns] of a file, by which the catalogue knows it again."""
     state = path.stat()
@@ -124,7 +133,7 @@ def row(path: Path) -> dict[str, Any]:
     """
     with opened(path) as run:
         rank = run["status"].ndim
-        wanted = {name: each for name, each in run.items() if each.ndim == rank}
+        wanted = {name: each for name, each in variables(run).items() if each.ndim == rank}
         values = {
             name: (each.asstr() if each.dtype.kind == "O" else each)[...].item()
             for name, each in wanted.items()

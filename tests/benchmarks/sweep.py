@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -163,11 +164,12 @@ class _Watch:
         self._process = psutil.Process(pid)
         self._peak = (0.0, 0.0)
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()
 
     def peak(self) -> tuple[float, float]:
         """Return the most of the process, and of one child [MB], since the last call."""
+        self._look()
         peak, self._peak = self._peak, (0.0, 0.0)
         return peak
 
@@ -176,11 +178,12 @@ class _Watch:
         self._closing.set()
         self._thread.join()
 
-    def _look(self) -> None:
+    def _watch(self) -> None:
         while not self._closing.wait(_LOOK):
-            try:
-                main = megabytes(self._process)
-                children = [megabytes(child) for child in self._process.children(recursive=True)]
-            except psutil.Error:  # one has just ended
-                continue
+            self._look()
+
+    def _look(self) -> None:
+        with suppress(psutil.Error):  # one has just ended
+            main = megabytes(self._process)
+            children = [megabytes(child) for child in self._process.children(recursive=True)]
             self._peak = (max(self._peak[0], main), max([self._peak[1], *children]))

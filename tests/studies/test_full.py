@@ -163,7 +163,7 @@ def test_a_real_device_without_room_is_told(tmp_path: Path) -> None:
         pytest.skip("no file system may be mounted here")
     try:
         store = Store(small / "out")
-        case = next(fake_study(points=200).cases())
+        case = next(fake_study(points=400).cases())
         with pytest.raises(StoreFull, match=r"no room is left in .*small/out"):
             store.write_run(run_dataset(FAKE, case, record(case.parameters)))
         (small / "filler").write_bytes(b"")
