@@ -10,9 +10,9 @@ would be far too small.
 2. To the elements around each inner vertex fit a polynomial of the degree of the element, by least
    squares.
 3. The recovered stress is the mean of the polynomials of an element's inner vertices, weighted with
-   their linear shape functions. It is continuous, and one order more exact than the stress. Where
-   an element has no inner vertex, its vertices at the boundary count, whose patches also take the
-   elements that touch those around them.
+   their linear shape functions. It is one order more exact than the stress, and continuous but for
+   edges between two vertices of the boundary. Where an element has no inner vertex, its vertices at
+   the boundary count, whose patches also take the elements that touch those around them.
 4. The energy of the difference of both, by full integration, estimates that of the error.
 
 A patch lies in one body: stress may jump where bodies touch.
@@ -58,8 +58,9 @@ def error_estimate(part: Discretisation, stress: Array) -> tuple[float, float]:
     stress : (4, n_points) Mandel [MPa]
     """
     points = ErrorPoints(part)
-    error = points.energies(points.recovered(stress) - points.computed(stress))
-    return float(error.sum()), float(points.energies(points.computed(stress)).sum())
+    computed = points.computed(stress)
+    error = points.energies(points.recovered(stress) - computed)
+    return float(error.sum()), float(points.energies(computed).sum())
 
 
 class ErrorPoints:
@@ -116,7 +117,7 @@ class ErrorPoints:
         inner[mesh.facets[:, mesh.boundary_facets()]] = False
         return inner
 
-    @property
+    @cached_property
     def _taken(self) -> NDArray[np.bool_]:
         """Which vertices of an element (corners, n_elements) count in its recovered stress."""
         inner = self._inner[self._part.basis.mesh.t]
@@ -134,7 +135,7 @@ class ErrorPoints:
         order = {4: 3, 3: 2}[self._corners]
         return np.asarray(get_quadrature(self._part.basis.elem.refdom, order)[0])
 
-    @property
+    @cached_property
     def _vertices(self) -> Array:
         """Positions of the vertices (2, n_vertices), as the mesh numbers them."""
         basis = self._part.basis

@@ -36,7 +36,7 @@ class Load(Protocol):
     def on(self, u: Array) -> Loading:
         """Return the load on a track that has these displacements (m,) without it."""
 
-    def lighter(self, share: float) -> Load:
+    def scaled(self, share: float) -> Load:
         """Return the same load with a share of its forces."""
 
 
@@ -51,6 +51,6 @@ class Given:
         """See `Load`."""
         return Loading(self.force, u + self.u, lambda change: change)
 
-    def lighter(self, share: float) -> Given:
+    def scaled(self, share: float) -> Given:
         """See `Load`."""
         return Given(share * self.force, share * self.u)

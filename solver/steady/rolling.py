@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+EXACT_AFTER = 4
+REPEATED = 1e-5
+"""After so many passes the tolerance is this one: small changes of many passes add up."""
+
+
 @dataclass(frozen=True, slots=True)
 class Expected:
     """What a load adds when it passes again: ``strain`` as last time, changed as it changed last.
@@ -52,11 +57,6 @@ class Expected:
         square = float((self.change**2).sum())
         kept = float((change * self.change).sum()) / square if square else 0.0
         return Expected(strain, change, min(max(kept, 0.0), 1.0))
-
-
-EXACT_AFTER = 4
-REPEATED = 1e-5
-"""After so many passes the tolerance is this one: small changes of many passes add up."""
 
 
 def rolling(

@@ -77,7 +77,7 @@ def search(
         if isinstance(found, NotConverged):
             found = _tried(_fading, partial(eased, load), partial(exactly, load), own, _LARGE)
         if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
-            above = load.lighter(_HEAVIER[0])
+            above = load.scaled(_HEAVIER[0])
             begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
             found = _approached(exactly, load, _HEAVIER[1:], begun, found)
     else:
@@ -155,5 +155,5 @@ def _approached(
     for share in (*shares, 1.0):
         if isinstance(found, NotConverged):
             return failure
-        found = _tried(exactly, load.lighter(share), None if found is None else found.strain)
+        found = _tried(exactly, load.scaled(share), None if found is None else found.strain)
     return failure if found is None else found

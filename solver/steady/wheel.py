@@ -5,7 +5,8 @@ The *slip* of a contact point is the relative displacement of the two materials 
 advances by one element h: with the tangential row T of the point, its displacement fields u, and S
 the shift of a field by one element upstream,
 
-    slip = T (u - S u) of track and wheel + rigid rolling + h * creepage * passing rim
+    slip = T (u - S u) of track and wheel + rigid rolling
+           + h * creepage * T (motion of the rim's material per arc)
 
 Gap and slip depend linearly on the contact forces through the compliances of the two surfaces. The
 result is the frictional problem of `solver.contact.problem`, with a compliance that is not
@@ -107,13 +108,15 @@ class _Known:
 class _Geometry:
     """Gaps and slips of the contact points ``at``, linear in displacements.
 
-    ``gap`` (n,) without any displacement; ``rows`` and ``moves``, for track and wheel: derivatives
+    ``gap`` (n,) without any displacement; ``creeping`` (n,) motion of the rim's material along the
+    contact, per arc; ``rows`` and ``moves``, for track and wheel: derivatives
     (2n, n_unknowns) of gaps and tangential displacements, and of gaps and slips.
     """
 
     at: NDArray[np.int64]
     area: Array
     gap: Array
+    creeping: Array
     rows: list[Array]
     moves: list[Array]
 
@@ -161,7 +164,7 @@ class RollingWheel:
             status=np.full(len(surface.vertices), OPEN),
         )
 
-    def lighter(self, share: float) -> RollingWheel:
+    def scaled(self, share: float) -> RollingWheel:
         """See `Load`."""
         other = copy(self)
         other._force *= share
@@ -228,7 +231,8 @@ class RollingWheel:
     def _geometry(self, shape: Array, known: _Known) -> _Geometry:
         """Return how gaps and slips depend on displacements, around the contact as known."""
         u = self._compliance[0] @ known.on_track + shape
-        d = self._compliance[1] @ known.on_wheel + known.height * self._up
+        bent = self._compliance[1] @ known.on_wheel
+        d = bent + known.height * self._up
         surface, rim = self._track.surface, self._rim.surface
         pairing = pair(surface, u.reshape(-1, 2).T, rim, d.reshape(-1, 2).T)
         at = np.flatnonzero(pairing.covered > _COVERED)
@@ -239,6 +243,7 @@ class RollingWheel:
             at=at,
             area=pairing.area,
             gap=pairing.gap[at] - normal[0] @ u - normal[1] @ d,
+            creeping=tangent[1] @ self._rim.passing(bent),
             rows=[np.vstack(both) for both in zip(normal, tangent, strict=True)],
             moves=[np.vstack(both) for both in zip(normal, slips, strict=True)],
         )
@@ -263,16 +268,15 @@ class RollingWheel:
         track, wheel = geometry.rows
         normal, tangent = wheel[:n], wheel[n:]
         ahead = np.tile([1.0, 0.0], len(shape) // 2)
-        creeping = tangent @ self._rim.passing(self._compliance[1] @ known.on_wheel)
         offset = geometry.moves[0] @ shape
         offset[:n] += geometry.gap
         offset[n:] += tangent @ self._rolled - self._length * (track[n:] @ ahead)
         motions = [np.concatenate([normal @ self._up, np.zeros(n)])]
         balance = [known.tilt - self._force]
         if self._drive is None:
-            offset[n:] += self._creepage * self._length * creeping
+            offset[n:] += self._creepage * self._length * geometry.creeping
         else:
-            motions.append(np.concatenate([np.zeros(n), creeping]))
+            motions.append(np.concatenate([np.zeros(n), geometry.creeping]))
             balance.append(self._drive)
         sides = zip(geometry.moves, self._compliance, geometry.rows, strict=True)
         W = np.sum([moves @ C @ rows.T for moves, C, rows in sides], axis=0)

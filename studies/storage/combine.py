@@ -221,7 +221,7 @@ class _Frame:
 
     def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Put the values of one run in their place."""
-        for name, variable in variables(run).items():
+        for name, variable in run.items():
             if name in self.fields:
                 inner, _ = self.fields[name]
                 whole = np.full(self._inner_shape(inner), np.nan)

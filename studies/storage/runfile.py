@@ -96,7 +96,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
     vouched = verify(path)
     try:
         with h5py.File(path, "r") as run:
-            _compare(global_attributes(run)["id"], path)
+            _compare(_text(run.attrs["id"]), path)
             yield run
     except (MemoryError, RunUnreadable, StoreFull):
         raise
@@ -108,16 +108,17 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 def global_attributes(run: h5py.File) -> dict[str, Any]:
     """Return the global attributes; h5py gives a text of ASCII letters as bytes."""
-    return {
-        name: value.decode() if isinstance(value, bytes) else value
-        for name, value in run.attrs.items()
-    }
+    return {name: _text(value) for name, value in run.attrs.items()}
 
 
 def variables(run: h5py.File) -> dict[str, h5py.Dataset]:
     """Return the variables by name, in the order in which they were given."""
-    names = global_attributes(run).get(_ORDER)
-    return {name: run[name] for name in (names.split() if names else run)}
+    names = _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else run
+    return {name: run[name] for name in names}
+
+
+def _text(value: Any) -> Any:
+    return value.decode() if isinstance(value, bytes) else value
 
 
 def stamp(path: Path) -> dict[str, int]:

@@ -40,7 +40,7 @@ from studies.storage.catalogue import Catalogue, Row
 from studies.storage.room import needs_room
 
 ENGINE: Literal["h5netcdf"] = "h5netcdf"
-"""netCDF backend of every file read or written here; safe with several threads."""
+"""netCDF backend of every file read here; safe with several threads."""
 
 
 _BATCH = 500

@@ -24,7 +24,7 @@ class Weight:
     def __init__(self, size=1.0):
         self.size = size
 
-    def lighter(self, share):
+    def scaled(self, share):
         return Weight(share * self.size)
 
 

@@ -170,11 +170,11 @@ def test_without_hardening_a_locked_wheel_has_its_limit():
 def test_a_lighter_load_is_one_of_less_force(share):
     parameters, place, _, load = wheel(share=share)
     nothing = np.zeros(len(place.operator.kept))
-    touching, whole = load.lighter(0.8).on(nothing), load.on(nothing)
+    touching, whole = load.scaled(0.8).on(nothing), load.on(nothing)
     # normals are tilted by up to a / R = 0.03, a little more under more force
     one, other = (t.normal.sum() / parameters.force for t in (touching, whole))
     assert (one, other) == (pytest.approx(0.8, rel=1e-3), pytest.approx(1.0, rel=1e-3))
     drive = share * FRICTION * parameters.force
     assert -touching.tangential.sum() == pytest.approx(0.8 * drive, abs=1e-3 * parameters.force)
     given = place.hertz(500.0, 0.1)
-    np.testing.assert_allclose(given.lighter(0.8).on(nothing).u, 0.8 * given.u, rtol=1e-12)
+    np.testing.assert_allclose(given.scaled(0.8).on(nothing).u, 0.8 * given.u, rtol=1e-12)

@@ -85,9 +85,8 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
         for name, each in run.coords.items()
         if name in known and each.ndim == 0
     }
-    left_out = {name: None for name, value in swept.items() if value != value}  # NaN
     try:
-        return defaults(scene, {**given, **swept, **left_out})
+        return defaults(scene, {**given, **swept})
     except ModelError:  # only what is swept makes the parameters go together
         return {name: parameter.default for name, parameter in known.items()}
 
