@@ -42,8 +42,9 @@ class Jobs:
     def __init__(self, path: Path, longest: int | None = None) -> None:
         self.path = path
         self.longest = longest
-        with self.transaction("BEGIN IMMEDIATE", mode="rwc") as connection:
-            schema.prepare(connection)
+        new = not path.exists()
+        with self.transaction("BEGIN IMMEDIATE", mode="rwc" if new else "rw") as connection:
+            schema.prepare(connection, new)
             for (finding,) in connection.execute("PRAGMA integrity_check(1)"):
                 if finding != "ok":
                     raise sqlite3.DatabaseError(finding)

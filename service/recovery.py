@@ -35,13 +35,14 @@ def open_queue(
             shutil.rmtree(damaged)
         damaged.unlink(missing_ok=True)
         path.replace(damaged)
-    path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)
     jobs = Jobs(part)
     for file in sorted(store.directory.glob("studies/*/study.json")):
         _find(file, jobs, store)
     jobs.resume(computed)
+    # What a writer in the lost file left behind would be taken for a part of the new one.
+    path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
     part.replace(path)  # at once: until then the queue is lost, not empty
     return Jobs(path, longest)
 

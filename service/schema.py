@@ -48,13 +48,13 @@ FIRST_FORM = (
 """Copies the rows of the first form, in which a row held all its runs as one text."""
 
 
-def prepare(connection: sqlite3.Connection) -> None:
-    """Make the tables, or bring them into today's form.
+def prepare(connection: sqlite3.Connection, new: bool) -> None:
+    """Make the tables of a new file; bring those of another into today's form.
 
     Raises
     ------
     sqlite3.DatabaseError
-        If the file is damaged, or none of ours.
+        If the file is damaged, empty, or none of ours.
     StudyError
         If a later version of the service has made it.
     """
@@ -65,6 +65,8 @@ def prepare(connection: sqlite3.Connection) -> None:
     if version > VERSION:
         allowed = f"must be of form {VERSION}: a later version of the service has made it"
         raise StudyError("jobs.sqlite", f"form {version}", allowed)
+    if not new and "job" not in known:
+        raise sqlite3.DatabaseError("it holds no queue")
     if "job" in known:
         connection.execute("ALTER TABLE job RENAME TO first")
     for statement in TABLES + (FIRST_FORM if "job" in known else ()):

@@ -165,16 +165,22 @@ def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
     assert (tmp_path / "jobs.sqlite.damaged").read_bytes() == content
 
 
-@pytest.mark.parametrize("damage", ["deleted", "overwritten", "directory"])
+@pytest.mark.parametrize("damage", ["deleted", "overwritten", "emptied", "directory"])
 def test_a_queue_that_is_lost_is_made_anew(tmp_path: Path, damage: str) -> None:
     path = tmp_path / "jobs.sqlite"
     Jobs(path).accept("0" * 32, STUDY, ["a"])
     path.unlink()
     if damage == "overwritten":
         path.write_text("no queue" * 1000)
+    if damage == "emptied":
+        path.touch()
     if damage == "directory":
         path.mkdir()
-    assert open_queue(path, Store(tmp_path), None).page(limit=9, offset=0) == ([], 0)
+    store = Store(tmp_path)
+    study = Study.from_dict({"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}})
+    store.save_study(study)
+    (job,), _ = open_queue(path, store, None).page(limit=9, offset=0)
+    assert (job.id, job.state) == (study.id, State.ACCEPTED)
     assert (tmp_path / "jobs.sqlite.damaged").exists() == (damage != "deleted")
 
 
