@@ -30,8 +30,7 @@ SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.ru
 class Jobs:
     """The queue in the file ``path``; safe to use from many threads and processes.
 
-    Every method raises `QueueLost` when the file is gone or damaged, and `StoreFull` when there is
-    no room to write.
+    Methods raise `QueueLost` when the file is gone or damaged, `StoreFull` when the disk is full.
 
     Parameters
     ----------

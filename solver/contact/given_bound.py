@@ -52,8 +52,8 @@ def given_bound(
         columns[:, : n + m] = A[: n + m].T * unit
         balance = problem.balance / (force * shape) - columns[:, n : n + m].sum(axis=1)
         held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
-        if len(held) < k:  # too few points to hold the floating bodies
-            return None
+        if len(held) < k or np.linalg.matrix_rank(A[held]) < k:
+            return None  # too few points, or too close ones, to hold the floating bodies
         eliminated = _eliminate(M, r, A, columns, balance, held)
         if eliminated is None:
             return None

@@ -162,6 +162,10 @@ class System:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
         return recovery(self.full(name))
 
+    def positions(self, name: str) -> NDArray[np.float64]:
+        """Return where the integration points of a body are (2, n_points) [mm]."""
+        return self.full(name).points.reshape(2, -1)
+
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body."""
         number = self.part(name)

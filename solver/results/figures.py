@@ -42,8 +42,7 @@ def extremes(look: Look) -> Values:
     names = system.names
     strains = {n: system.response(n, look.unloaded).state.accumulated for n in names}
     most = max(names, key=lambda name: strains[name].max())
-    points = system.full(most).points.reshape(2, -1)
-    where = points[1, strains[most].argmax()]
+    where = system.positions(most)[1, strains[most].argmax()]
     residual = [look.samples.stress(name, look.unloaded)[:3] for name in names]
     return {
         MAX_PLASTIC_STRAIN: float(strains[most].max()),

@@ -46,6 +46,9 @@ class Bodies(Protocol):
     def full(self, name: str) -> Discretisation:
         """Return a body."""
 
+    def positions(self, name: str) -> Array:
+        """Return where the points of a body are (2, n_points) [mm]."""
+
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
 

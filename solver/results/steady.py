@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array, diags_array, hstack
 from scipy.spatial import cKDTree
 
 from solver.contact.state import State
@@ -76,25 +77,35 @@ class HalfPlane:
         return self._part
 
     def recovery(self, name: str) -> csr_array:
-        """Return the matrix (n_nodes, n_points) from values at points to those at nodes.
+        """Return the matrix (n_nodes, n) from values at points, and at the surface, to nodes.
 
-        At the surface stress goes with the plastic strain, which may change much between the first
-        two rows of points: there the nodes have the values of the first row.
+        The nodes of the surface have values of their own: plastic strain, and stress with it, may
+        change too much between the first two rows of points to be extrapolated.
         """
         del name
-        part = self._part
+        part, first = self._part, self._first
         points, y = part.points.reshape(2, -1), part.X[1]
-        first = np.flatnonzero(points[1] > points[1].max() * (1 + _LEVEL))
         top = np.flatnonzero(y > y.max() - _LEVEL * abs(points[1].max()))
         nearest = cKDTree(points[0, first, None]).query(part.X[0, top, None], k=2)[1]
         below = np.ones(len(y))
         below[top] = 0.0
-        halves = np.full(nearest.size, 0.5), (np.repeat(top, 2), first[nearest].ravel())
-        at_surface = csr_array(halves, shape=(len(y), points.shape[1]))
-        return csr_array(diags_array(below) @ recovery(part) + at_surface)
+        halves = np.full(nearest.size, 0.5), (np.repeat(top, 2), nearest.ravel())
+        at_surface = csr_array(halves, shape=(len(y), len(first)))
+        return csr_array(hstack([diags_array(below) @ recovery(part), at_surface]))
+
+    @cached_property
+    def _first(self) -> NDArray[np.int64]:
+        """The points nearest to the surface."""
+        y = self._part.points[1].ravel()
+        return np.flatnonzero(y > y.max() * (1 + _LEVEL))
+
+    def positions(self, name: str) -> Array:
+        """Return where points are, then those at the surface above the first row (2, n) [mm]."""
+        points = self.full(name).points.reshape(2, -1)
+        return np.concatenate([points, points[:, self._first] * [[1.0], [0.0]]], axis=1)
 
     def response(self, name: str, converged: Standing) -> Response:
-        """Return stress and internal variables at the points."""
+        """Return stress and internal variables at the points, and then at the surface above."""
         del name
         return converged.response
 
@@ -118,10 +129,17 @@ class HalfPlane:
         return self._seen(_RELEASED, of_layers(self.track, found.after), None)
 
     def _seen(self, time: float, fields: Fields, touching: Touching | None) -> Standing:
-        u, strain, plastic = fields
+        u, strain, inside, (above, at_surface) = fields
+        strain = np.concatenate([strain, above], axis=1)
+        plastic = PlasticState(
+            np.concatenate([inside.plastic_strain, at_surface.plastic_strain], axis=1),
+            np.concatenate([inside.accumulated, at_surface.accumulated]),
+        )
         stress = self.track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
         if self.way == -1:
             points, nodes = self.track.mirror
+            uppermost = np.searchsorted(self.track.rows.highest, points[self._first])
+            points = np.concatenate([points, len(points) + uppermost])
             u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
             stress = stress[:, points] * _MIRRORED
             plastic = plastic.at(points)

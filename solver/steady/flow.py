@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,8 +33,8 @@ class Flow:
     def __init__(
         self, rows: Rows, material: Material, before: Layers, added: Array, parts: int
     ) -> None:
-        rule, elasticity = material.hardening_rule, material.elasticity
-        double_shear = 2 * elasticity.shear_modulus
+        rule, self._elasticity = material.hardening_rule, material.elasticity
+        double_shear = 2 * self._elasticity.shear_modulus
         self._law = np.array(
             [
                 double_shear,
@@ -44,20 +44,35 @@ class Flow:
                 rule.yield_stress,
             ]
         )
-        self._rows, self._before = rows, before
+        self._rows, self._before, self._added, self._parts = rows, before, added, parts
         self._yield_strain = material.yield_stress / material.youngs_modulus
-        at_rest = before.strain(elasticity)[:, None]
-        strain = np.concatenate([at_rest, at_rest + added], axis=1)
-        start = before.plastic_strain, before.accumulated
-        self.plastic, self.total, self._path = sweep.flow(strain, *start, self._law, parts)
-        ends = np.ascontiguousarray(self.plastic[:, -1]), self.total[:, -1].copy()
-        closed = sweep.close(*ends, self._law, elasticity.bulk_modulus)
-        self.after = replace(before, plastic_strain=closed[0], accumulated=closed[1])
-        self._closing = closed[2:]
+        self.plastic, self.total, self._path, self.after, self._closing = self._of(before, added)
         self.force = rows.force(
             self.plastic - before.plastic_strain[:, None],
-            closed[0] - before.plastic_strain,
+            self.after.plastic_strain - before.plastic_strain,
         )
+
+    def surface(self) -> tuple[Array, Array, Layers]:
+        """Return plastic strain (n, n_columns, 4) and accumulated strain at the surface, and after.
+
+        Its strain is that of the uppermost rows, extrapolated. Plastic strain changes too abruptly
+        in depth for that; it follows from the strain, as on any row.
+        """
+        plastic, total, _, after, _ = self._of(
+            self._before.top, self._rows.onto_surface(self._added)
+        )
+        return plastic, total, after
+
+    def _of(self, before: Layers, added: Array) -> tuple[Array, Array, Array, Layers, Any]:
+        """Return what rows gather at the columns, how, what is left, and how it closed."""
+        at_rest = before.strain(self._elasticity)[:, None]
+        strain = np.concatenate([at_rest, at_rest + added], axis=1)
+        start = before.plastic_strain, before.accumulated
+        plastic, total, path = sweep.flow(strain, *start, self._law, self._parts)
+        ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
+        closed = sweep.close(*ends, self._law, self._elasticity.bulk_modulus)
+        after = replace(before, plastic_strain=closed[0], accumulated=closed[1])
+        return plastic, total, path, after, closed[2:]
 
     @property
     def gathered(self) -> float:

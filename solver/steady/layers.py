@@ -34,12 +34,20 @@ class Layers:
     thickness : (n,) that each row stands for [mm]
     plastic_strain : (n, 4) Mandel
     accumulated : (n,) equivalent plastic strain
+    surface : the same at depth zero, of no thickness; None for that layer itself
     """
 
     depth: Array
     thickness: Array
     plastic_strain: Array
     accumulated: Array
+    surface: Layers | None = None
+
+    @property
+    def top(self) -> Layers:
+        """The layer at depth zero."""
+        assert self.surface is not None
+        return self.surface
 
     def strain(self, elasticity: Elasticity) -> Array:
         """Return total strain (n, 4), Mandel."""
@@ -68,4 +76,6 @@ class Layers:
     @property
     def mirrored(self) -> Layers:
         """The same, seen along -x."""
-        return replace(self, plastic_strain=self.plastic_strain * [1.0, 1.0, 1.0, -1.0])
+        seen = self.plastic_strain * [1.0, 1.0, 1.0, -1.0]
+        surface = self.surface.mirrored if self.surface else None
+        return replace(self, plastic_strain=seen, surface=surface)

@@ -16,7 +16,7 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,6 +72,7 @@ class Pass:
     strain : (n_rows, n_columns, 4) Mandel strain that the pass adds, at the points of the window
     plastic_strain : (n_rows, n_columns, 4) there
     accumulated : (n_rows, n_columns) there
+    surface : the same two (n, n_columns, ...) at the surface above the n uppermost rows
     last_steps : multiplier (n_rows, n_columns) and direction (n_rows, n_columns, 4) of flow in the
         last increment before each column
     loading : the load on it
@@ -85,6 +86,7 @@ class Pass:
     strain: Array
     plastic_strain: Array
     accumulated: Array
+    surface: tuple[Array, Array]
     last_steps: tuple[Array, Array]
     loading: Loading
     left_over: float
@@ -157,12 +159,14 @@ def passing(
             flow = here.flow
             if flow.beyond:
                 raise WindowTooSmall(f"the window is too small {flow.beyond} for a steady pass")
+            *surface, top = flow.surface()
             return Pass(
                 before=before,
-                after=flow.after,
+                after=replace(flow.after, surface=top),
                 strain=here.added,
                 plastic_strain=flow.plastic,
                 accumulated=flow.total,
+                surface=(surface[0], surface[1]),
                 last_steps=flow.last_steps,
                 loading=here.loading,
                 left_over=left_over,

@@ -7,6 +7,7 @@ last column, closed to the residual state, down to the left end of the mesh.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +45,7 @@ class Rows:
     points : (n_rows, n_columns) their numbers
     ahead, behind : (n_rows, n) numbers of the points before and behind the window, on these rows
     shape : n_rows, n_columns
+    uppermost : number of the rows that lie nearest to the surface
     virgin : the state before any load
     weights : (n_rows, n_columns) volume of the points [mm3]
     """
@@ -68,12 +70,12 @@ class Rows:
         self.weights = part.volumes[points]
         n_rows = len(points)
         length = self._length(points)
-        self.virgin = Layers(
-            depth=-part.points[1].ravel()[points[:, 0]],
-            thickness=self.weights.sum(axis=1) / length,
-            plastic_strain=np.zeros((n_rows, 4)),
-            accumulated=np.zeros(n_rows),
-        )
+        self.uppermost = k = 2 if interleaved else 1
+        depth = -part.points[1].ravel()[points[:, 0]]
+        nothing = np.zeros(n_rows), np.zeros((n_rows, 4))
+        surface = Layers(nothing[0][:k], nothing[0][:k], nothing[1][:k], nothing[0][:k])
+        thickness = self.weights.sum(axis=1) / length
+        self.virgin = Layers(depth, thickness, nothing[1], nothing[0], surface)
         self.ahead = _in_rows(part, shallow & (middle[0] > ahead), deep, interleaved)
         self.behind = downstream = _in_rows(
             part, shallow & (middle[0] < -behind), deep, interleaved
@@ -88,12 +90,32 @@ class Rows:
         )
         each = self._force_of(downstream, self._strain_at(downstream))
         self._behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
-        self._force_behind = operator.condense(self._behind.toarray())
+        # it acts on the boundary of the window alone
+        self._force_behind = sparse.csr_array(operator.condense(self._behind.toarray()))
 
     @property
     def every(self) -> NDArray[np.int64]:
         """The points of each row all along the body (n_rows, n), in and beyond the window."""
         return np.hstack([self.points, self.ahead, self.behind])
+
+    @cached_property
+    def highest(self) -> NDArray[np.int64]:
+        """The points of the uppermost rows (n,), increasing."""
+        return np.sort(self.every[: self.uppermost].ravel())
+
+    @cached_property
+    def above(self) -> NDArray[np.int64]:
+        """Where the points of the uppermost rows (n_uppermost, n) are among `highest`."""
+        return np.searchsorted(self.highest, self.every[: self.uppermost])
+
+    def onto_surface(self, values: Array) -> Array:
+        """Return values (n, ...) at the surface, linear in depth, from those of rows (2 n, ...).
+
+        ``n`` is the number of the uppermost rows.
+        """
+        k = self.uppermost
+        near, far = self.virgin.depth[0], self.virgin.depth[k]
+        return np.asarray((far * values[:k] - near * values[k : 2 * k]) / (far - near))
 
     def _length(self, points: NDArray[np.int64]) -> float:
         """Return the length of the window [mm]."""

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 _ROUNDS = 40
 _COVERED = 0.999
 """Share of the hat of a vertex that must face the rim for the vertex to be a contact point."""
-_SETTLED = 1e-9
+_SETTLED = 1e-7
 """Change of the contact forces / load, at which the geometry of the contact is found."""
 
 

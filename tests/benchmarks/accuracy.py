@@ -3,8 +3,8 @@
 The error is that of residual sigma_x, in percent of the yield stress, against a run of finer
 elements and smaller increments. It is taken where the documentation promises accuracy: along the
 surfaces of the punch problem up to 0.005 half-widths from the corner (0.028 in the punch itself),
-on a rolled track at the first row of points and from 1 mm down. Each run makes its mesh and its
-factors anew.
+on a rolled track from 1 mm down, and at the surface, or the first row of points if it has ends.
+Each run makes its mesh and its factors anew.
 """
 
 from __future__ import annotations
@@ -62,8 +62,9 @@ def _near_corner(record: Record) -> Array:
 def _under_track(record: Record) -> Array:
     profiles = np.asarray(record.fields["residual_profile"][1])[-1]
     deep = np.asarray(record.coordinates["depth"]) >= _SHALLOW
-    row = record.scalars["first_row_residual_x"]
-    return np.concatenate([[row], profiles[len(profiles) // 2, 0, deep]])
+    endless = record.parameters.endless
+    top = record.scalars["surface_residual_x" if endless else "first_row_residual_x"]
+    return np.concatenate([[top], profiles[len(profiles) // 2, 0, deep]])
 
 
 _ENDLESS = RollingParameters()

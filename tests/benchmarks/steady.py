@@ -94,7 +94,9 @@ def _rolled(case: Case, load: str) -> tuple[Track, np.ndarray, np.ndarray]:
     p = replace(BASE, **LOADS[load], **case.changes)
     track = track_for(p)
     (one,) = steady_passes(p, parts=case.parts)
-    return track, one.after.depth, one.after.stress(track.elasticity)[:, 0]
+    both = (one.after.top, one.after)
+    depth = np.concatenate([each.depth for each in both])
+    return track, depth, np.concatenate([each.stress(track.elasticity)[:, 0] for each in both])
 
 
 def _profile(rolled: tuple[Track, np.ndarray, np.ndarray]) -> np.ndarray:

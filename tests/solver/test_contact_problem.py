@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from solver.contact.complementarity import solve_contact
+from solver.contact.given_bound import given_bound
 from solver.contact.lemke import lemke
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem
 
@@ -195,3 +196,16 @@ def test_lemke_solves_random_positive_definite_problems():
 def test_lemke_says_so_where_there_is_no_solution():
     _, solved = lemke(np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 1.0]), 100)
     assert not solved
+
+
+def test_two_points_at_one_place_do_not_hold_a_body_that_may_tilt():
+    problem = ContactProblem(
+        W=np.array(
+            [[1.87780333174076, -1.373420995404054], [-1.373420995404054, 1.17402163736985]]
+        ),
+        offset=np.array([0.21327155, 0.45899312]),
+        friction=np.zeros(2),
+        A=np.full((2, 2), [1.0, 6.405920704482398]),
+        balance=np.array([-1.0, -6.405920704482398]),
+    )
+    assert given_bound(problem, np.zeros(2)) is None

@@ -129,13 +129,15 @@ def test_the_derivative_of_the_flow_is_that_of_differences():
     assert np.linalg.norm(exact - differences) < 1e-4 * np.linalg.norm(differences)
 
 
-def test_material_at_rest_behind_the_load_carries_no_stress_across():
-    one = passes(5.0, 1, shear=0.09)[0]
+@pytest.mark.parametrize("where", ["rows", "surface"])
+def test_material_at_rest_behind_the_load_carries_no_stress_across(where):
+    after = passes(5.0, 1, shear=0.09)[0].after
+    after = after.top if where == "surface" else after
     material = steel()
-    state = PlasticState(one.after.plastic_strain.T, one.after.accumulated)
-    found = material.respond(one.after.strain(material.elasticity).T, state)
+    state = PlasticState(after.plastic_strain.T, after.accumulated)
+    found = material.respond(after.strain(material.elasticity).T, state)
     assert abs(found.stress[[1, 3]]).max() < 1e-6 * YIELD
-    np.testing.assert_allclose(found.stress.T, one.after.stress(material.elasticity), atol=1e-6)
+    np.testing.assert_allclose(found.stress.T, after.stress(material.elasticity), atol=1e-6)
     assert not found.yielding.any() or material.yield_value(found.stress, state).max() < 1e-6
 
 
@@ -148,8 +150,20 @@ def test_a_pass_back_undoes_the_advance_of_the_surface():
     first, second = (
         passes(4.7, 2, directions=ways, material=kinematic) for ways in ([1, 1], [-1, -1])
     )
-    seen = second[-1].left.mirrored.plastic_strain
-    np.testing.assert_allclose(seen, first[-1].left.plastic_strain, atol=1e-12)
+    seen, left = second[-1].left.mirrored, first[-1].left
+    for one, other in ((seen, left), (seen.top, left.top)):
+        np.testing.assert_allclose(one.plastic_strain, other.plastic_strain, atol=1e-12)
+
+
+def test_at_the_surface_stress_has_settled_where_the_first_row_has_not():
+    elasticity = steel().elasticity
+    coarse, usual, fine = (passes(4.7, 1, size=size)[0].after for size in (2.0, 1.0, 0.5))
+    rows, tops = (
+        np.array([each.stress(elasticity)[0, 0] for each in found])
+        for found in ((coarse, usual, fine), (coarse.top, usual.top, fine.top))
+    )
+    assert abs(tops - tops[-1]).max() < 2.0
+    assert abs(rows - tops[-1]).min() > 3.0
 
 
 def test_more_elements_change_little_below_the_surface():

@@ -103,14 +103,14 @@ def never_yields(parameters: RollingParameters) -> bool:
 def _left(passed: Passed) -> dict[str, float]:
     """Return how far the state after the passes is from one of free layers."""
     p, look = passed.parameters, passed.look
-    part, response = look.system.full("half_space"), look.unloaded.response
+    response = look.unloaded.response
     stress, ep = response.stress / p.yield_stress, response.state.plastic_strain
     nu, E = p.poisson_ratio, p.youngs_modulus / p.yield_stress
     wanted = np.zeros_like(stress)
     wanted[0] = -E / (1 - nu**2) * (ep[0] + nu * ep[2])
     wanted[2] = -E / (1 - nu**2) * (ep[2] + nu * ep[0])
     size = max(1.0, E * float(np.abs(ep).max()))
-    depth = np.round(part.points[1].ravel() / p.mesh_width, 9)
+    depth = np.round(_positions(passed)[1] / p.mesh_width, 9)
     order = np.argsort(depth, kind="stable")
     first = np.append(0, np.flatnonzero(np.diff(depth[order])) + 1)
     spread = np.maximum.reduceat(stress[:, order], first, axis=1)
@@ -125,11 +125,18 @@ def _left(passed: Passed) -> dict[str, float]:
     }
 
 
+def _positions(passed: Passed) -> np.ndarray:
+    """Return where the points are, and those at the surface above the first row (2, n)."""
+    points = passed.look.system.full("half_space").points.reshape(2, -1)
+    first = points[1] > points[1].max() * (1 + 1e-6)
+    return np.concatenate([points, points[:, first] * [[1.0], [0.0]]], axis=1)
+
+
 def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far stress and plastic strain are from the law, where material flows."""
     p, look = passed.parameters, passed.look
     a, material = p.mesh_width, p.material()
-    x, y = look.system.full("half_space").points.reshape(2, -1)
+    x, y = _positions(passed)
     x = x * passed.parameters.directions[len(passed.record.coordinates["pass"]) - 1]
     inside = (x < AHEAD * a) & (x > -BEHIND * a) & (y > -DEEP * a)
     found = {}
@@ -160,7 +167,7 @@ def _balance(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far the stress under load is from what presses on the surface."""
     look = passed.look
     part = look.system.full("half_space")
-    stress = look.loaded.response.stress
+    stress = look.loaded.response.stress[:, : part.weights.size]
     left = part.internal_force(stress).reshape(-1, 2)
     held = np.ones(part.n, dtype=bool)
     held[part.free] = False
