@@ -81,15 +81,17 @@ def search(
             begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
             found = _approached(exactly, load, _HEAVIER[1:], begun, found)
     else:
-        again = guess is not None and isinstance(found, NotConverged)
-        if again and not isinstance(found, LimitLoad):
+        if guess is not None and isinstance(found, NotConverged):  # the guess may be a bad one
             found = _tried(exactly, load)
         if isinstance(found, NotConverged):
             found = _approached(exactly, load, _LIGHTER, None, found)
     if isinstance(found, NotConverged):
         raise found
     if own < _HARDEST and found.gathered > _LARGE:
-        raise _unbounded(own)
+        raise LimitLoad(
+            f"a steady pass adds {found.gathered:.0%} of plastic strain, and {_LARGE:.0%} or more"
+            " counts as the limit of a material that hardly hardens"
+        )
     return found
 
 

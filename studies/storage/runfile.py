@@ -13,13 +13,13 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import h5py
 import netCDF4
 import xarray as xr
 from xarray.backends import NetCDF4DataStore
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from studies.errors import RunUnreadable, StoreFull
 from studies.storage import dataset as layout
@@ -35,8 +35,6 @@ _FIRST_BYTES = 1 << 16
 """Size with which a file in memory begins; it grows."""
 _ORDER = "variables"
 """Attribute with the names of the variables in their order, which netCDF loses in memory."""
-_ONE_AT_A_TIME = Lock()
-"""The netCDF library serves one thread at a time."""
 _NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
 
 
@@ -52,12 +50,15 @@ def _packed(run: xr.Dataset) -> bytes:
     for name, variable in run.variables.items():
         if variable.ndim and variable.dtype.kind in "fi":
             stored.setdefault(str(name), {})["fletcher32"] = True
-    with _ONE_AT_A_TIME:
+    order = {_ORDER: " ".join(map(str, run.variables))}
+    with NETCDF4_PYTHON_LOCK:
         file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
-        store = NetCDF4DataStore(file, lock=False)
-        order = {_ORDER: " ".join(map(str, run.variables))}
-        run.assign_attrs(SEALED | order).dump_to_store(store, encoding=stored)
-        return bytes(file.close())
+        try:
+            store = NetCDF4DataStore(file, lock=False)
+            run.assign_attrs(SEALED | order).dump_to_store(store, encoding=stored)
+        finally:
+            content = file.close()
+        return bytes(content)
 
 
 def verify(path: Path) -> bool:

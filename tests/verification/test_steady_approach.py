@@ -7,15 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver import LimitLoad
+from solver import LimitLoad, Material
 from solver.errors import NotConverged, WindowTooSmall
 from solver.fem.fields import recovery
 from solver.results.steady import HalfPlane
 from solver.scenes.rolling_grids import wheel_nodes
 from solver.scenes.rolling_parameters import RollingParameters
+from solver.steady import search as steady_search
 from solver.steady import track_of
 from solver.steady.rolling import Expected
-from solver.steady.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading
+from solver.steady.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
 
 
 class Weight:
@@ -119,6 +120,24 @@ def test_a_pass_that_is_not_found_however_slowly_it_fades_is_told():
 def test_passes_of_fading_hardening_that_gather_too_much_are_at_their_limit():
     with pytest.raises(LimitLoad, match=r"30%, even if the material hardens by 0\.0"):
         faded(largest=1.0)
+
+
+# -- bad guesses -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("failure", [LimitLoad, NotConverged])
+def test_a_bad_guess_does_not_make_a_limit_of_a_pass_that_exists(monkeypatch, failure):
+    found = SimpleNamespace(strain=1.0, gathered=0.01)
+
+    def passing(track, material, load, before, guess=None, **settings):
+        if guess is not None:
+            raise failure("flows without bound")
+        return found
+
+    monkeypatch.setattr(steady_search, "passing", passing)
+    rolled = SimpleNamespace(accumulated=np.ones(1))
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=500.0)
+    assert search(None, steel, Weight(), rolled, guess=np.ones(1)) is found
 
 
 # -- passes that repeat ----------------------------------------------------------------------------
