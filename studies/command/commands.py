@@ -15,20 +15,17 @@ from studies.definition.study import Study
 from studies.errors import StudyError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-SHOWN = 100
-"""Most runs that `run` prints; `show` prints all."""
 
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from studies.command.cost import dry_run, long_run
     from studies.command.progress import Progress
+    from studies.command.report import report
     from studies.execution.cluster import Access
     from studies.execution.limits import Limits
     from studies.execution.run import run_study
     from studies.storage.store import Store
-    from studies.views.reading import open_study
-    from studies.views.tables import messages, runs_table
 
     limits = Limits(
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
@@ -56,17 +53,12 @@ def run(options: argparse.Namespace) -> int:
             should_stop=lambda: bool(interrupted),
         )
     progress.close()
-    with open_study(outcome.dataset) as dataset:
-        if study.size <= SHOWN:
-            print(runs_table(dataset))
-        print(messages(dataset), end="")
-        warned = _warned(dataset)
-        picture = _picture(dataset, outcome.dataset.with_name("residual_stress_xx.png"))
-    counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
+    told = report(study, store, outcome)
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
-    print(f"\n{study.name}: {study.size} runs ({counts}{warned}), {computed}")
-    for written in (outcome.dataset, *picture):
-        print(f"wrote {written}")
+    print(f"{told.text.rstrip()}, {computed}")
+    written = {outcome.dataset: outcome.anew} | dict.fromkeys(told.files, told.anew)
+    for path, anew in written.items():
+        print(f"{'wrote' if anew else 'kept'} {path}")
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
@@ -198,27 +190,6 @@ def _interruption() -> Iterator[list[int]]:
         yield received
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _warned(dataset: Any) -> str:
-    """Return how many runs succeeded with a warning, which their details show."""
-    from studies.definition.vocabulary import STATUSES
-
-    warned = (dataset["status"] == STATUSES.index("ok")) & (dataset["message"] != "")
-    return f"; {int(warned.sum())} with a warning" if warned.any() else ""
-
-
-def _picture(dataset: Any, path: Path) -> list[Path]:
-    """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
-    from studies.views.plots.maps import map_figure
-    from studies.views.reading import one_run
-
-    try:
-        drawn = map_figure(one_run(dataset), "residual_stress", "xx")
-    except StudyError:
-        return []
-    _save(drawn, path)
-    return [path]
 
 
 def _save(drawn: Any, path: Path) -> None:

@@ -126,6 +126,20 @@ def written(scene: Scene) -> list[list[str]]:
     module imports does not count, and code without a file, such as a cell of a notebook, has no
     digest.
     """
+    functions = _functions(scene)
+    digests = {name: _module_digest(name) for name in {each.__module__ for each in functions}}
+    return [[each.__qualname__, digests[each.__module__]] for each in functions]
+
+
+def sources(scene: Scene) -> list[Path]:
+    """Return the files of solver, studies and scene: with their words, all that makes results."""
+    roots = (Path(solver.__file__).parent, Path(__file__).parents[1])
+    own = filter(None, (_own_file(each.__module__) for each in _functions(scene)))
+    return sorted({*own, *(path for root in roots for path in root.rglob("*.py"))})
+
+
+def _functions(scene: Scene) -> list[Any]:
+    """Return the parameters of a scene and its functions that make numbers."""
     given: list[Any] = [type(scene)]
     for item in fields(scene):
         if item.name in NO_NUMBERS:
@@ -133,20 +147,25 @@ def written(scene: Scene) -> list[list[str]]:
         value = getattr(scene, item.name)
         given += value if isinstance(value, tuple) else [value]
     called = [getattr(each, "func", each) for each in given if callable(each)]
-    functions = [each if hasattr(each, "__qualname__") else type(each) for each in called]
-    modules = {each.__module__ for each in functions}
-    digests = {name: _module_digest(name) for name in modules}
-    return [[each.__qualname__, digests[each.__module__]] for each in functions]
+    return [each if hasattr(each, "__qualname__") else type(each) for each in called]
+
+
+def _own_file(module: str) -> Path | None:
+    """Return the file of a module that is none of the solver's, if it has one."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if file is None or Path(file).is_relative_to(Path(solver.__file__).parent):
+        return None
+    return Path(file)
 
 
 def _module_digest(name: str) -> str:
     """Return the digest of a module's source but for its words; nothing for one of the solver."""
-    file = getattr(sys.modules.get(name), "__file__", None)
-    if file is None or Path(file).is_relative_to(Path(solver.__file__).parent):
+    file = _own_file(name)
+    if file is None:
         return ""
     from studies.definition.meaning import meaning
 
-    tree = ast.parse(Path(file).read_bytes())
+    tree = ast.parse(file.read_bytes())
     tree.body = [each for each in tree.body if not _only_as_script(each)]
     return _digest(meaning(ast.unparse(tree)).encode())
 

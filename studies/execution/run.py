@@ -21,10 +21,10 @@ from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
+from studies.execution.result import result
 from studies.execution.task import PathTask, walk
 from studies.execution.watch import Waiting
 from studies.storage import dataset as layout
-from studies.storage.combine import Combined, combine
 from studies.storage.store import Store
 
 DEFAULT = Limits()
@@ -72,6 +72,7 @@ class StudyOutcome:
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
     dataset : the combined data set
+    anew : whether the data set was written anew; it is kept where it was made of the same runs
     wall_seconds : duration
     stopped : whether it was asked to stop before all was computed
     """
@@ -81,6 +82,7 @@ class StudyOutcome:
     failed: Sequence[tuple[str, str, str]]
     computed: Sequence[str]
     dataset: Path
+    anew: bool
     wall_seconds: float
     stopped: bool
 
@@ -159,26 +161,17 @@ def run_study(
                 raise StoreFull(str(store.directory))  # no path is walked in vain
             work.compute(workers or os.cpu_count() or 1, access, stop)
         stopped = asked and bool(wanted - work.computed)
-        combined = _result(study, store, stopped)
-        store.catalogue.remove(combined.missing)
+        combined = result(study, store, complete=not wanted, stopped=stopped)
     return StudyOutcome(
         study_id=study.id,
         counts=combined.counts,
         failed=combined.failed,
         computed=sorted(work.computed),
         dataset=combined.path,
+        anew=combined.anew,
         wall_seconds=time.monotonic() - started,
         stopped=stopped,
     )
-
-
-def _result(study: Study, store: Store, stopped: bool) -> Combined:
-    """Combine the runs, unless a repeat that was stopped has fewer of them than the data set."""
-    held = store.outcomes(study.id)
-    if stopped and held[OK] > store.catalogue.counts(study.run_ids()).get(OK, 0):
-        path = store.dataset_path(study.id)
-        return Combined(path=path, counts=dict(held), failed=(), missing=())
-    return combine(study, store, study.cases())
 
 
 def _answering(access: Access) -> None:

@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -20,6 +19,7 @@ from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, STATUSES, SYMMETRIC
 from studies.errors import RunUnreadable
 from studies.storage import dataset as layout
+from studies.storage.held import Combined
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
 from studies.storage.runfile import global_attributes, opened, variables
@@ -27,23 +27,6 @@ from studies.storage.store import Store, appearing
 
 SAME = 1e-9
 """Relative difference below which two runs are taken to have the same grid."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Combined:
-    """What the data set of a study holds.
-
-    Attributes
-    ----------
-    path : the data set
-    counts, failed : as those of a `StudyOutcome`
-    missing : ids of the runs that it lacks
-    """
-
-    path: Path
-    counts: Mapping[str, int]
-    failed: Sequence[tuple[str, str, str]]
-    missing: Sequence[str]
 
 
 def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
@@ -105,6 +88,7 @@ def _combined(
         counts=dict(counts | Counter({MISSING: len(missing)} if missing else {})),
         failed=[(run_id, *each) for run_id, each in outcomes.items() if each[0] != OK],
         missing=missing,
+        anew=True,
     )
 
 

@@ -4,6 +4,7 @@
 runs/<run id>.nc              one file a run, shared by all studies
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
+studies/<study id>/made.json  what it was made of, and what was made of it
 catalogue.sqlite              made anew from the files when it is missing or damaged
 unreadable/                   files that were damaged or in a wrong place
 ```

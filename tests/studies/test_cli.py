@@ -39,8 +39,8 @@ def test_run_prints_a_table_and_writes_data_and_picture(
         ["0.3", "0", "ok"], ["0.3", "0.4", "ok"], ["0.9", "0", "ok"], ["0.9", "0.4", "ok"],
     ]  # fmt: skip
     written = [Path(line.split()[1]) for line in lines if line.startswith("wrote")]
-    assert [path.suffix for path in written] == [".nc", ".png"]
-    assert written[1].read_bytes().startswith(PNG)
+    assert [path.suffix for path in written] == [".nc", ".txt", ".png"]
+    assert written[2].read_bytes().startswith(PNG)
     assert "\r" not in printed.err, "no bar where nobody watches"
     assert len(printed.err.splitlines()) == 4
 

@@ -1,0 +1,86 @@
+"""What `residua run` leaves beside a data set: the table of its runs, and a picture of one.
+
+Both are kept as long as the data set is the one that they were made of.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.definition.study import Study
+from studies.definition.vocabulary import STATUSES
+from studies.errors import StudyError
+from studies.execution.run import StudyOutcome
+from studies.storage.made import Made
+from studies.storage.store import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SHOWN = 100
+"""Most runs that a report lists; `residua show` prints all."""
+
+_NAME = "report"
+_TEXT, _PICTURE = "report.txt", "residual_stress_xx.png"
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a study came to.
+
+    Attributes
+    ----------
+    text : its runs, their messages, and in the last line how many there are
+    files : the text, and the picture where a run succeeded
+    anew : whether they were written now, not kept
+    """
+
+    text: str
+    files: list[Path]
+    anew: bool
+
+
+def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
+    """Return the report of a study that was carried out, made anew where its data set was."""
+    made = Made(study, store)
+    of = made.digest(outcome.dataset.name)
+    if files := made.kept(_NAME, of):
+        return Report(files[0].read_text(encoding="utf-8"), files, anew=False)
+    from studies.views.reading import open_study  # with tables and pictures, a second to import
+
+    with open_study(outcome.dataset) as dataset:
+        text = _text(study, outcome, dataset)
+        files = made.write(_NAME, of, {_TEXT: text.encode(), **_drawn(dataset)})
+    return Report(text, files, anew=True)
+
+
+def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
+    from studies.views.tables import messages, runs_table
+
+    table = runs_table(dataset) + "\n" if study.size <= SHOWN else ""
+    counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
+    ended = f"{study.name}: {study.size} runs ({counts}{_warned(dataset)})"
+    return f"{table}{messages(dataset)}\n{ended}\n"
+
+
+def _warned(dataset: xr.Dataset) -> str:
+    """Return how many runs succeeded with a warning, which their details show."""
+    warned = (dataset["status"] == STATUSES.index("ok")) & (dataset["message"] != "")
+    return f"; {int(warned.sum())} with a warning" if warned.any() else ""
+
+
+def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
+    """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
+    from studies.views.plots.maps import map_figure
+    from studies.views.reading import one_run
+
+    try:
+        drawn = map_figure(one_run(dataset), "residual_stress", "xx")
+    except StudyError:
+        return {}
+    picture = io.BytesIO()
+    drawn.savefig(picture, format="png")
+    return {_PICTURE: picture.getvalue()}

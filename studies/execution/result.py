@@ -1,0 +1,40 @@
+"""The data set of a study: combined, or kept where it was made of the same runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from studies.definition.study import Study
+from studies.definition.vocabulary import OK
+from studies.storage.combine import combine
+from studies.storage.held import Combined, held
+from studies.storage.made import Made
+from studies.storage.store import Store
+
+_NAME = "data set"
+
+
+def result(study: Study, store: Store, *, complete: bool, stopped: bool) -> Combined:
+    """Combine the runs of a study, unless its data set is made of these already.
+
+    Parameters
+    ----------
+    study, store : whose runs, and where they are
+    complete : whether nothing was computed, and the files of all runs have just been verified
+    stopped : whether runs were left out; a data set that has more of them is kept too
+    """
+    made = Made(study, store)
+    if complete:
+        of, known = held(study, store)
+        if made.kept(_NAME, of):
+            return known
+    elif stopped:
+        before = store.outcomes(study.id)
+        _, known = held(study, store)
+        if before[OK] > known.counts.get(OK, 0):
+            return replace(known, counts=dict(before), failed=(), missing=())
+    combined = combine(study, store, study.cases())
+    store.catalogue.remove(combined.missing)
+    of, _ = held(study, store)
+    made.note(_NAME, of, [combined.path.name])
+    return combined

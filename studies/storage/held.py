@@ -1,0 +1,61 @@
+"""What the catalogue holds of a study: how its runs ended, and a digest of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from studies.definition.study import Study
+from studies.definition.vocabulary import MISSING, OK
+from studies.storage.store import Store
+
+_BATCH = 500
+"""Runs whose rows are held at a time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Combined:
+    """What the data set of a study holds.
+
+    Attributes
+    ----------
+    path : the data set
+    counts, failed : as those of a `StudyOutcome`
+    missing : ids of the runs that it lacks
+    anew : whether it was written now, not kept
+    """
+
+    path: Path
+    counts: Mapping[str, int]
+    failed: Sequence[tuple[str, str, str]]
+    missing: Sequence[str]
+    anew: bool
+
+
+def held(study: Study, store: Store) -> tuple[str, Combined]:
+    """Return a digest of the runs of `study`, and what a data set made of them holds.
+
+    The digest is another one when a run is there or gone, or when its file has another length or
+    time of change: whoever relies on it has compared the catalogue with the files (`Store.sound`).
+    """
+    digest = hashlib.sha256()
+    counts: Counter[str] = Counter()
+    failed, missing = [], []
+    ids = study.run_ids()
+    while some := list(islice(ids, _BATCH)):
+        rows = store.catalogue.rows(some)
+        for run_id in some:
+            row = rows.get(run_id, {"status": MISSING})
+            digest.update(f"{run_id} {row.get('size')} {row.get('modified')}\n".encode())
+            counts[row["status"]] += 1
+            if row["status"] == MISSING:
+                missing.append(run_id)
+            elif row["status"] != OK:
+                failed.append((run_id, row["status"], row["message"]))
+    path = store.dataset_path(study.id)
+    ended = Combined(path=path, counts=dict(counts), failed=failed, missing=missing, anew=False)
+    return digest.hexdigest(), ended

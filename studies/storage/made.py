@@ -1,0 +1,104 @@
+"""What was made of what, so that nothing is made again that is there: ``made.json`` of a study.
+
+A result is one or several files, such as the data set. Of each, a digest of all it was made of is
+kept, and one of every file. A result is made anew where a file is gone or is not what was written,
+where it was made of something else, and after any change of our sources or of the libraries that
+write and draw.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from solver.scenes import SCENES
+from studies.definition.identity import sources
+from studies.definition.study import Study
+from studies.storage.room import needs_room
+from studies.storage.store import Store, appearing
+
+_LIBRARIES = ("h5netcdf", "matplotlib", "xarray")
+
+
+class Made:
+    """The results in the directory of a study.
+
+    Parameters
+    ----------
+    study, store : whose, and where
+    """
+
+    def __init__(self, study: Study, store: Store) -> None:
+        self._study, self._store = study, store
+        self._directory = store.study_directory(study.id)
+        self._file = self._directory / "made.json"
+
+    def kept(self, result: str, of: str) -> list[Path] | None:
+        """Return the files of a result that is there, made of this; None where it must be made."""
+        try:
+            entry = self._entries()[result]
+            files = {self._directory / name: digest for name, digest in entry["files"].items()}
+            same = entry["of"] == self._made_of(of)
+        except (AttributeError, KeyError, TypeError):
+            return None
+        if same and all(_digest(path) == digest for path, digest in files.items()):
+            return list(files)
+        return None
+
+    def digest(self, name: str) -> str:
+        """Return the digest of a file, of which something can be made; of none where it is gone."""
+        return str(_digest(self._directory / name))
+
+    def note(self, result: str, of: str, names: Iterable[str]) -> None:
+        """Keep in mind what files were made of, while nobody else writes them."""
+        self._note(result, of, {name: _digest(self._directory / name) for name in names})
+
+    def write(self, result: str, of: str, contents: Mapping[str, bytes]) -> list[Path]:
+        """Write files with these contents, keep in mind what they were made of, return them."""
+        for name, content in contents.items():
+            self._write(self._directory / name, content)
+        self._note(result, of, {name: _hex(content) for name, content in contents.items()})
+        return [self._directory / name for name in contents]
+
+    def _note(self, result: str, of: str, files: Mapping[str, str | None]) -> None:
+        entries = self._entries() | {result: {"of": self._made_of(of), "files": files}}
+        self._write(self._file, (json.dumps(entries, indent=2) + "\n").encode())
+
+    def _entries(self) -> dict[str, Any]:
+        try:
+            content = json.loads(self._file.read_bytes())
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    def _write(self, path: Path, content: bytes) -> None:
+        self._store.clear_directory(path)
+        with needs_room(self._store.directory), appearing(path) as part:
+            part.write_bytes(content)
+
+    def _made_of(self, of: str) -> str:
+        return _hex("\n".join([of, *self._makers]).encode())
+
+    @cached_property
+    def _makers(self) -> list[str]:
+        """Digests of the sources, and versions of libraries."""
+        found = [_hex(path.read_bytes()) for path in sources(SCENES[self._study.scene])]
+        return found + [importlib.metadata.version(name) for name in _LIBRARIES]
+
+
+def _digest(path: Path) -> str | None:
+    """Return the digest of a file; None of one that cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return None
+
+
+def _hex(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

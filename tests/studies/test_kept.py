@@ -1,0 +1,151 @@
+"""Of a complete study nothing is made again: data set, report and picture are kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from studies import Store, Study, run_study
+from studies.command.cli import main
+from studies.storage import made
+from tests.studies.conftest import compute_here
+from tests.studies.test_damage import true_numbers
+
+RESULTS = ["dataset.nc", "report.txt", "residual_stress_xx.png"]
+REPORT = RESULTS[1:]
+Make = Callable[[], list[str]]
+"""Runs the command; returns the names of the files that it has written, not kept."""
+
+
+@pytest.fixture
+def complete(study_file: Callable[..., Path], tmp_path: Path) -> tuple[Study, Store]:
+    """A study whose command ran to its end, without worker processes."""
+    study, store = Study.from_toml(study_file()), Store(tmp_path / "out")
+    compute_here(study, store)
+    assert main(arguments(tmp_path)) == 0
+    return study, store
+
+
+def arguments(folder: Path) -> list[str]:
+    return ["run", str(folder / "study.toml"), "--out", str(folder / "out")]
+
+
+@pytest.fixture
+def again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Make:
+    def run() -> list[str]:
+        capsys.readouterr()
+        assert main(arguments(tmp_path)) == 0
+        lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+        return [Path(line[1]).name for line in lines if line and line[0] == "wrote"]
+
+    return run
+
+
+def states(study: Study, store: Store) -> dict[str, tuple[int, int]]:
+    """Return what every writing of a file of the study changes."""
+    files = store.study_directory(study.id).iterdir()
+    return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in files}
+
+
+def refused(*arguments: object) -> None:
+    raise AssertionError("made again")
+
+
+def test_a_complete_study_is_told_again_and_nothing_is_made(
+    complete: tuple[Study, Store], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    before = states(*complete)
+    assert before.keys() == {"study.json", "made.json", *RESULTS}
+    for maker in (
+        "studies.execution.result.combine",
+        "studies.views.plots.maps.map_figure",
+        "studies.views.tables.runs_table",
+    ):
+        monkeypatch.setattr(maker, refused)
+    assert main(arguments(tmp_path)) == 0
+    assert states(*complete) == before
+    told, directory = capsys.readouterr().out, complete[1].study_directory(complete[0].id)
+    assert told.startswith((directory / "report.txt").read_text().rstrip() + ", 0 computed in ")
+    assert told.splitlines()[-3:] == [f"kept {directory / name}" for name in RESULTS]
+
+
+def flip(path: Path) -> None:
+    """Damage a file as a disk does: its length and its time stay."""
+    state, content = path.stat(), bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
+
+
+def directory(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize("damage", [flip, Path.unlink, directory])
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_that_is_damaged_or_gone_is_made_again(
+    complete: tuple[Study, Store], again: Make, damage: Callable[[Path], None], name: str
+) -> None:
+    study, store = complete
+    path = store.study_directory(study.id) / name
+    before = path.read_bytes()
+    damage(path)
+    # the data set tells when it was made: what is made of it is made anew
+    assert set(again()) >= ({name} if name == "dataset.nc" else set(REPORT))
+    assert len(path.read_bytes()) == len(before)
+    true_numbers(study, store)
+    assert again() == []
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b'{"data set": 1}', b'{"report": {"files": {}}}'])
+def test_where_it_is_not_known_what_results_were_made_of_all_are_made_again(
+    complete: tuple[Study, Store], again: Make, content: bytes
+) -> None:
+    study, store = complete
+    (store.study_directory(study.id) / "made.json").write_bytes(content)
+    assert "dataset.nc" in again()
+    assert again() == []
+
+
+def test_a_run_written_anew_makes_all_results_anew(
+    complete: tuple[Study, Store], again: Make
+) -> None:
+    study, store = complete
+    run = store.run_path(next(study.cases()).id)
+    state = run.stat()
+    os.utime(run, ns=(state.st_atime_ns, state.st_mtime_ns - 10**12))  # older, and yet another one
+    assert "dataset.nc" in again()
+    assert again() == []
+
+
+@pytest.mark.parametrize("what", ["source", "library"])
+def test_other_sources_and_libraries_make_all_results_anew(
+    complete: tuple[Study, Store], again: Make, tmp_path: Path, what: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    changed = tmp_path / "other.py"
+    changed.write_text("# only a word")
+    if what == "source":
+        known = made.sources
+        monkeypatch.setattr(made, "sources", lambda scene: [*known(scene), changed])
+    else:
+        monkeypatch.setattr("importlib.metadata.version", lambda name: "0.0")
+    assert set(REPORT) <= set(again()), "a picture of the same data set too"
+    assert again() == []
+
+
+def test_a_study_with_failed_runs_is_kept_where_they_are_not_tried_again(
+    study_file: Callable[..., Path], store: Store
+) -> None:
+    study = Study.from_toml(study_file(trouble="limit"))
+    compute_here(study, store)
+    first, second = (run_study(study, store, resume=True) for _ in range(2))
+    assert (first.anew, second.anew) == (True, False)
+    assert second.counts == first.counts == {"ok": 2, "limit_load": 2}
+    assert second.failed == first.failed
+    assert len(second.failed) == 2
