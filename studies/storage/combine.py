@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 from typing import Any
 
 import h5netcdf
@@ -141,9 +142,10 @@ class _Frame:
 
     def learn(self, run: h5py.File) -> None:
         """Take in the grids and variables of one run."""
-        for name, variable in variables(run).items():
+        for name in variables(run):
             if name in self.usual or name in self.fields or name in self.small:
                 continue
+            variable = run[name]
             if variable.is_scale:
                 self._learn_coordinate(name, _values(variable))
             elif inner := [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]:
@@ -205,12 +207,13 @@ class _Frame:
 
     def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Put the values of one run in their place."""
+        places = cache(partial(self._places, run))
         for name, variable in run.items():
             if name in self.fields:
                 inner, _ = self.fields[name]
                 whole = np.full(self._inner_shape(inner), np.nan)
                 values = _values(variable).reshape(variable.shape[len(self.usual) :])
-                whole[np.ix_(*(self._places(run, dimension) for dimension in inner))] = values
+                whole[np.ix_(*map(places, inner))] = values
                 file.variables[name][at] = whole
             elif name in self.ragged:
                 self.small[name][0][at][: len(variable)] = _values(variable)

@@ -112,10 +112,9 @@ def global_attributes(run: h5py.File) -> dict[str, Any]:
     return {name: _text(value) for name, value in run.attrs.items()}
 
 
-def variables(run: h5py.File) -> dict[str, h5py.Dataset]:
-    """Return the variables by name, in the order in which they were given."""
-    names = _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else run
-    return {name: run[name] for name in names}
+def variables(run: h5py.File) -> list[str]:
+    """Return the names of the variables in the order in which they were given."""
+    return _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else list(run)
 
 
 def _text(value: Any) -> Any:
@@ -135,11 +134,11 @@ def row(path: Path) -> dict[str, Any]:
     """
     with opened(path) as run:
         rank = run["status"].ndim
-        wanted = {name: each for name, each in variables(run).items() if each.ndim == rank}
+        every = {name: run[name] for name in variables(run)}
         values = {
             name: (each.asstr() if each.dtype.kind == "O" else each)[...].item()
-            for name, each in wanted.items()
-            if not each.is_scale
+            for name, each in every.items()
+            if each.ndim == rank and not each.is_scale
         }
         return layout.summary(global_attributes(run), values) | stamp(path)
 
