@@ -52,8 +52,9 @@ def tell(event: StudyEvent, outlet: Outlet) -> None:
 
 
 def prepare() -> None:
-    """Load what every study needs: dask, and the sources that make the ids of runs."""
-    from studies.execution import grid  # noqa: F401
+    """Load what every study needs: dask, netCDF, and the sources that make the ids of runs."""
+    import studies.execution.grid
+    import studies.storage.combine  # noqa: F401
 
     solver_hash()
 

@@ -8,22 +8,55 @@ one, and gives an `Outcome`. `solve` does this for a model of your own and retur
 points up.
 """
 
-from solver.contact.system import System
-from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
-from solver.loading.control import PathControl, Tolerances
-from solver.loading.outcome import Outcome
-from solver.loading.path import Branch, Path
-from solver.loading.program import Program, Stage
-from solver.loading.walker import Walker
-from solver.materials.material import Material
-from solver.model.body import Body
-from solver.model.model import ContactPair, Model
-from solver.results.audit import Audit
-from solver.results.record import Record, Status
-from solver.results.solution import Solution, solve
-from solver.scenes import SCENES, Scene
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from solver.contact.system import System
+    from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
+    from solver.loading.control import PathControl, Tolerances
+    from solver.loading.outcome import Outcome
+    from solver.loading.path import Branch, Path
+    from solver.loading.program import Program, Stage
+    from solver.loading.walker import Walker
+    from solver.materials.material import Material
+    from solver.model.body import Body
+    from solver.model.model import ContactPair, Model
+    from solver.results.audit import Audit
+    from solver.results.record import Record, Status
+    from solver.results.solution import Solution, solve
+    from solver.scenes import SCENES, Scene
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "Audit": "results.audit",
+    "Body": "model.body",
+    "Branch": "loading.path",
+    "ContactPair": "model.model",
+    "LimitLoad": "errors",
+    "Material": "materials.material",
+    "Model": "model.model",
+    "ModelError": "errors",
+    "NotConverged": "errors",
+    "Outcome": "loading.outcome",
+    "Path": "loading.path",
+    "PathControl": "loading.control",
+    "Program": "loading.program",
+    "Record": "results.record",
+    "Scene": "scenes",
+    "SCENES": "scenes",
+    "Solution": "results.solution",
+    "solve": "results.solution",
+    "SolverError": "errors",
+    "Stage": "loading.program",
+    "Status": "results.record",
+    "System": "contact.system",
+    "Tolerances": "loading.control",
+    "Walker": "loading.walker",
+}
 
 __all__ = [
     "SCENES",
@@ -51,3 +84,10 @@ __all__ = [
     "Walker",
     "solve",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: to name the runs of a study needs no solver."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -16,12 +16,11 @@ from solver.errors import LimitLoad, ModelError
 from solver.loading.bearing import unbearable
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
+from solver.loading.settling import HALVINGS
 from solver.loading.stepper import Stepper, turned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from solver.contact.state import Converged
     from solver.contact.system import System
@@ -29,31 +28,13 @@ if TYPE_CHECKING:
     from solver.loading.control import Control
     from solver.loading.outcome import Point
     from solver.loading.program import Program, Target
+    from solver.loading.settling import Settling
     from solver.loading.stepper import Report
 
     Points = Mapping[str, Converged]
 
-HALVINGS = 6
-"""Most times that `Settling` halves the increments."""
 _NOTHING = 1e-6
 """Plastic work of a lap / plastic work so far, below which the lap counts as elastic."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settling:
-    """How small increments must be: halved until the result of the first lap no longer changes.
-
-    Backward Euler in the plastic strain is of first order in the increment, so the change by
-    halving estimates the error that is left.
-
-    Attributes
-    ----------
-    measure : (trace of a lap) -> numbers that must not change
-    tolerance : largest change that is accepted
-    """
-
-    measure: Callable[[Any], NDArray[np.float64]]
-    tolerance: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

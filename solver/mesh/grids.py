@@ -9,8 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
-from skfem import MeshQuad, MeshQuad2, MeshTri
 
 from solver.errors import ModelError
 
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
-    from skfem import Mesh
+    from skfem import Mesh, MeshQuad2
 
 
 _SAME = 1e-9
@@ -48,6 +46,8 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> NDAr
 
 def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") -> Mesh:
     """Return the tensor grid with boundaries ``left``, ``right``, ``bottom``, ``top``."""
+    from skfem import MeshQuad, MeshTri  # a third of a second to import, and `graded` needs none
+
     make = MeshTri if cells == "tri" else MeshQuad
     mesh = make.init_tensor(np.asarray(x, float), np.asarray(y, float))
     tolerance = 1e-9 * max(np.ptp(x), np.ptp(y))
@@ -78,6 +78,8 @@ def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.floa
     ``function`` takes and returns coordinates (2, n); boundary names are kept. It must keep
     orientation.
     """
+    from skfem import MeshQuad2
+
     curved = MeshQuad2.from_mesh(mesh)
     moved = MeshQuad2(
         doflocs=np.asarray(function(curved.doflocs)), t=curved.t, sort_t=False, validate=False
@@ -90,6 +92,9 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
 
     A grid bent until its ends meet becomes a closed ring: its ends are no boundary any more.
     """
+    from scipy.spatial import cKDTree
+    from skfem import MeshQuad, MeshQuad2
+
     corners = mesh.p[:, : mesh.nvertices]
     tolerance = _SAME * float(np.ptp(corners, axis=1).max())
     first = np.arange(mesh.nvertices)

@@ -12,8 +12,6 @@ import numpy as np
 from solver.deprecation import renamed
 from solver.errors import ModelError
 from solver.materials import PlaneStress
-from solver.mesh.check import check_mesh
-from solver.mesh.elements import element_type
 from solver.model.kinematics import KINEMATICS, Kinematics
 
 if TYPE_CHECKING:
@@ -64,6 +62,10 @@ class Body:
     periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
+        # scikit-fem takes a third of a second to import: only who makes a body waits for it
+        from solver.mesh.check import check_mesh
+        from solver.mesh.elements import element_type
+
         if self.kinematics not in KINEMATICS:
             raise ModelError(
                 "kinematics", self.kinematics, "must be one of " + ", ".join(KINEMATICS)

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
-from solver.mesh.elements import element_type
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
@@ -38,6 +36,8 @@ class Lattice(NamedTuple):
 
 @cache
 def _per_place(element: str) -> tuple[str, int, int, int]:
+    from solver.mesh.elements import element_type  # scikit-fem takes a third of a second to import
+
     kind = element_type(element)
     shape = kind.element
     return kind.cells, shape.nodal_dofs, shape.facet_dofs, shape.interior_dofs

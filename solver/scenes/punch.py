@@ -24,10 +24,8 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh import graded, grid
-from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.model.model import Model
-from solver.results.audit import cut_force
 from solver.results.contact import contact
 from solver.results.fields import maps, profiles, surfaces
 from solver.results.figures import cost, extremes
@@ -136,6 +134,8 @@ def _graded_nodes(
 
 def model(parameters: PunchParameters) -> Model:
     """Return the half model: bodies, supports, pressure and contact."""
+    from solver.mesh.elements import element_type  # only who computes needs the solver
+
     under, beyond, up, down = _nodes(parameters)
     cells = element_type(parameters.element).cells
     punch = Body(
@@ -229,6 +229,8 @@ _INSIDE = {"half_plane": 0.005, "punch": 0.028}
 
 def figures(look: Look) -> Values:
     """Return the figures of the punch, those of the publication among them."""
+    from solver.results.audit import cut_force  # only who computes needs the solver
+
     samples, system, unloaded = look.samples, look.system, look.unloaded
     a, s = look.parameters.half_width, look.view.s
     out: dict[Quantity, float] = {}

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.loading.walker import Settling
+from solver.loading.settling import Settling
 from solver.results.contact import contact
 from solver.results.fields import maps, surfaces
 from solver.results.figures import cost, extremes
@@ -30,10 +30,9 @@ from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.scenes.passes import Trace, passes, shakedown_of
 from solver.scenes.rolling_effort import effort
-from solver.scenes.rolling_endless import without_ends
 from solver.scenes.rolling_model import model
 from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.scene import Scene, by_increments
+from solver.scenes.scene import Method, Scene, by_increments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -124,6 +123,15 @@ STEADY_NET_INCREMENT = declare(
 
 
 _SEEN = 4.0  # reach of what is recorded on a track without ends / Hertz half-width
+
+
+def method(parameters: RollingParameters) -> Method:
+    """Return how the passes are computed: steadily, or by increments."""
+    if not parameters.endless:
+        return by_increments
+    from solver.scenes.rolling_endless import without_ends  # only who computes needs the solver
+
+    return without_ends
 
 
 def program(parameters: RollingParameters) -> Program:
@@ -269,7 +277,7 @@ ROLLING = Scene(
     summary="elastic cylinder rolling on an elastic-plastic half-space, pass after pass",
     parameters=RollingParameters,
     branch="passes",
-    method=lambda parameters: without_ends if parameters.endless else by_increments,
+    method=method,
     refining=frozenset(
         {
             "accuracy", "element_size", "growth", "advance_step", "advance_tolerance",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from solver.loading.walker import HALVINGS
+from solver.loading.settling import HALVINGS
+from solver.mesh.endless import track_lines
 from solver.scenes.effort import Effort, lattice
 from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
 from solver.scenes.rolling_model import track_grid
-from solver.steady import track_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

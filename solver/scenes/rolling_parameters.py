@@ -10,12 +10,12 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.loading.walker import HALVINGS
+from solver.loading.settling import HALVINGS
+from solver.mesh.endless import MOST_COLUMNS, window_elements
 from solver.scenes.parameters import Accuracy, by_accuracy, described
 from solver.scenes.schedule import Schedule
 from solver.scenes.sequence import OF_A_PASS, block_of
 from solver.scenes.wheel_parameters import WheelParameters
-from solver.steady import MOST_COLUMNS, window_elements
 
 ENDLESS: Literal["endless"] = "endless"
 """What `track` is where passes are steady."""

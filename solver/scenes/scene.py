@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.loading.control import Control
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
-from solver.loading.walker import Settling, Walker
+from solver.loading.settling import Settling
 from solver.model.model import Model
-from solver.results.audit import AUDIT, Audit, audit
+from solver.results.audit.figures import AUDIT
 from solver.results.look import Look, Output, Values
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
-from solver.results.samples import Samples
-from solver.results.touch import touch_of
 from solver.results.view import View
 from solver.scenes.effort import Effort
+
+if TYPE_CHECKING:
+    from solver.results.audit import Audit
+    from solver.results.samples import Samples
 
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
@@ -144,6 +145,13 @@ def _merged(look: Look, outputs: Sequence[Output]) -> Values:
 
 def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterator[Look]:
     """Walk the programs of runs that differ in the branch parameter; yield each when known."""
+    # only who computes needs the solver, which takes half a second to import
+    from solver.contact.system import System
+    from solver.loading.walker import Walker
+    from solver.results.audit import audit
+    from solver.results.samples import Samples
+    from solver.results.touch import touch_of
+
     last = runs[-1]
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))

@@ -9,18 +9,10 @@ from solver.steady.layers import Layers
 from solver.steady.passing import Pass
 from solver.steady.rim import Rim
 from solver.steady.rolling import rolling
-from solver.steady.track import (
-    MOST_COLUMNS,
-    Track,
-    standing_pressure,
-    track_lines,
-    track_of,
-    window_elements,
-)
+from solver.steady.track import Track, standing_pressure, track_of
 from solver.steady.wheel import RollingWheel, Touching
 
 __all__ = [
-    "MOST_COLUMNS",
     "Layers",
     "Pass",
     "Rim",
@@ -29,7 +21,5 @@ __all__ = [
     "Track",
     "rolling",
     "standing_pressure",
-    "track_lines",
     "track_of",
-    "window_elements",
 ]

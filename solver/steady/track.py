@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,8 @@ from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.surface import extract, travelling_forces
 from solver.materials.material import Material
-from solver.mesh import graded, grid, with_middle
+from solver.mesh import grid, with_middle
+from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
@@ -29,37 +29,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_AHEAD, _BEHIND, _DEEP = 3.0, 5.0, 4.0
-"""Reach of the window from the load / half-width. A window that ends 3 half-widths behind a load
-that pushes errs by 5 MPa in 500 near the surface, as rows at yield still flow there; elements that
-grow behind the load make them flow too much, and err by 30."""
 _CONTACT = 2.0
 """Half the length of the surface that may come into contact / half-width."""
-_FAR = 1600.0
-"""Distance of the sides and the bottom / half-width. Half of it moves stress by 1 MPa in 500."""
-_FAR_GROWTH = 2.0
-"""Ratio of neighbouring element sides outside the window: 0.1 MPa in 500, a sixth of the time."""
-MOST_COLUMNS = 3000
-
-
-def track_lines(
-    half_width: float, element_size: float, growth: float, reach: float = 1.0
-) -> tuple[Array, Array]:
-    """Return where the lines x = const and y = const of the mesh of a `Track` are [mm]."""
-    a, h = half_width, element_size
-    ahead, behind = window_elements(a, h, reach)
-    window = h * np.arange(-behind, ahead + 1)
-    beyond = graded(_FAR * a, h, _FAR_GROWTH, _FAR * a / 2)[1:]
-    x = np.concatenate([window[0] - beyond[::-1], window, window[-1] + beyond])
-    near = graded(_DEEP * reach * a, h, growth, _DEEP * reach * a)
-    below = graded(_FAR * a, near[-1] - near[-2], _FAR_GROWTH, _FAR * a / 2)[1:]
-    return x, -np.concatenate([near, near[-1] + below])[::-1]
-
-
-def window_elements(a: float, h: float, reach: float = 1.0) -> tuple[int, int]:
-    """Return the elements of the window before and behind the load."""
-    ahead, behind = (math.ceil(each * reach * a / h) for each in (_AHEAD, _BEHIND))
-    return ahead, behind
 
 
 class Track:
@@ -105,7 +76,7 @@ class Track:
         self._lines = track_lines(a, h, growth, reach)
         self._contact = _CONTACT * reach * a
         self.part = Discretisation(_body(*self._lines, self._contact, elasticity))
-        self._window = h * ahead, h * behind, _DEEP * reach * a
+        self._window = h * ahead, h * behind, window_depth(a, reach)
         self.rows = Rows(self.part, self.operator, *self._window, interleaved=interleaved)
 
     @cached_property

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from studies.definition.study import Study
@@ -21,10 +22,10 @@ def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from studies.command.cost import dry_run, long_run
     from studies.command.progress import Progress
-    from studies.command.report import report
+    from studies.command.report import prepare, report
     from studies.execution.cluster import Access
     from studies.execution.limits import Limits
-    from studies.execution.run import run_study
+    from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
 
     limits = Limits(
@@ -40,7 +41,13 @@ def run(options: argparse.Namespace) -> int:
         return OK
     if warning := long_run(study, store):
         print(warning, file=sys.stderr)
-    progress = Progress(study)
+    progress, preparing = Progress(study), Thread(target=prepare)
+
+    def hear(event: StudyEvent) -> None:
+        if preparing.ident is None:
+            preparing.start()
+        progress(event)
+
     with _interruption() as interrupted:
         outcome = run_study(
             study,
@@ -49,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
             scheduler=access,
             resume=options.resume,
             limits=limits,
-            on_event=progress,
+            on_event=hear,
             should_stop=lambda: bool(interrupted),
         )
     progress.close()

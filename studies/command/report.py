@@ -43,6 +43,17 @@ class Report:
     anew: bool
 
 
+def prepare() -> None:
+    """Import what a report needs; it takes a second, in which workers compute."""
+    import xarray as xr
+
+    import studies.storage.combine
+    import studies.views.plots.maps
+    import studies.views.tables  # noqa: F401
+
+    xr.DataArray(0.0)  # the first array makes xarray import more
+
+
 def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
     """Return the report of a study that was carried out, made anew where its data set was."""
     made = Made(study, store)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
-from studies.storage.combine import combine
 from studies.storage.held import Combined, held
 from studies.storage.made import Made
 from studies.storage.store import Store
@@ -33,6 +32,8 @@ def result(study: Study, store: Store, *, complete: bool, stopped: bool) -> Comb
         _, known = held(study, store)
         if before[OK] > known.counts.get(OK, 0):
             return replace(known, counts=dict(before), failed=(), missing=())
+    from studies.storage.combine import combine  # h5netcdf: a complete study does not wait for it
+
     combined = combine(study, store, study.cases())
     store.catalogue.remove(combined.missing)
     of, _ = held(study, store)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from solver.results.quantities import QUANTITIES
 from solver.results.record import Record
@@ -16,6 +15,9 @@ from studies.definition.cases import USUAL_AXES, Case
 from studies.definition.parameters import completed, parameters_of
 from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES, SYMMETRIC
 from studies.storage.provenance import provenance
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 INTEGER_FILL = -1
 
@@ -115,6 +117,8 @@ def _frame(
     scene: Scene, case: Case, sweep: tuple[str, ...], status: str, message: str
 ) -> xr.Dataset:
     """Return a data set with everything but what the solver computed."""
+    import xarray as xr  # half a second: only who makes a data set waits for it
+
     ones = (1,) * len(sweep)
     flag = np.full(ones, STATUSES.index(status), dtype=np.int8)
     text = np.full(ones, message, dtype=object)

@@ -13,7 +13,6 @@ from typing import Any
 
 import solver
 from solver.errors import ModelError
-from solver.linear.solvers import chosen
 from solver.scenes import Scene
 from studies.definition.identity import solver_hash
 
@@ -81,6 +80,8 @@ def _versions() -> dict[str, str]:
 
 def _linear_solver() -> str:
     """Return the linear solver this process uses; a run that asks for another one has failed."""
+    from solver.linear.solvers import chosen  # scipy: only who writes a file waits for it
+
     try:
         return chosen()
     except ModelError:

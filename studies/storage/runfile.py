@@ -13,16 +13,14 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
-
-import h5py
-import netCDF4
-import xarray as xr
-from xarray.backends import NetCDF4DataStore
-from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
+from typing import TYPE_CHECKING, Any
 
 from studies.errors import RunUnreadable, StoreFull
 from studies.storage import dataset as layout
+
+if TYPE_CHECKING:
+    import h5py
+    import xarray as xr
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of a file that has the line; a file without either is older, and has no checksum."""
@@ -46,6 +44,10 @@ def sealed(run: xr.Dataset) -> bytes:
 
 def _packed(run: xr.Dataset) -> bytes:
     """Return a run as netCDF, made in memory: HDF5 does not survive a full disk."""
+    import netCDF4  # with xarray half a second: a complete study waits for neither
+    from xarray.backends import NetCDF4DataStore
+    from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
+
     stored = layout.encoding(run)
     for name, variable in run.variables.items():
         if variable.ndim and variable.dtype.kind in "fi":
@@ -94,6 +96,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
     What goes wrong while a file without checksum is read is taken for damage of that file. What
     goes wrong with a sound one is not.
     """
+    import h5py
+
     vouched = verify(path)
     try:
         with h5py.File(path, "r") as run:

@@ -26,10 +26,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Literal
-
-import h5py
-import xarray as xr
+from typing import TYPE_CHECKING, Literal
 
 from studies.definition.identity import is_id
 from studies.definition.study import Study
@@ -39,6 +36,9 @@ from studies.storage import dataset as layout
 from studies.storage import runfile
 from studies.storage.catalogue import Catalogue, Row
 from studies.storage.room import needs_room
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ENGINE: Literal["h5netcdf"] = "h5netcdf"
 """netCDF backend of every file read here; safe with several threads."""
@@ -81,6 +81,8 @@ class Store:
 
     def outcomes(self, study_id: str) -> Counter[str]:
         """Return how many runs the data set of a study holds, by status."""
+        import h5py
+
         try:
             with h5py.File(self.dataset_path(study_id), "r") as file:
                 return Counter(STATUSES[code] for code in file["status"][...].ravel())

@@ -28,7 +28,7 @@ from solver.fem.fields import Sampler
 from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
 from solver.loading.program import Lap, shared
-from solver.loading.walker import Settling
+from solver.loading.settling import Settling
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
 from solver.results.audit import audit

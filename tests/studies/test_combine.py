@@ -11,6 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 
+from solver.linear import solvers
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.definition.vocabulary import STATUSES
 from studies.storage import provenance
@@ -66,7 +67,7 @@ def test_what_ran_is_told_of_all_runs_though_others_combine_them(
     for case, name, version in zip(
         cases, ["superlu", "pardiso"] * 2, ["1.0", "2.0"] * 2, strict=True
     ):
-        monkeypatch.setattr(provenance, "chosen", lambda name=name: name)
+        monkeypatch.setattr(solvers, "chosen", lambda name=name: name)
         monkeypatch.setattr(provenance, "_versions", lambda version=version: {"numpy": version})
         store.write_run(run_dataset(FAKE, case, record(case.parameters)))
     monkeypatch.undo()

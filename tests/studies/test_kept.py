@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +16,11 @@ from studies.storage import made
 from tests.studies.conftest import compute_here
 from tests.studies.test_damage import true_numbers
 
+ROOT = Path(__file__).parents[2]
+HEAVY = {
+    "dask", "distributed", "h5netcdf", "h5py", "matplotlib", "netCDF4", "numba", "pandas", "scipy",
+    "skfem", "xarray",
+}  # fmt: skip
 RESULTS = ["dataset.nc", "report.txt", "residual_stress_xx.png"]
 REPORT = RESULTS[1:]
 Make = Callable[[], list[str]]
@@ -61,7 +68,7 @@ def test_a_complete_study_is_told_again_and_nothing_is_made(
     before = states(*complete)
     assert before.keys() == {"study.json", "made.json", *RESULTS}
     for maker in (
-        "studies.execution.result.combine",
+        "studies.storage.combine.combine",
         "studies.views.plots.maps.map_figure",
         "studies.views.tables.runs_table",
     ):
@@ -71,6 +78,20 @@ def test_a_complete_study_is_told_again_and_nothing_is_made(
     told, directory = capsys.readouterr().out, complete[1].study_directory(complete[0].id)
     assert told.startswith((directory / "report.txt").read_text().rstrip() + ", 0 computed in ")
     assert told.splitlines()[-3:] == [f"kept {directory / name}" for name in RESULTS]
+
+
+def test_a_complete_study_imports_nothing_that_computes_or_draws(
+    complete: tuple[Study, Store], tmp_path: Path
+) -> None:
+    """These imports take two seconds, and the answer less than one."""
+    code = (
+        "import sys, tests.studies.fakes; from studies.command.cli import main;"
+        "assert main(sys.argv[1:]) == 0; print(*sys.modules, file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", code, *arguments(tmp_path)]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert told.stdout.count("kept ") == len(RESULTS)
+    assert not HEAVY & set(told.stderr.split())
 
 
 def flip(path: Path) -> None:

@@ -352,10 +352,11 @@ def test_the_ready_study_of_the_punch_is_45_runs_in_15_paths() -> None:
     assert len(list(study.paths())) == 15
 
 
-def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray() -> None:
+def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray_nor_scipy() -> None:
+    heavy = "('dask', 'distributed', 'matplotlib', 'xarray', 'scipy', 'skfem', 'numba')"
     code = (
-        "import sys, studies; studies.Study;"
-        "print([m for m in ('dask', 'distributed', 'matplotlib', 'xarray') if m in sys.modules])"
+        "import sys, studies; studies.Study, studies.Store;"
+        f"print([m for m in {heavy} if m in sys.modules])"
     )
     answer = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
