@@ -88,19 +88,15 @@ def search(
     if isinstance(found, NotConverged):
         raise found
     if own < _HARDEST and found.gathered > _LARGE:
-        raise LimitLoad(
-            f"a steady pass adds {found.gathered:.0%} of plastic strain, and {_LARGE:.0%} or more"
-            " counts as the limit of a material that hardly hardens"
-        )
+        raise _too_much(own)
     return found
 
 
-def _unbounded(ratio: float) -> LimitLoad:
+def _too_much(ratio: float) -> LimitLoad:
     """Return the limit of a load under which a material of this hardening gathers too much."""
     even = f", even if the material hardens by {ratio:.2g} of Young's modulus" if ratio else ""
-    return LimitLoad(
-        f"plastic strain grows without bound: a steady pass adds more than {_LARGE:.0%}{even}"
-    )
+    much = f"a steady pass adds more than {_LARGE:.0%} of plastic strain{even}"
+    return LimitLoad(f"{much}: this counts as the limit")
 
 
 def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
@@ -136,7 +132,7 @@ def _fading(
         elif last:
             return next_one
         elif next_one.gathered > largest:
-            raise _unbounded(ratio)
+            raise _too_much(ratio)
         else:
             found, share = next_one, max(share**2, _SHARE)
         ratio *= share
