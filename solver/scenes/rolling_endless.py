@@ -170,25 +170,21 @@ class _Side:
 
     @cached_property
     def _by_depth(self) -> Array:
-        """The matrix (n_depth, n_rows + 1) from values of rows and of the surface to a profile."""
+        """The matrix (n_depth, 1 + n_rows) from values at the surface and of rows to a profile."""
         body, track = self.samples.view.profile_body, self.half_plane.track
         rows, n = track.rows, track.part.weights.size
-        each = np.zeros((len(rows.every) + 1, n + len(rows.highest)))
-        np.put_along_axis(each[:-1], rows.every, 1.0, axis=1)
-        each[-1, n:] = 1.0
+        each = np.zeros((1 + len(rows.every), n + len(rows.highest)))
+        each[0, n:] = 1.0
+        np.put_along_axis(each[1:], rows.every, 1.0, axis=1)
         return self.samples.along_depth(self.samples.of_points(body, each))[:, 0].T
 
     def trace(self, found: Pass) -> Trace:
         """Return what is kept of a pass."""
-        left, elasticity = found.left, self.half_plane.track.elasticity
-        top = left.top
-        strain = np.maximum(self._by_depth @ np.append(left.accumulated, top.accumulated), 0.0)
+        left, elasticity = found.left.whole, self.half_plane.track.elasticity
+        strain = np.maximum(self._by_depth @ left.accumulated, 0.0)
         stress, flow = (
-            to_tensor((self._by_depth @ np.vstack(values)).T)[None]
-            for values in (
-                (left.stress(elasticity), top.stress(elasticity)),
-                (left.plastic_strain, top.plastic_strain),
-            )
+            to_tensor((self._by_depth @ values).T)[None]
+            for values in (left.stress(elasticity), left.plastic_strain)
         )
         touching = found.loading
         return Trace(
@@ -197,7 +193,7 @@ class _Side:
             flow=flow,
             surface=left.displacement(elasticity)[:, None],
             creepage=touching.creepage if isinstance(touching, Touching) else np.nan,
-            peak=float(max(left.accumulated.max(), top.accumulated.max())),
+            peak=float(left.accumulated.max()),
         )
 
     def states(self, found: Pass) -> dict[str, Standing]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from solver.steady.layers import Layers
     from solver.steady.passing import Pass
+    from solver.steady.rows import Rows
     from solver.steady.track import Track
 
     Array = NDArray[np.float64]
@@ -48,38 +49,32 @@ def of_layers(track: Track, layers: Layers) -> Fields:
 
 def under_load(track: Track, found: Pass) -> Fields:
     """Return the fields while the load of a pass is there, which goes along +x."""
-    rows, before, after = track.rows, of_layers(track, found.before), of_layers(track, found.after)
-    grown = found.after.plastic_strain - found.before.plastic_strain
+    rows, before, after = track.rows, of_layers(track, found.before), found.after
+    grown = after.plastic_strain - found.before.plastic_strain
     u = track.operator.expand(found.loading.u, rows.force_behind(grown))
     added = track.part.strain(u)
-    above = added[:, rows.every[: 2 * rows.uppermost]]
-    added_above = np.zeros_like(before.surface[0])
-    added_above[:, rows.above] = np.moveaxis(rows.onto_surface(np.moveaxis(above, 0, 2)), 2, 0)
+    uppermost = np.moveaxis(added[:, rows.every[: 2 * rows.uppermost]], 0, 2)
+    strain, plastic = before.surface
+    strain[:, rows.above] += np.moveaxis(rows.onto_surface(uppermost), 2, 0)
+    _pass(rows, rows.every, before.plastic, (found.plastic_strain, found.accumulated), after)
+    _pass(rows, rows.above, plastic, found.surface, after.top)
+    return before._replace(u=before.u + u, strain=before.strain + added)
 
-    def at(
-        every: NDArray[np.int64],
-        flow: tuple[Array, Array],
-        before: PlasticState,
-        after: PlasticState,
-    ) -> PlasticState:
-        inside, behind = np.split(every, [rows.shape[1]], axis=1)
-        behind = behind[:, rows.ahead.shape[1] :]
-        before.plastic_strain[:, inside] = np.moveaxis(flow[0], 2, 0)
-        before.accumulated[inside] = flow[1]
-        before.plastic_strain[:, behind] = after.plastic_strain[:, behind]
-        before.accumulated[behind] = after.accumulated[behind]
-        return before
 
-    flow = found.plastic_strain, found.accumulated
-    return Fields(
-        before.u + u,
-        before.strain + added,
-        at(rows.every, flow, before.plastic, after.plastic),
-        (
-            before.surface[0] + added_above,
-            at(rows.above, found.surface, before.surface[1], after.surface[1]),
-        ),
-    )
+def _pass(
+    rows: Rows,
+    every: NDArray[np.int64],
+    plastic: PlasticState,
+    flow: tuple[Array, Array],
+    after: Layers,
+) -> None:
+    """Put into ``plastic`` what rows have gathered in the window, and have behind it."""
+    n = rows.shape[1]
+    inside, behind = every[:, :n], every[:, n + rows.ahead.shape[1] :]
+    plastic.plastic_strain[:, inside] = np.moveaxis(flow[0], 2, 0)
+    plastic.accumulated[inside] = flow[1]
+    plastic.plastic_strain[:, behind] = after.plastic_strain.T[:, :, None]
+    plastic.accumulated[behind] = after.accumulated[:, None]
 
 
 def _sunk(track: Track, layers: Layers) -> Array:

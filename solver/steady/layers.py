@@ -49,6 +49,16 @@ class Layers:
         assert self.surface is not None
         return self.surface
 
+    @property
+    def whole(self) -> Layers:
+        """The layer at depth zero and those below, as one."""
+        both = self.top, self
+        depth, thickness, plastic_strain, accumulated = (
+            np.concatenate([getattr(each, name) for each in both])
+            for name in ("depth", "thickness", "plastic_strain", "accumulated")
+        )
+        return Layers(depth, thickness, plastic_strain, accumulated)
+
     def strain(self, elasticity: Elasticity) -> Array:
         """Return total strain (n, 4), Mandel."""
         nu = elasticity.poisson_ratio

@@ -159,14 +159,14 @@ def passing(
             flow = here.flow
             if flow.beyond:
                 raise WindowTooSmall(f"the window is too small {flow.beyond} for a steady pass")
-            *surface, top = flow.surface()
+            plastic, total, top = flow.surface()
             return Pass(
                 before=before,
                 after=replace(flow.after, surface=top),
                 strain=here.added,
                 plastic_strain=flow.plastic,
                 accumulated=flow.total,
-                surface=(surface[0], surface[1]),
+                surface=(plastic, total),
                 last_steps=flow.last_steps,
                 loading=here.loading,
                 left_over=left_over,

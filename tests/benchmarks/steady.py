@@ -94,9 +94,8 @@ def _rolled(case: Case, load: str) -> tuple[Track, np.ndarray, np.ndarray]:
     p = replace(BASE, **LOADS[load], **case.changes)
     track = track_for(p)
     (one,) = steady_passes(p, parts=case.parts)
-    both = (one.after.top, one.after)
-    depth = np.concatenate([each.depth for each in both])
-    return track, depth, np.concatenate([each.stress(track.elasticity)[:, 0] for each in both])
+    left = one.after.whole
+    return track, left.depth, left.stress(track.elasticity)[:, 0]
 
 
 def _profile(rolled: tuple[Track, np.ndarray, np.ndarray]) -> np.ndarray:
