@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _INSIDE = 1e-7
 _NEWTON_STEPS = 6
+_EXACT = 1e-12
 
 
 def _monomials(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
@@ -124,6 +125,8 @@ def _reference(
         (a, b), (c, d) = np.asarray(mapping.DF(local, tind=element))
         step = np.stack([d * miss[0] - b * miss[1], a * miss[1] - c * miss[0]]) / (a * d - b * c)
         local = np.clip(local + step, -2.0, 3.0)
+        if np.abs(step).max() < _EXACT:  # as in rectangles after the first step
+            break
     return np.asarray(local[:, :, 0])
 
 

@@ -28,6 +28,10 @@ from studies.storage.store import Store, appearing
 
 SAME = 1e-9
 """Relative difference below which two runs are taken to have the same grid."""
+_PIECE = 32
+"""Values along a dimension that are compressed together at least, where lengths differ."""
+_NO_COORDINATE = "_nc4_non_coord_"
+"""Before the name HDF5 has for a variable called like a dimension whose coordinate it is not."""
 
 
 def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
@@ -58,30 +62,33 @@ def _combined(
     frame = _Frame(axes=axes, usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
     halves: set[int] = set()
-    for run_id in found:
+    outcomes: dict[str, tuple[str, str]] = {}
+    places: dict[str, tuple[int, ...]] = {}
+    for run_id, index in found.items():
+        own = dict(zip(study.axes, index, strict=True))
+        at = places[run_id] = tuple(own.get(name, 0) for name in axes)
         with opened(store.run_path(run_id)) as run:
-            frame.learn(run)
+            frame.learn(run, at)
+            code, message = (frame.small[name][0][at] for name in ("status", "message"))
+            outcomes[run_id] = STATUSES[code], str(message)
             ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))
     told = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
     symmetric = {SYMMETRIC: int(halves == {1})}
-    outcomes: dict[str, tuple[str, str]] = {}
     store.clear_directory(target)
     with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
         with h5netcdf.File(disk, "w") as file:
             file.attrs.update(told | symmetric)
             frame.create_axes(file, scene)
             frame.create_fields(file)
-            for run_id, index in found.items():
-                place = dict(zip(study.axes, index, strict=True))
-                at = tuple(place.get(name, 0) for name in axes)
-                with opened(store.run_path(run_id)) as run:
-                    frame.place(file, run, at)
-                    code, message = (frame.small[name][0][at] for name in ("status", "message"))
-                    outcomes[run_id] = STATUSES[code], str(message)
-                disk.check()
             frame.write_small(file)
+        disk.check()
+        with h5py.File(disk, "r+") as file:
+            for run_id, at in places.items():
+                with opened(store.run_path(run_id)) as run:
+                    frame.fill(file, run, at)
+                disk.check()
         disk.check()
     counts = Counter(status for status, _ in outcomes.values())
     return Combined(
@@ -109,11 +116,11 @@ class _Frame:
     axes, usual : all sweep dimensions with their values; those that the file of a run has
     linked : parameter set by a linked axis -> the axis, the values over it
     labels : labelled dimension -> union of the labels
-    grids, sizes : numeric dimension -> the grid found, of several alike the longest; the
-        greatest length
+    grids, sizes, shortest : numeric dimension -> the grid found, of several alike the longest;
+        the greatest length; the smallest
     ragged : numeric dimensions whose grid differs from run to run
     fields : variable -> (dimensions after the sweep's, attributes)
-    small : variable -> its values over the sweep: scalars, flags, grids that differ
+    small : variable -> its values over the sweep: scalars, flags, texts
     """
 
     axes: Mapping[str, Sequence[Any]]
@@ -122,6 +129,7 @@ class _Frame:
     labels: dict[str, list[str]] = field(default_factory=dict)
     grids: dict[str, np.ndarray] = field(default_factory=dict)
     sizes: dict[str, int] = field(default_factory=dict)
+    shortest: dict[str, int] = field(default_factory=dict)
     ragged: set[str] = field(default_factory=set)
     fields: dict[str, tuple[list[str], dict[str, Any]]] = field(default_factory=dict)
     small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
@@ -140,18 +148,21 @@ class _Frame:
         """CF attribute of a variable over the sweep: its coordinates that are no dimensions."""
         return {"coordinates": " ".join(self.linked)} if self.linked else {}
 
-    def learn(self, run: h5py.File) -> None:
-        """Take in the grids and variables of one run."""
+    def learn(self, run: h5py.File, at: tuple[int, ...]) -> None:
+        """Take in the grids and variables of one run, and its values that are small."""
         for name in variables(run):
-            if name in self.usual or name in self.fields or name in self.small:
+            if name in self.usual or name in self.fields:
                 continue
             variable = run[name]
             if variable.is_scale:
                 self._learn_coordinate(name, _values(variable))
-            elif inner := [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]:
+            elif variable.ndim > len(self.usual):
+                inner = [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]
                 self.fields[name] = (inner, layout.attributes_of(name))
             else:
-                self._hold(name, variable.dtype)
+                if name not in self.small:
+                    self._hold(name, variable.dtype)
+                self.small[name][0][at] = _values(variable).item()
 
     def _hold(self, name: str, kind: np.dtype[Any]) -> None:
         empty = np.full(self.shape, _absent(name, kind), dtype=kind)
@@ -164,6 +175,7 @@ class _Frame:
             return
         grid = self.grids.setdefault(name, values)
         self.sizes[name] = max(self.sizes.get(name, 0), len(values))
+        self.shortest[name] = min(self.shortest.get(name, len(values)), len(values))
         both = min(len(grid), len(values))
         tolerance = SAME * np.abs(grid).max(initial=0.0)
         if not np.allclose(grid[:both], values[:both], rtol=0.0, atol=tolerance):
@@ -183,21 +195,26 @@ class _Frame:
             texts = np.array(labels, dtype=object)
             _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
         for name, grid in self.grids.items():
-            if name not in self.ragged:
+            if name in self.ragged:
+                self.fields[name] = ([name], layout.attributes_of(name))
+            else:
                 _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
-                continue
-            by_run = np.full((*self.shape, self.sizes[name]), np.nan)
-            self.small[name] = (by_run, layout.attributes_of(name))
 
     def create_fields(self, file: h5netcdf.File) -> None:
-        """Make the variables that are written run by run: one compressed chunk a run."""
+        """Make the variables that are written run by run.
+
+        A run has one compressed chunk, or several along a dimension that is longer in other runs:
+        the length that it lacks is not written.
+        """
         for name, (inner, attributes) in self.fields.items():
+            sizes = [self.sizes.get(each) or len(self.labels[each]) for each in inner]
+            pieces = [max(self.shortest.get(each, _PIECE), _PIECE) for each in inner]
             variable = file.create_variable(
                 name,
                 (*self.axes, *inner),
                 dtype="f8",
                 fillvalue=np.nan,
-                chunks=(*(1,) * len(self.axes), *self._inner_shape(inner)),
+                chunks=(*(1,) * len(self.axes), *map(min, sizes, pieces)),
                 compression="gzip",
                 compression_opts=1,
                 shuffle=True,
@@ -205,32 +222,27 @@ class _Frame:
             )
             variable.attrs.update(attributes | self.auxiliary)
 
-    def place(self, file: h5netcdf.File, run: h5py.File, at: tuple[int, ...]) -> None:
-        """Put the values of one run in their place."""
+    def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
+        """Write the fields of one run in their place."""
         places = cache(partial(self._places, run))
-        for name, variable in run.items():
-            if name in self.fields:
-                inner, _ = self.fields[name]
-                whole = np.full(self._inner_shape(inner), np.nan)
-                values = _values(variable).reshape(variable.shape[len(self.usual) :])
+        for name, (inner, _) in self.fields.items():
+            if name in run:
+                values = _values(run[name])
+                values = values.reshape(values.shape[values.ndim - len(inner) :])
+                whole = np.full(tuple(map(self._extent, inner, values.shape)), np.nan)
                 whole[np.ix_(*map(places, inner))] = values
-                file.variables[name][at] = whole
-            elif name in self.ragged:
-                self.small[name][0][at][: len(variable)] = _values(variable)
-            elif name in self.small:
-                self.small[name][0][at] = _values(variable).item()
+                target = file[_NO_COORDINATE + name if name in self.ragged else name]
+                target[(*at, *map(slice, whole.shape))] = whole
 
     def write_small(self, file: h5netcdf.File) -> None:
-        """Write what was held in memory: scalars, flags, grids that differ."""
+        """Write what was held in memory."""
         for name, (values, attributes) in self.small.items():
-            if name in self.ragged:
-                _write(file, name, (*self.axes, name), values, attributes)
-            else:
-                held = attributes | self.auxiliary
-                _write(file, name, tuple(self.axes), values, held, complete=name == "status")
+            held = attributes | self.auxiliary
+            _write(file, name, tuple(self.axes), values, held, complete=name == "status")
 
-    def _inner_shape(self, inner: Sequence[str]) -> tuple[int, ...]:
-        return tuple(self.sizes.get(name) or len(self.labels[name]) for name in inner)
+    def _extent(self, dimension: str, length: int) -> int:
+        """Return up to where a run that has this length writes along a dimension."""
+        return len(self.labels[dimension]) if dimension in self.labels else length
 
     def _places(self, run: h5py.File, dimension: str) -> list[int]:
         """Return where a run's points along a dimension lie in the combined one."""
