@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from solver.materials.material import Material
     from solver.model.body import Body
     from solver.model.model import ContactPair, Model
-    from solver.results.audit import Audit
+    from solver.results.audit.report import Audit
     from solver.results.record import Record, Status
     from solver.results.solution import Solution, solve
     from solver.scenes import SCENES, Scene
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Audit": "results.audit",
+    "Audit": "results.audit.report",
     "Body": "model.body",
     "Branch": "loading.path",
     "ContactPair": "model.model",

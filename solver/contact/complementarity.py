@@ -46,18 +46,18 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
     return _active_sets(problem, start, capped) or _lag_bound(problem)
 
 
-def change_of_forces(
+def change_of(
     problem: ContactProblem, solution: ContactSolution, offset: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the change (m,) of a solution's forces with the offset (m,), statuses kept.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the change of a solution's forces (m,) and motions with the offset, statuses kept.
 
     Tangential forces at their limit stay there.
     """
     nothing = np.zeros(problem.n)
     capped = problem.friction * solution.forces[: problem.n] > problem.limits
     changed = replace(problem, offset=offset, balance=0 * problem.balance, limit=nothing)
-    found = _forces(changed, solution.status, capped)
-    return np.zeros_like(offset) if found is None else found[0]
+    nothing_moves = np.zeros_like(offset), np.zeros_like(solution.rigid)
+    return _forces(changed, solution.status, capped) or nothing_moves
 
 
 def _forces(

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6
+_LAST_STEP = 1e-9
+"""Step of Newton's method after which the next one would be rounding."""
 _BEYOND = 1.5
 _EDGE_TOLERANCE = 1e-8
 _MIN_COVERED = 1e-3
@@ -107,7 +109,10 @@ def _project_on_slave(
         n = (1 - xi) / 2 * n0 + (1 + xi) / 2 * n1
         value = _cross(n, offset)
         derivative = _cross((n1 - n0) / 2, offset) + _cross(n, slope)
-        xi = np.clip(xi - value / np.where(derivative == 0, 1.0, derivative), -3.0, 3.0)
+        step = value / np.where(derivative == 0, 1.0, derivative)
+        xi = np.clip(xi - step, -3.0, 3.0)
+        if np.abs(step).max(initial=0.0) < _LAST_STEP:
+            break
     return edge, xi
 
 
@@ -124,7 +129,10 @@ def _project_on_master(
     for _ in range(_NEWTON_STEPS):
         offset = _combine(xe, shape_functions(eta, count)) - points
         slope = _cross(normals, _combine(xe, shape_derivatives(eta, count)))
-        eta = np.clip(eta - _cross(normals, offset) / np.where(slope == 0, 1.0, slope), -3.0, 3.0)
+        step = _cross(normals, offset) / np.where(slope == 0, 1.0, slope)
+        eta = np.clip(eta - step, -3.0, 3.0)
+        if np.abs(step).max(initial=0.0) < _LAST_STEP:
+            break
     offset = _combine(xe, shape_functions(eta, count)) - points
     return eta, (normals * offset).sum(axis=0)
 

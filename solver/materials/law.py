@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_ROUNDING = 8 * float(np.finfo(float).eps)
+
 
 class Law(ABC):
     """An elastic-plastic law for small strains, independent of the rate of loading."""
@@ -153,7 +155,9 @@ class Law(ABC):
         - the yield value is not above 0, and is 0 where dp > 0
         - plastic strain grew by dp times the flow direction at the end, dp >= 0
 
-        The largest error counts; an error of strain is multiplied by 2 G.
+        The largest error counts; an error of strain is multiplied by 2 G. Stress is the difference
+        of terms as large as C : strain. Their rounding turns the flow direction, at very large
+        strain by more than any error of interest: so much of the flow is left out.
 
         Parameters
         ----------
@@ -167,4 +171,6 @@ class Law(ABC):
         worst = np.maximum(worst, np.where(dp > 0, np.abs(beyond), np.maximum(beyond, 0.0)))
         flow = after.plastic_strain - before.plastic_strain
         stray = np.abs(flow - dp * self.flow_direction(stress, after)).max(axis=0)
+        turned = _ROUNDING * 2 * G * np.abs(strain).max(axis=0) / self.flow_stress(after)
+        stray = np.maximum(stray - dp * turned, 0.0)
         return np.asarray(np.maximum(worst, 2 * G * np.maximum(stray, -dp)))

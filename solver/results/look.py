@@ -10,7 +10,7 @@ from solver.results.quantities import Quantity
 
 if TYPE_CHECKING:
     from solver.loading.outcome import Outcome
-    from solver.results.audit import Audit
+    from solver.results.audit.report import Audit
     from solver.results.samples import Bodies, Samples, Solved
     from solver.results.touch import Touch
     from solver.results.view import View

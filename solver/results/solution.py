@@ -13,7 +13,7 @@ from solver.errors import ModelError
 from solver.loading.control import PathControl
 from solver.loading.outcome import Tally
 from solver.loading.walker import Walker
-from solver.results.audit import Audit, audit
+from solver.results.audit.report import Audit, audit
 from solver.results.samples import Nodal
 from solver.tensors import to_tensor
 

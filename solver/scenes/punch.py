@@ -229,7 +229,7 @@ _INSIDE = {"half_plane": 0.005, "punch": 0.028}
 
 def figures(look: Look) -> Values:
     """Return the figures of the punch, those of the publication among them."""
-    from solver.results.audit import cut_force  # only who computes needs the solver
+    from solver.results.audit.cut import cut_force  # only who computes needs the solver
 
     samples, system, unloaded = look.samples, look.system, look.unloaded
     a, s = look.parameters.half_width, look.view.s

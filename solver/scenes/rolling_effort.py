@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from solver.scenes.rolling_parameters import RollingParameters
 
 _ELEMENT = "quad8"
+_DECIDED = 3
+"""Passes after which a state may be decided."""
 
 
 def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
@@ -24,7 +26,8 @@ def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
     elements, unknowns = _size(parameters)
     if parameters.endless:
         count = int(max(passes))
-        return Effort(elements=elements, unknowns=unknowns, increments=count, most_increments=count)
+        least = min(count, _DECIDED) if parameters.until == "decided" else count
+        return Effort(elements=elements, unknowns=unknowns, increments=least, most_increments=count)
     schedule = parameters.schedule
     fixed = schedule.press * (1 + schedule.driven) + schedule.release
     rolled = 2 * schedule.half_steps

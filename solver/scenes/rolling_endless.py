@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
-from solver.results.audit import audit_pass
+from solver.results.audit.steady import audit_pass
 from solver.results.look import Look
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.results.audit import Audit
+    from solver.results.audit.report import Audit
     from solver.results.steady import Standing
     from solver.results.touch import Touch
     from solver.results.view import View

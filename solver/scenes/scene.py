@@ -21,7 +21,7 @@ from solver.results.view import View
 from solver.scenes.effort import Effort
 
 if TYPE_CHECKING:
-    from solver.results.audit import Audit
+    from solver.results.audit.report import Audit
     from solver.results.samples import Samples
 
 Monitor = Callable[[float], None]
@@ -148,7 +148,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     # only who computes needs the solver, which takes half a second to import
     from solver.contact.system import System
     from solver.loading.walker import Walker
-    from solver.results.audit import audit
+    from solver.results.audit.report import audit
     from solver.results.samples import Samples
     from solver.results.touch import touch_of
 

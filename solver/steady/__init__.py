@@ -9,8 +9,9 @@ from solver.steady.layers import Layers
 from solver.steady.passing import Pass
 from solver.steady.rim import Rim
 from solver.steady.rolling import rolling
+from solver.steady.touching import Touching
 from solver.steady.track import Track, standing_pressure, track_of
-from solver.steady.wheel import RollingWheel, Touching
+from solver.steady.wheel import RollingWheel
 
 __all__ = [
     "Layers",

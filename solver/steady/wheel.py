@@ -18,17 +18,17 @@ J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.complementarity import change_of_forces, solve_contact
+from solver.contact.complementarity import change_of, solve_contact
 from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem
 from solver.errors import NotConverged, WindowTooSmall
-from solver.steady.load import Loading
 from solver.steady.rim import flowed
+from solver.steady.touching import Touching
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,53 +40,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _ROUNDS = 40
+_NEAR = 0.01
+"""Expected change of a contact force / load, up to which a contact is looked for from there."""
 _COVERED = 0.999
 """Share of the hat of a vertex that must face the rim for the vertex to be a contact point."""
 _SETTLED = 1e-7
 """Change of the contact forces / load, at which the geometry of the contact is found."""
-
-
-@dataclass(frozen=True, slots=True)
-class Touching(Loading):
-    """A wheel on a track.
-
-    Attributes
-    ----------
-    x : (n,) positions of the vertices of the track [mm]
-    normal, tangential : (n,) contact forces on the track, tangential ones along the surface
-        against the way of the load [N]
-    area : (n,) of the hats of the vertices [mm2]
-    gap : (n,) between track and rim, NaN where none faces the other [mm]
-    status : (n,) of the contact points
-    friction : coefficient
-    bound : (n,) of the tangential forces [N]
-    creepage : 1 + R d(rotation) / d(advance)
-    height : displacement of the axle [mm]
-    """
-
-    x: Array
-    normal: Array
-    tangential: Array
-    area: Array
-    gap: Array
-    status: NDArray[np.int64]
-    friction: float
-    bound: Array
-    creepage: float
-    height: float
-
-    @property
-    def pressure(self) -> Array:
-        """Contact pressure at the vertices (n,), zero where none faces the rim [MPa]."""
-        return self._over_area(self.normal)
-
-    @property
-    def shear(self) -> Array:
-        """Shear on the track at the vertices (n,), against the way of the load [MPa]."""
-        return self._over_area(self.tangential)
-
-    def _over_area(self, force: Array) -> Array:
-        return np.divide(force, self.area, out=np.zeros_like(force), where=self.area > 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +115,7 @@ class RollingWheel:
         self._flowed = flowed(surface, +1), flowed(rim.surface, -1)
         self._rolled = rim.rolled(self._length)
         self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
+        self._found: tuple[Array, _Geometry, ContactProblem, ContactSolution] | None = None
         self._known = _Known(
             on_track=np.zeros(len(surface.dofs)),
             on_wheel=np.zeros(len(rim.surface.dofs)),
@@ -185,7 +145,7 @@ class RollingWheel:
         geometry, problem, found = self._touch(u[at])
 
         def along(change: Array) -> Array:
-            forces = change_of_forces(problem, found, geometry.moves[0] @ change[at])
+            forces, _ = change_of(problem, found, geometry.moves[0] @ change[at])
             return np.asarray(change + response @ (geometry.rows[0].T @ forces))
 
         every = np.zeros((2, len(surface.vertices)))
@@ -213,7 +173,7 @@ class RollingWheel:
 
     def _touch(self, shape: Array) -> tuple[_Geometry, ContactProblem, ContactSolution]:
         """Return the contact on a surface of this shape (2 n_nodes,), and the problem it solves."""
-        known = self._known
+        known = self._expected(shape)
         for _ in range(_ROUNDS):
             geometry = self._geometry(shape, known)
             problem = self._problem(geometry, shape, known)
@@ -224,9 +184,21 @@ class RollingWheel:
             if np.abs(known.on_track - before.on_track).max() < _SETTLED * self._force:
                 if (known.status[[0, -1]] != OPEN).any():
                     raise WindowTooSmall("the contact reaches the ends of the surface")
-                self._known = known
+                self._known, self._found = known, (shape, geometry, problem, found)
                 return geometry, problem, found
         raise NotConverged("the geometry of the contact was not found in a steady pass")
+
+    def _expected(self, shape: Array) -> _Known:
+        """Return the contact on a surface of this shape, as the last one found tells it."""
+        if self._found is None:
+            return self._known
+        before, geometry, problem, found = self._found
+        forces, rigid = change_of(problem, found, geometry.moves[0] @ (shape - before))
+        if np.abs(forces).max(initial=0.0) > _NEAR * self._force:
+            return self._known
+        return self._following(
+            geometry, replace(found, forces=found.forces + forces, rigid=found.rigid + rigid)
+        )
 
     def _geometry(self, shape: Array, known: _Known) -> _Geometry:
         """Return how gaps and slips depend on displacements, around the contact as known."""

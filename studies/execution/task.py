@@ -21,6 +21,10 @@ from studies.storage.store import Store
 NO_RECORD = "the scene ended its loading path without a record of this run"
 
 
+_WORTH, _SILENCE = 0.01, 1.0
+"""Part of a path after which its progress is worth a message, and seconds after which it is in any
+case: a message costs as much as a short increment."""
+
 REFUSAL_SECONDS = 1.0
 """Time a worker takes to refuse a task; while it does, other workers get the paths."""
 
@@ -86,9 +90,15 @@ def walk(
         with contextlib.suppress(Exception):  # the file tells it too
             report({"path": task.path.id, "row": row})
 
+    told, since = -1.0, 0.0
+
     def monitor(fraction: float) -> None:
+        nonlocal told, since
+        now = time.monotonic()
         try:
-            report({"path": task.path.id, "fraction": float(fraction)})
+            if fraction >= told + _WORTH or now >= since + _SILENCE:
+                report({"path": task.path.id, "fraction": float(fraction)})
+                told, since = fraction, now
             stop = should_stop()
         except Exception as error:  # nobody listens: the worker is closing, which is no run's fault
             raise StopAsked from error

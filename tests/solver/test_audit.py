@@ -10,8 +10,8 @@ import pytest
 from solver import Body, ContactPair, Material, Model, PathControl, solve
 from solver.materials import PlaneStress
 from solver.mesh import grid, mapped
-from solver.results.audit import audit
 from solver.results.audit.law import increment_error
+from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
 from tests.verification.bodies import block
 

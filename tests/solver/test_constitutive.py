@@ -128,6 +128,20 @@ def test_an_answer_fits_the_stated_law(law, n_components):
     assert np.isnan(law.misfit(strain, spoilt, state, after)[3])
 
 
+def test_rounding_at_huge_strain_is_no_misfit_and_a_wrong_flow_is():
+    law = steel("kinematic", ratio=1e-6, yield_stress=300.0)
+    strain = np.array([[180.0], [-450.0], [270.0], [15.0]]) * np.linspace(0.5, 1.0, 50)
+    before = law.initial(50, 4)
+    stress, _, after, _ = law.respond(strain, before)
+    direct = np.abs(
+        after.plastic_strain - after.accumulated * law.flow_direction(stress, after)
+    ).max()
+    assert 2 * law.shear_modulus * direct > 1e-4  # MPa: the rounding of stress turns the flow
+    assert law.misfit(strain, stress, before, after).max() < 1e-6 * law.yield_stress
+    wrong = replace(after, plastic_strain=(1 + 1e-9) * after.plastic_strain)
+    assert law.misfit(strain, stress, before, wrong).min() > 1e-6 * law.yield_stress
+
+
 @every_law
 def test_strength_begins_at_the_yield_stress(law, n_components):
     virgin = law.initial(1, n_components)

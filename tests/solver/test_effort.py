@@ -92,6 +92,15 @@ def test_halving_of_increments_is_told_as_the_most_there_can_be() -> None:
     assert told.most_increments == 9 * fixed + rolled * (127 + 2 * 64)
 
 
+def test_passes_until_a_state_is_decided_are_few_at_least_and_all_at_most() -> None:
+    scene = SCENES["rolling"]
+    found = [
+        scene.effort(scene.parameters(passes=600, until=until), [600])
+        for until in ("passes", "decided")
+    ]
+    assert [(each.increments, each.most_increments) for each in found] == [(600, 600), (3, 600)]
+
+
 @pytest.mark.parametrize(("name", "branch"), [("punch", [0.3, 0.6]), ("rolling", [1, 2, 3])])
 def test_effort_takes_microseconds(name: str, branch: list[float]) -> None:
     """A hundred paths that differ in what decides the mesh, then as many that do not."""

@@ -31,7 +31,7 @@ from solver.loading.program import Lap, shared
 from solver.loading.settling import Settling
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
-from solver.results.audit import audit
+from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
 
 COARSE = PunchParameters(smallest_element=0.05, growth=1.8, friction=0.3)

@@ -10,7 +10,7 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.errors import NotConverged, WindowTooSmall
-from solver.results.audit import audit_pass
+from solver.results.audit.steady import audit_pass
 from solver.scenes import rolling_endless, rolling_steady
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on, track_for

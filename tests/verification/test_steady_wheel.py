@@ -15,7 +15,7 @@ import pytest
 
 from solver.contact.problem import OPEN, STICK
 from solver.errors import LimitLoad
-from solver.results.audit import audit_pass
+from solver.results.audit.steady import audit_pass
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import rim_of
 from solver.steady import RollingWheel, rolling, track_of
