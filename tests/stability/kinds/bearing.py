@@ -16,6 +16,10 @@ without bound."""
 NEAR = 0.75
 """Of what is borne. A wheel that sinks in leans on what is before it, and needs more than its
 traction tells: that there is an equilibrium is certain only well below."""
+NEAR_LARGE, ENOUGH = 0.5, 0.024
+"""The same where a steady pass that adds more than 30 % of plastic strain counts as a limit, which
+may be well before the limit load; the slope / Young's modulus from which hardening lets it add
+more."""
 BORNE = 1 / (1 + math.pi / 2)
 """Most traction over vertical force that a surface without hardening bears: k times a width that
 bears (1 + pi / 2) k beside it (A.P. Green, J. Mech. Phys. Solids 2 (1954) 197-211)."""
@@ -54,21 +58,23 @@ def _borne(p: RollingParameters) -> bool:
     Prandtl's (2 + pi) k where there is no shear. A given pressure must be below it everywhere, and
     that of a wheel in the mean: beyond, its contact must become wider by flow alone.
     """
-    rule = p.material().hardening_rule
-    k = (p.yield_stress + STRAINED * rule.modulus) / math.sqrt(3)
+    enough = p.hardening != "none" and p.hardening_ratio >= ENOUGH
+    near = NEAR if enough else NEAR_LARGE
+    hardened = STRAINED * p.material().hardening_rule.modulus if enough else 0.0
+    k = (p.yield_stress + hardened) / math.sqrt(3)
     shear = _sheared(p)
     if p.load == "contact":
         if p.shear_limit:
             shear = min(shear, p.shear_limit * p.yield_stress / math.sqrt(3))
-            if not p.guided and p.friction and abs(p.traction) > NEAR * _transmitted(p):
+            if not p.guided and p.friction and abs(p.traction) > near * _transmitted(p):
                 return False
         ratio = p.friction * (1.0 if p.guided else abs(p.traction))
-        if ratio > NEAR * BORNE and shear > NEAR * k:
+        if ratio > near * BORNE and shear > near * k:
             return False
         return math.pi / 4 * p.peak_pressure < k * (2 + math.pi)
     m = min(shear / k, 1.0)
     strip = k * (1 + math.pi / 2 + math.acos(m) + math.sqrt(1 - m**2))
-    return m < NEAR and p.peak_pressure < NEAR * strip
+    return m < near and p.peak_pressure < near * strip
 
 
 def _transmitted(p: RollingParameters) -> float:

@@ -146,19 +146,22 @@ def judge(rolled: Rolled) -> dict[str, Figure]:
         )
         figures |= {
             f"pressure {stage}": Figure(abs(np.trapezoid(pressure, s) / force - 1), near),
-            f"shear {stage}": Figure(abs(np.trapezoid(shear, s) - way) / force, near),
             f"cone {stage}": Figure(
                 float((np.abs(shear) - p.friction * pressure).max() / pressure.max()), 1e-6
             ),
             f"tension {stage}": Figure(-float(pressure.min()) / pressure.max(), 1e-9),
         }
+        if p.control == "moment":  # with the creepage given, the force follows
+            off = abs(np.trapezoid(shear, s) - way) / force
+            figures[f"shear {stage}"] = Figure(off, near)
         touching = s[pressure > 0]
         if stage == "loaded":  # at the end of the way, and the fine rim ends a margin beyond it
             beyond = float(np.abs(touching).max()) - p.margin
             figures["beyond the rim loaded"] = Figure(beyond, 0.0)
-    # pressure off the middle turns the wheel as well: P e in R F, and e is within the contact
-    longitudinal = abs(record.scalars["longitudinal_force"] - way)
-    figures["longitudinal force"] = Figure(longitudinal / force, p.half_width / p.radius)
+    if p.control == "moment":
+        # pressure off the middle turns the wheel as well: P e in R F, and e is within the contact
+        longitudinal = abs(record.scalars["longitudinal_force"] - way)
+        figures["longitudinal force"] = Figure(longitudinal / force, p.half_width / p.radius)
     return figures | _laws(rolled) | _wheel(rolled)
 
 
