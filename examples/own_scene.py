@@ -21,7 +21,8 @@ from solver.results.figures import cost, extremes
 from solver.results.look import Look, Values
 from solver.results.quantities import declare
 from solver.results.view import View
-from solver.scenes.parameters import Length, MaterialParameters, Ratio, described
+from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.parameters import Length, Ratio, described
 from studies import Store, Study, open_study, run_study
 
 

@@ -139,8 +139,12 @@ class Discretisation(Nodes, Part):
         return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
 
     def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
-        """Return stress, tangent and new state at all points."""
-        return self.body.law.respond(self.strain(u), state)
+        """Return stress, tangent and new state at all points; the tangent is symmetric."""
+        response = self.body.law.respond(self.strain(u), state)
+        if self.body.law.symmetric:
+            return response
+        tangent = response.tangent
+        return response._replace(tangent=0.5 * (tangent + tangent.swapaxes(0, 1)))
 
     def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""

@@ -28,18 +28,19 @@ class Flow:
     """The step that met the least resistance.
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
-    ``place`` (x, y) [mm] say what it strained most, ``hardens`` whether that material hardens.
+    ``place`` (x, y) [mm] say what it strained most, ``proves`` whether its material can have no
+    other reason for it than a limit load: it does not harden, and its stress meets no corner.
     """
 
     stiffness: float = 1.0
     body: str = ""
     place: tuple[float, float] = (0.0, 0.0)
-    hardens: bool = True
+    proves: bool = False
 
     @property
     def limit(self) -> bool:
         """Whether the step was a plastic mechanism that no hardening resists."""
-        return self.stiffness < _FLOWING and not self.hardens
+        return self.stiffness < _FLOWING and self.proves
 
     def __str__(self) -> str:
         x, y = self.place
@@ -69,11 +70,12 @@ def softer(
     if not elastic > 0 or tangent / elastic >= than.stiffness:
         return than
     most = int((forms[:, 1] - forms[:, 0]).argmax())
+    law = parts[most].body.law
     return Flow(
         stiffness=max(float(tangent / elastic), 0.0),  # less is rounding
         body=parts[most].body.name,
         place=parts[most].most_strained(step[most]),
-        hardens=parts[most].body.material.hardens,
+        proves=not (law.hardens or law.cornered),
     )
 
 

@@ -1,26 +1,40 @@
 """Material laws: (strain, state) -> (stress, tangent, new state, yielding).
 
-`Law` is the contract. `Material` is the law of the package, made of `Elasticity`, a `VonMises`
-surface and `LinearHardening`; `PlaneStress` makes any law one for plane stress.
+`Law` is the contract. `Material` is the law of the scenes: von Mises, linear hardening. `Chaboche`
+hardens along a `Voce` or `Table` curve and by back stresses that fade, `Layered` by layers that
+yield one after the other, `TrescaMaterial` yields by the largest shear stress. `PlaneStress` makes
+any law one for plane stress.
 """
 
+from solver.materials.chaboche import BackStress, Chaboche
+from solver.materials.curves import Curve, Table, Voce
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening import LinearHardening
 from solver.materials.law import Law
+from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
 from solver.materials.plane_stress import PlaneStress
 from solver.materials.state import PlasticState, Response
-from solver.materials.yield_surface import VonMises, YieldSurface
+from solver.materials.tresca import TrescaMaterial
+from solver.materials.yield_surface import Tresca, VonMises, YieldSurface
 
 __all__ = [
+    "BackStress",
+    "Chaboche",
+    "Curve",
     "Elasticity",
     "Hardening",
     "Law",
+    "Layered",
     "LinearHardening",
     "Material",
     "PlaneStress",
     "PlasticState",
     "Response",
+    "Table",
+    "Tresca",
+    "TrescaMaterial",
+    "Voce",
     "VonMises",
     "YieldSurface",
 ]

@@ -106,8 +106,21 @@ class Law(ABC):
         return math.isinf(self.yield_stress)
 
     @attribute
+    def symmetric(self) -> bool:
+        """Whether its tangent is; bodies take the symmetric part of one that is not."""
+        return True
+
+    @attribute
     def hardens(self) -> bool:
         """Whether stress grows with plastic strain without bound, so that no limit load exists."""
+        return False
+
+    @attribute
+    def cornered(self) -> bool:
+        """Whether stress may stay in a corner of the yield surface while strain changes.
+
+        No tangent is left there, though the body may bear more: softness proves no limit load.
+        """
         return False
 
     @attribute
@@ -170,7 +183,20 @@ class Law(ABC):
         dp = after.accumulated - before.accumulated
         worst = np.maximum(worst, np.where(dp > 0, np.abs(beyond), np.maximum(beyond, 0.0)))
         flow = after.plastic_strain - before.plastic_strain
-        stray = np.abs(flow - dp * self.flow_direction(stress, after)).max(axis=0)
         turned = _ROUNDING * 2 * G * np.abs(strain).max(axis=0) / self.flow_stress(after)
-        stray = np.maximum(stray - dp * turned, 0.0)
+        stray = np.maximum(self.stray(stress, flow, dp, after) - dp * turned, 0.0)
         return np.asarray(np.maximum(worst, 2 * G * np.maximum(stray, -dp)))
+
+    def stray(self, stress: Array, flow: Array, growth: Array, after: PlasticState) -> Array:
+        """Return the error (n_points,) of a plastic flow with respect to this law.
+
+        Override it where a yield surface has edges, on which more than one direction is right.
+
+        Parameters
+        ----------
+        stress, flow : (n_components, n_points) Mandel, at the end of an increment; its plastic
+            strain
+        growth : (n_points,) plastic multiplier
+        after : internal variables at its end
+        """
+        return np.asarray(np.abs(flow - growth * self.flow_direction(stress, after)).max(axis=0))

@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.state import Response
+from solver.materials.yield_surface import VonMises
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -98,6 +99,16 @@ class PlaneStress(Law):
     def elastic(self) -> bool:
         """Whether the wrapped law never yields."""
         return self.law.elastic
+
+    @property
+    def cornered(self) -> bool:
+        """Whether the yield surface has edges: stresses in the plane alone then meet corners."""
+        return not isinstance(self.surface, VonMises)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent of the wrapped law is symmetric."""
+        return self.law.symmetric
 
     @property
     def hardens(self) -> bool:

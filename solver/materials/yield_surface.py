@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from solver.materials.principal import PAIRS, dyad, principal
 from solver.tensors import deviator, von_mises
 
 if TYPE_CHECKING:
@@ -47,3 +48,56 @@ class VonMises:
         """Return 3/2 s / q (n_components, n_points); zero where there is no deviator."""
         s = deviator(stress)
         return np.asarray(1.5 * s / np.maximum(np.sqrt(1.5 * (s**2).sum(axis=0)), _NOTHING))
+
+
+@dataclass(frozen=True, slots=True)
+class Tresca:
+    """The Tresca surface: yield depends on the largest shear stress alone.
+
+    In principal stresses it is a hexagonal prism. On its edges, where two principal stresses are
+    the same, any flow between the normals of the two faces is associated.
+    """
+
+    def shear(self, tension: Tension) -> Tension:
+        """Return k = tension / 2 [MPa]."""
+        return tension / 2
+
+    def equivalent(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return s1 - s3 (n_points,) of Mandel stress (n_components, n_points) [MPa]."""
+        values, _ = principal(stress)
+        return np.asarray(values[0] - values[2])
+
+    def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return e1 e1 - e3 e3 (n_components, n_points), on an edge that of one of its faces."""
+        _, directions = principal(stress)
+        return dyad(directions, 0, 0, len(stress)) - dyad(directions, 2, 2, len(stress))
+
+    def stray(
+        self,
+        stress: NDArray[np.float64],
+        flow: NDArray[np.float64],
+        growth: NDArray[np.float64],
+        unit: float,
+    ) -> NDArray[np.float64]:
+        """Return by how much a flow is not associated (n_points,).
+
+        In the principal directions of stress its components off the diagonal vanish, but where two
+        principal stresses are the same. On the diagonal the largest is the multiplier, and the
+        middle one vanishes, but on the edge that it points to.
+
+        Parameters
+        ----------
+        stress, flow : (n_components, n_points) Mandel, relative to the back stress; plastic strain
+        growth : (n_points,) multiplier
+        unit : stress whose difference counts as much as a strain of 1 [MPa]
+        """
+        values, directions = principal(stress)
+        n = len(stress)
+        along = [(flow * dyad(directions, i, i, n)).sum(axis=0) for i in range(3)]
+        worst = np.abs(np.maximum(along[0], -along[2]) - growth)
+        edge = np.where(along[1] > 0, values[0] - values[1], values[1] - values[2])
+        worst = np.maximum(worst, np.minimum(np.abs(along[1]), edge / unit))
+        for i, j in PAIRS:
+            mixed = np.abs((flow * dyad(directions, i, j, n)).sum(axis=0))
+            worst = np.maximum(worst, np.minimum(mixed, (values[i] - values[j]) / unit))
+        return np.asarray(worst)

@@ -6,16 +6,14 @@ import math
 import operator
 import types
 import typing
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable
+from dataclasses import field, fields
 from functools import cache
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
 
 from solver.errors import ModelError
-from solver.materials.material import Hardening, Material
-from solver.model.model import ContactPair, effective_friction
 
 
 def described(default: Any, description: str) -> Any:
@@ -39,75 +37,6 @@ Stress = Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")]
 Length = Annotated[float, Interval(gt=0.0, le=1e6), Unit("mm")]
 Accuracy = Literal["draft", "standard", "fine"]
 Poisson = Annotated[float, Interval(ge=0.0, le=0.4999), Unit("1")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MaterialParameters:
-    """The material every scene asks for, and how accurate the answer is to be."""
-
-    accuracy: Accuracy = described(
-        "standard", "sets mesh and increments together, where they are not given"
-    )
-
-    hardening: Hardening = described("none", "hardening rule of the yielding bodies")
-    hardening_ratio: HardeningRatio = described(
-        0.024, "slope Eu of the uniaxial hardening branch / Young's modulus"
-    )
-    isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
-    yield_stress: Stress = described(350.0, "uniaxial yield stress Re")
-    youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
-    poisson_ratio: Poisson = described(0.3, "Poisson ratio")
-
-    def __post_init__(self) -> None:
-        check(self)
-        for name, value in self.usual().items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
-
-    def usual(self) -> Mapping[str, float]:
-        """Return the values of the parameters that ``accuracy`` sets."""
-        return {}
-
-    def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Material:
-        """Return the material, with ``stiffness`` times Young's modulus."""
-        return Material(
-            youngs_modulus=self.youngs_modulus * stiffness,
-            poisson_ratio=self.poisson_ratio,
-            yield_stress=math.inf if elastic else self.yield_stress,
-            hardening=self.hardening,
-            hardening_ratio=self.hardening_ratio,
-            isotropic_fraction=self.isotropic_fraction,
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactParameters(MaterialParameters):
-    """Material and friction, which every scene of two bodies asks for."""
-
-    friction: Friction = described(0.0, "Coulomb friction coefficient")
-    shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
-        0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
-    )
-
-    @property
-    def frictionless(self) -> bool:
-        """Whether the contact is solved without friction."""
-        return effective_friction(self.friction) == 0.0
-
-    def contact(
-        self,
-        slave: tuple[str, str],
-        master: tuple[str, str],
-        sliding: Literal["small", "finite"] = "small",
-    ) -> ContactPair:
-        """Return a pair of boundaries with this friction."""
-        return ContactPair(
-            slave=slave,
-            master=master,
-            friction=self.friction,
-            shear_limit=self.shear_limit or math.inf,
-            sliding=sliding,
-        )
 
 
 def check(parameters: Any) -> None:

@@ -34,9 +34,9 @@ from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.view import View
 from solver.scenes.effort import Effort, lattice
+from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.parameters import (
     Accuracy,
-    ContactParameters,
     Length,
     Ratio,
     by_accuracy,

@@ -155,7 +155,7 @@ class _Rolled:
 
         def check() -> Audit:
             assert found is not None
-            return audit_pass(side.half_plane.track, run.material(), found)
+            return audit_pass(side.half_plane.track, run.linear_material(), found)
 
         touch = _touch(run.of_pass(max(len(self._steps) - 1, 0)), side.half_plane.way)
         return Look(parameters=run, samples=side.samples, touch=touch, outcome=outcome, check=check)

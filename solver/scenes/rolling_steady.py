@@ -49,7 +49,7 @@ def steady_passes(
     made = {id(own): load_on(track, p, own) for own in block}
     loads = itertools.cycle(made[id(own)] for own in block)
     guess = _first_guess(p, reach)
-    yield from rolling(track, p.material(), loads, p.directions, guess=guess, parts=parts)
+    yield from rolling(track, p.linear_material(), loads, p.directions, guess=guess, parts=parts)
 
 
 def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
@@ -63,8 +63,9 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
         track = track_for(coarse, reach)
         with one_thread():
             found = search(
-                track, p.material(), load_on(track, coarse, coarse.of_pass(0)), track.rows.virgin,
-                _first_guess(coarse, reach), parts=_PARTS, tolerance=_TOLERANCE,
+                track, p.linear_material(), load_on(track, coarse, coarse.of_pass(0)),
+                track.rows.virgin, _first_guess(coarse, reach), parts=_PARTS,
+                tolerance=_TOLERANCE,
             )  # fmt: skip
     except LimitLoad:
         raise
@@ -76,7 +77,7 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
 def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
     """Return the half-space, made once for all runs of a process with the same mesh."""
     p = parameters
-    return track_of(p.mesh_width, p.element_size, p.growth, p.material().elasticity, reach)
+    return track_of(p.mesh_width, p.element_size, p.growth, p.linear_material().elasticity, reach)
 
 
 def rim_of(parameters: RollingParameters) -> Rim:
@@ -105,7 +106,7 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
     p = parameters
     if p.load == "hertz":
         shear = p.friction * abs(p.traction) * p.peak_pressure
-        if (limit := too_much_shear(p.material(), shear)) is not None:
+        if (limit := too_much_shear(p.linear_material(), shear)) is not None:
             raise limit
         return track.hertz(p.peak_pressure, p.friction * p.traction, p.half_width)
     friction = effective_friction(p.friction)
@@ -114,7 +115,7 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
         rim_of(run),
         friction=friction,
         force=p.force,
-        limit=p.shear_limit * p.material().shear_yield_stress or np.inf,
+        limit=p.shear_limit * p.linear_material().shear_yield_stress or np.inf,
         drive=None if p.guided else p.traction * friction * p.force,
         creepage=1.0 if p.traction == 1.0 else p.given_creepage,
     )

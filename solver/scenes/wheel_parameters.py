@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.scenes.parameters import ContactParameters, Friction, Length, described
+from solver.scenes.material_parameters import ContactParameters
+from solver.scenes.parameters import Friction, Length, described
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

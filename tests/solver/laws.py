@@ -9,21 +9,51 @@ from typing import Any
 import numpy as np
 
 from solver.materials import (
+    BackStress,
+    Chaboche,
     Elasticity,
     Law,
+    Layered,
     Material,
     PlaneStress,
     PlasticState,
     Response,
+    Table,
+    TrescaMaterial,
+    Voce,
 )
 
 HARDENING = ["none", "isotropic", "kinematic", "mixed"]
+
+
+STEEL = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
+SOFT = Voce(yield_stress=350.0)
+CURVES = {
+    "none": SOFT,
+    "linear": Voce(yield_stress=350.0, modulus=4918.0),
+    "voce": Voce(yield_stress=350.0, saturation=120.0, rate=300.0),
+    "table": Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0)),
+}
+BACK_STRESSES = {
+    "prager": (BackStress(5000.0),),
+    "fading": (BackStress(60_000.0, 600.0), BackStress(4000.0, 20.0), BackStress(500.0)),
+}
+LAYERED = Layered.of_curve(
+    STEEL, strain=(350.0 / 2e5, 0.003, 0.01), stress=(350.0, 430.0, 500.0), slope=2000.0
+)
 
 
 def steel(hardening: str = "none", ratio: float = 0.024, **fields: Any) -> Material:
     """Return a steel of Re = 350 MPa."""
     given = {"youngs_modulus": 2e5, "poisson_ratio": 0.3, "yield_stress": 350.0} | fields
     return Material(hardening=hardening, hardening_ratio=ratio, **given)
+
+
+def chaboche(back_stresses: str, curve: str = "voce") -> Chaboche:
+    """Return a law with these back stresses and this curve."""
+    return Chaboche(
+        elasticity=STEEL, curve=CURVES[curve], back_stresses=BACK_STRESSES[back_stresses]
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +119,18 @@ LAWS: dict[str, tuple[Law, int]] = {
     **{f"radial {h} {n}": (steel(h), n) for h in HARDENING for n in (4, 6)},
     **{f"projected {h}": (steel(h).in_plane_stress(), 4) for h in HARDENING},
     **{f"wrapped {h}": (PlaneStress(steel(h)), 4) for h in HARDENING},
+    **{
+        f"tresca {c} {n}": (TrescaMaterial(elasticity=STEEL, curve=CURVES[c]), n)
+        for c in CURVES
+        for n in (4, 6)
+    },
+    "tresca, wrapped": (PlaneStress(TrescaMaterial(elasticity=STEEL, curve=SOFT)), 4),
+    **{f"curve {c}": (Chaboche(elasticity=STEEL, curve=CURVES[c]), 6) for c in CURVES},
+    **{f"back stresses {b} {n}": (chaboche(b), n) for b in BACK_STRESSES for n in (4, 6)},
+    "back stresses, wrapped": (PlaneStress(chaboche("fading")), 4),
+    "layered 4": (LAYERED, 4),
+    "layered 6": (LAYERED, 6),
+    "layered, wrapped": (PlaneStress(LAYERED), 4),
     "own 4": (StoredCentre(steel("kinematic")), 4),
     "own 6": (StoredCentre(steel("kinematic")), 6),
     "own, wrapped": (PlaneStress(StoredCentre(steel("kinematic"))), 4),

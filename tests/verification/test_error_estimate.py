@@ -12,7 +12,7 @@ from solver.fem.fields import Sampler, recovery
 from solver.results.audit.report import estimated_error
 from solver.tensors import SQRT2
 from tests.verification import hertz_line
-from tests.verification.bodies import NU
+from tests.verification.bodies import NU, steel
 from tests.verification.effectivity import effectivity
 from tests.verification.thick_walls import CYLINDER, SPHERE, YIELD, exact_stress, press
 
@@ -28,7 +28,7 @@ def of_wall(case, element, n, stage):
     """Effectivity in a wall of n by n elements: elastic, or released after it has yielded."""
     wall, kinematics, nu = CASES[case]
     strength = math.inf if stage == "elastic" else YIELD
-    solution = press(kinematics, wall.pressure, nu, n, n, element, yield_stress=strength)
+    solution = press(kinematics, wall.pressure, nu, n, n, element, material=steel(strength, nu))
     state = solution.unloaded if stage == "unloaded" else solution.loaded
     stress = solution.system.response("ring", state).stress
     body = solution.system.full("ring")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from solver.materials import Elasticity, TrescaMaterial, Voce
 from tests.verification.bodies import polar_stress
 from tests.verification.thick_walls import CYLINDER, SPHERE, YIELD, errors, press
 
@@ -88,3 +89,23 @@ def test_one_increment_gives_the_sphere_that_ten_give():
     )
     # the direction is only kept up to the discretisation error of 1 %
     assert np.abs(one - ten).max() < 5e-4 * YIELD
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.3, 0.45])
+def test_tresca_cylinder_matches_its_closed_form_at_any_poissons_ratio(poisson_ratio):
+    """Within 0.1 % of the yield stress everywhere.
+
+    Radial and hoop stress differ by Re in the plastic zone, where von Mises' incompressible
+    cylinder has 2 / sqrt(3) of its own. The axial stress lies between: no flow along the axis.
+    """
+    material = TrescaMaterial(
+        elasticity=Elasticity(youngs_modulus=2e5, poisson_ratio=poisson_ratio),
+        curve=Voce(yield_stress=2 / np.sqrt(3) * YIELD),
+    )
+    for n in (10, 20):
+        body = press("plane_strain", CYLINDER.pressure, poisson_ratio, n, n, material=material)
+        error = errors(body, CYLINDER)
+        assert error["loaded"] < 1e-3
+        assert error["unloaded"] < 1e-3
+        flow = body.system.response("ring", body.loaded).state.plastic_strain
+        assert np.abs(flow[2]).max() < 1e-12 < np.abs(flow[:2]).max()

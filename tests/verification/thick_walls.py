@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import Model, PathControl, Solution, solve
+from solver.materials import Law
 from tests.verification.bodies import polar_stress, sector, steel
 from tests.verification.closed_forms import ThickCylinder, ThickSphere
 
@@ -31,13 +32,16 @@ def press(
     n_angle: int,
     element: str = "quad8",
     steps: int = 1,
-    yield_stress: float = YIELD,
+    material: Law | None = None,
 ) -> Solution:
-    """Return a wall of ``n_radius`` by ``n_angle`` elements, put under pressure and released."""
+    """Return a wall of ``n_radius`` by ``n_angle`` elements, put under pressure and released.
+
+    Its material is a steel without hardening, unless one is given.
+    """
     body = sector(
         np.linspace(1.0, 2.0, n_radius + 1),
         n_angle,
-        material=steel(yield_stress, poisson_ratio),
+        material=material or steel(YIELD, poisson_ratio),
         kinematics=state,
         element=element,
         pressure={"left": pressure},

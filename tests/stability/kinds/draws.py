@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.scenes.parameters import MaterialParameters
+    from solver.scenes.material_parameters import MaterialParameters
 
 RULES = ("none", "isotropic", "kinematic", "mixed")
 RATIOS = (0.0, 1e-6, 1e-4, 0.01, 0.024, 0.1, 0.5)

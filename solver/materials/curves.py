@@ -1,0 +1,116 @@
+"""How a yield surface grows: its size over the accumulated plastic strain."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+class Curve(Protocol):
+    """The tensile stress that a yield surface grows to; it does not fall."""
+
+    def flow_stress(self, accumulated: Array) -> Array:
+        """Return the size (n,) of the yield surface at plastic strains (n,) [MPa]."""
+
+    def slope(self, accumulated: Array) -> Array:
+        """Return the derivative (n,) of the size by plastic strain [MPa]."""
+
+    @property
+    def limit(self) -> float:
+        """The size that it tends to [MPa]; inf where it grows without bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Voce:
+    """Exponential growth that saturates: Re + Q (1 - exp(-b p)), and a linear part.
+
+    Attributes
+    ----------
+    yield_stress : Re, tensile stress at first yield [MPa]
+    saturation : Q, growth in the end; negative for a material that softens [MPa]
+    rate : b, how fast
+    modulus : slope of the linear part [MPa]
+
+    References
+    ----------
+    E. Voce, J. Inst. Metals 74 (1948) 537-562.
+    """
+
+    yield_stress: float
+    saturation: float = 0.0
+    rate: float = 1.0
+    modulus: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, low in (("yield_stress", 0.0), ("rate", 0.0)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > low):
+                raise ModelError(name, value, "must be positive")
+        for name in ("saturation", "modulus"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ModelError(name, value, "must not be negative [MPa]")
+
+    def flow_stress(self, accumulated: Array) -> Array:
+        """See `Curve`."""
+        grown = -np.expm1(-self.rate * accumulated)
+        return self.yield_stress + self.saturation * grown + self.modulus * accumulated
+
+    def slope(self, accumulated: Array) -> Array:
+        """See `Curve`."""
+        return self.saturation * self.rate * np.exp(-self.rate * accumulated) + self.modulus
+
+    @property
+    def limit(self) -> float:
+        """See `Curve`."""
+        return math.inf if self.modulus else self.yield_stress + self.saturation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Straight lines between measured points; constant after the last one.
+
+    Attributes
+    ----------
+    plastic_strain : (n,) from 0, increasing
+    stress : (n,) the size there, positive, not falling [MPa]
+    """
+
+    plastic_strain: tuple[float, ...]
+    stress: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        strain, stress = np.asarray(self.plastic_strain), np.asarray(self.stress)
+        if strain.ndim != 1 or strain.shape != stress.shape or not len(strain):
+            shapes = f"{strain.shape} and {stress.shape}"
+            raise ModelError("table", shapes, "needs as many plastic strains as stresses")
+        if not (np.isfinite(strain).all() and strain[0] == 0 and (np.diff(strain) > 0).all()):
+            raise ModelError("table.plastic_strain", self.plastic_strain, "must grow from 0")
+        if not (np.isfinite(stress).all() and stress[0] > 0 and (np.diff(stress) >= 0).all()):
+            allowed = "must be positive and must not fall [MPa]"
+            raise ModelError("table.stress", self.stress, allowed)
+
+    def flow_stress(self, accumulated: Array) -> Array:
+        """See `Curve`."""
+        return np.asarray(np.interp(accumulated, self.plastic_strain, self.stress))
+
+    def slope(self, accumulated: Array) -> Array:
+        """See `Curve`; at a point that of the line after it."""
+        slopes = np.append(np.diff(self.stress) / np.diff(self.plastic_strain), 0.0)
+        at = np.searchsorted(self.plastic_strain, accumulated, side="right") - 1
+        return np.asarray(slopes[at])
+
+    @property
+    def limit(self) -> float:
+        """See `Curve`."""
+        return self.stress[-1]

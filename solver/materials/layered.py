@@ -1,0 +1,239 @@
+"""Layered (overlay) material: perfectly plastic layers that share one strain.
+
+Each layer yields at a stress of its own. Together they harden along straight lines, and after
+reversal yield early, as metals do (the Bauschinger effect), with twice the curve of first loading.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
+from solver.materials.material import Material
+from solver.materials.state import PlasticState, Response
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LayeredState(PlasticState):
+    """Internal variables, of all layers together (weighted means) and of each.
+
+    Attributes
+    ----------
+    layer_strain : (n_layers, n_components, n_points) plastic strain of the layers that yield
+    layer_accumulated : (n_layers, n_points) their equivalent plastic strain
+    """
+
+    layer_strain: Array
+    layer_accumulated: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layered(Law):
+    """Besseling's material of layers under one strain.
+
+    Attributes
+    ----------
+    elasticity : Hooke's law of all layers
+    weights : (n_layers,) shares of the layers that yield; what is missing to 1 stays elastic
+    yields : (n_layers,) their yield stresses [MPa], increasing
+
+    References
+    ----------
+    J.F. Besseling, J. Appl. Mech. 25 (1958) 529-536. D.R.J. Owen, A. Prakash, O.C. Zienkiewicz,
+    Comput. Struct. 4 (1974) 1251-1267.
+    """
+
+    elasticity: Elasticity
+    weights: tuple[float, ...]
+    yields: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.weights or len(self.weights) != len(self.yields):
+            lengths = f"{len(self.weights)} and {len(self.yields)}"
+            raise ModelError("layers", lengths, "must have as many weights as yield stresses")
+        if not (min(self.weights) > 0 and sum(self.weights) <= 1 + 1e-12):
+            raise ModelError("weights", self.weights, "must be positive, and at most 1 together")
+        if not (self.yields[0] > 0 and (np.diff(self.yields) > 0).all()):
+            raise ModelError("yields", self.yields, "must be positive and increase [MPa]")
+
+    @classmethod
+    def of_curve(
+        cls,
+        elasticity: Elasticity,
+        strain: Sequence[float],
+        stress: Sequence[float],
+        slope: float = 0.0,
+    ) -> Layered:
+        """Return the layers whose curve in tension goes through these points in straight lines.
+
+        The first point is that of first yield: its strain is stress / E. In tension a layer that
+        flows contracts more across than one that does not, so that the shares of the layers are
+        not the ratios of slopes. With the slope T after a point, the layers that flow have the
+        share ``(E - T) / (E - (1 - 2 nu) / 3 T)``. One that begins to flow at strain e and stress
+        s has the yield stress ``(3 E e - (1 - 2 nu) s) / (2 (1 + nu))``.
+
+        Parameters
+        ----------
+        strain, stress : (n,) total strain and stress in tension [MPa]
+        slope : of stress over total strain after the last point [MPa]
+        """
+        E, nu = elasticity.youngs_modulus, elasticity.poisson_ratio
+        e, s = np.asarray(strain, dtype=float), np.asarray(stress, dtype=float)
+        if e.ndim != 1 or e.shape != s.shape or not len(e):
+            shapes = f"{e.shape} and {s.shape}"
+            raise ModelError("curve", shapes, "needs as many strains as stresses")
+        if not (s[0] > 0 and abs(E * e[0] - s[0]) <= 1e-6 * s[0]):
+            allowed = f"must begin at the end of the elastic line: {s[0] / E:.6g} at {s[0]:g} MPa"
+            raise ModelError("curve.strain", float(e[0]), allowed)
+        slopes = np.append(np.diff(s) / np.diff(e), slope)
+        falls = (np.diff(e) > 0).all() and (np.diff(slopes, prepend=E) < 0).all()
+        if not (falls and slope >= 0):
+            allowed = "must be a curve whose slope falls from line to line, and is not negative"
+            raise ModelError("curve.stress", list(map(float, s)), allowed)
+        flowing = (E - slopes) / (E - (1 - 2 * nu) / 3 * slopes)
+        yields = (3 * E * e - (1 - 2 * nu) * s) / (2 * (1 + nu))
+        return cls(
+            elasticity=elasticity,
+            weights=tuple(np.diff(flowing, prepend=0.0).tolist()),
+            yields=tuple(yields.tolist()),
+        )
+
+    # -- its layers ----------------------------------------------------------------------------
+
+    @cached_property
+    def _layers(self) -> list[tuple[float, Material]]:
+        """Weight and law of each layer that yields."""
+        E, nu = self.elasticity.youngs_modulus, self.elasticity.poisson_ratio
+        return [
+            (weight, Material(youngs_modulus=E, poisson_ratio=nu, yield_stress=stress))
+            for weight, stress in zip(self.weights, self.yields, strict=True)
+        ]
+
+    @property
+    def elastic_weight(self) -> float:
+        """Share of what never yields."""
+        rest = 1 - sum(self.weights)
+        return rest if rest > 1e-12 else 0.0
+
+    def _states(self, state: PlasticState) -> list[PlasticState]:
+        assert isinstance(state, LayeredState)
+        both = zip(state.layer_strain, state.layer_accumulated, strict=True)
+        return [PlasticState(*each) for each in both]
+
+    def _together(self, layers: Sequence[PlasticState]) -> LayeredState:
+        strain = np.stack([layer.plastic_strain for layer in layers])
+        accumulated = np.stack([layer.accumulated for layer in layers])
+        weights = np.array(self.weights)
+        return LayeredState(
+            plastic_strain=np.tensordot(weights, strain, axes=1),
+            accumulated=weights @ accumulated,
+            layer_strain=strain,
+            layer_accumulated=accumulated,
+        )
+
+    def _stresses(self, stress: Array, state: PlasticState) -> list[Array]:
+        """Return the stress of each layer from that of all together, as they share one strain."""
+        C = self.stiffness(len(stress))
+        return [
+            stress + C @ (state.plastic_strain - layer.plastic_strain)
+            for layer in self._states(state)
+        ]
+
+    # -- the law, see `Law` --------------------------------------------------------------------
+
+    @property
+    def hardens(self) -> bool:
+        """Whether a part never yields."""
+        return self.elastic_weight > 0
+
+    @property
+    def ultimate_shear_stress(self) -> float:
+        """The weighted yield stresses together, in shear [MPa]."""
+        most = float(np.dot(self.weights, self.yields))
+        return math.inf if self.hardens else self.surface.shear(most)
+
+    def initial(self, n_points: int, n_components: int) -> LayeredState:
+        """Return the state of layers that have never yielded."""
+        virgin = PlasticState.virgin(n_points, n_components)
+        return self._together([virgin] * len(self.weights))
+
+    def flow_stress(self, state: PlasticState) -> Array:
+        """Return the yield stress of the weakest layer (n_points,) [MPa]."""
+        return np.full(state.accumulated.shape, self.yields[0])
+
+    def strength(self, state: PlasticState) -> Array:
+        """Return the stress of a tension test at this plastic strain (n_points,) [MPa].
+
+        All layers are taken to contract alike, as they do where volume is kept.
+        """
+        stiff = 3 * self.elasticity.shear_modulus
+        weights, yields = np.array(self.weights), np.array(self.yields)
+        strain = np.append(yields, 2 * yields[-1]) / stiff
+        plastic = np.maximum(strain[:, None] - yields / stiff, 0.0) @ weights
+        stress = np.minimum(stiff * strain[:, None], yields) @ weights
+        stress += self.elastic_weight * stiff * strain
+        slope = (stress[-1] - stress[-2]) / (plastic[-1] - plastic[-2])
+        beyond = np.maximum(state.accumulated - plastic[-1], 0.0)
+        return np.interp(state.accumulated, plastic, stress) + slope * beyond
+
+    def yield_value(self, stress: Array, state: PlasticState) -> Array:
+        """Return the largest yield function of a layer (n_points,) [MPa]."""
+        each = zip(self._layers, self._stresses(stress, state), self._states(state), strict=True)
+        return np.max([law.yield_value(own, layer) for (_, law), own, layer in each], axis=0)
+
+    def dissipation(self, before: PlasticState, response: Response) -> Array:
+        """Return the work that the layers turn into heat (n_points,) [N mm/mm3]."""
+        total = np.zeros(response.stress.shape[1])
+        stresses = self._stresses(response.stress, response.state)
+        layers = zip(
+            self.weights, stresses, self._states(before), self._states(response.state), strict=True
+        )
+        for weight, stress, old, new in layers:
+            total += weight * (stress * (new.plastic_strain - old.plastic_strain)).sum(axis=0)
+        return total
+
+    def misfit(
+        self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
+    ) -> Array:
+        """Return the largest error of a layer's increment, and of the sum of stresses [MPa]."""
+        C = self.stiffness(len(stress))
+        worst = np.abs(stress - C @ (strain - after.plastic_strain)).max(axis=0)
+        for state in (before, after):  # the means are those of the layers
+            together = self._together(self._states(state))
+            apart = np.abs(state.plastic_strain - together.plastic_strain).max(axis=0)
+            apart = np.maximum(apart, np.abs(state.accumulated - together.accumulated))
+            worst = np.maximum(worst, 2 * self.elasticity.shear_modulus * apart)
+        states = zip(self._layers, self._states(before), self._states(after), strict=True)
+        for (_, law), old, new in states:
+            own = law.misfit(strain, C @ (strain - new.plastic_strain), old, new)
+            worst = np.maximum(worst, own)
+        return worst
+
+    def respond(self, strain: Array, state: PlasticState) -> Response:
+        """Return the weighted stresses, tangents and states of the layers."""
+        C = self.stiffness(len(strain))
+        stress = self.elastic_weight * (C @ strain)
+        tangent = np.repeat((self.elastic_weight * C)[:, :, None], strain.shape[1], axis=2)
+        yielding = np.zeros(strain.shape[1], dtype=bool)
+        states = []
+        for (weight, law), layer in zip(self._layers, self._states(state), strict=True):
+            own = law.respond(strain, layer)
+            stress += weight * own.stress
+            tangent += weight * own.tangent
+            yielding |= own.yielding
+            states.append(own.state)
+        return Response(stress, tangent, self._together(states), yielding)

@@ -1,0 +1,199 @@
+"""The material that every scene asks for, and the law that its parameters stand for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal, cast
+
+import numpy as np
+from annotated_types import Interval, Unit
+
+from solver.errors import ModelError
+from solver.materials.chaboche import BackStress, Chaboche
+from solver.materials.curves import Table, Voce
+from solver.materials.law import Law
+from solver.materials.layered import Layered
+from solver.materials.material import Hardening, Material
+from solver.materials.tresca import TrescaMaterial
+from solver.model.model import ContactPair, effective_friction
+from solver.scenes.parameters import (
+    Accuracy,
+    Fraction,
+    Friction,
+    HardeningRatio,
+    Poisson,
+    Stress,
+    check,
+    described,
+)
+
+if TYPE_CHECKING:
+    from solver.materials.curves import Curve
+    from solver.materials.elasticity import Elasticity
+
+YieldCondition = Literal["mises", "tresca"]
+HardeningRule = Literal[
+    "none", "isotropic", "kinematic", "mixed", "voce", "table", "chaboche", "layered"
+]
+LINEAR = ("none", "isotropic", "kinematic", "mixed")
+"""Rules of the closed-form law, which steady passes know."""
+_ISOTROPIC = ("none", "isotropic", "voce", "table")
+"""Rules that go with Tresca's condition."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaterialParameters:
+    """The material every scene asks for, and how accurate the answer is to be."""
+
+    accuracy: Accuracy = described(
+        "standard", "sets mesh and increments together, where they are not given"
+    )
+
+    yield_condition: YieldCondition = described("mises", "condition of first yield, and of flow")
+    hardening: HardeningRule = described("none", "hardening rule of the yielding bodies")
+    hardening_ratio: HardeningRatio = described(
+        0.024, "slope Eu of the uniaxial hardening branch / Young's modulus"
+    )
+    isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
+    saturation: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
+        0.0, "growth of the yield stress in the end, with voce and chaboche hardening"
+    )
+    saturation_rate: Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")] = described(
+        10.0, "how fast it grows: as 1 - exp(-rate * plastic strain)"
+    )
+    curve: tuple[tuple[float, float], ...] = described(
+        (), "points [plastic strain, stress in MPa] of the tension curve, with table and layered "
+        "hardening; the first is [0, yield_stress]",
+    )  # fmt: skip
+    back_stresses: tuple[tuple[float, float], ...] = described(
+        (), "[modulus C in MPa, recall gamma] of each, with chaboche hardening"
+    )
+    yield_stress: Stress = described(350.0, "uniaxial yield stress Re")
+    youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
+    poisson_ratio: Poisson = described(0.3, "Poisson ratio")
+
+    def __post_init__(self) -> None:
+        check(self)
+        for name, value in self.usual().items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+        self.material()  # refuses what does not go together
+
+    def usual(self) -> Mapping[str, float]:
+        """Return the values of the parameters that ``accuracy`` sets."""
+        return {}
+
+    def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:
+        """Return the law of the material, with ``stiffness`` times Young's modulus."""
+        material = self.linear_material(stiffness, elastic=elastic)
+        return material if elastic else law_of(self, material)
+
+    def linear_material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Material:
+        """Return the von Mises law with these constants and linear hardening, where there is any.
+
+        Steady passes know no other.
+        """
+        return Material(
+            youngs_modulus=self.youngs_modulus * stiffness,
+            poisson_ratio=self.poisson_ratio,
+            yield_stress=math.inf if elastic else self.yield_stress,
+            hardening=cast("Hardening", self.hardening) if self.hardening in LINEAR else "none",
+            hardening_ratio=self.hardening_ratio,
+            isotropic_fraction=self.isotropic_fraction,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactParameters(MaterialParameters):
+    """Material and friction, which every scene of two bodies asks for."""
+
+    friction: Friction = described(0.0, "Coulomb friction coefficient")
+    shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
+        0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
+    )
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether the contact is solved without friction."""
+        return effective_friction(self.friction) == 0.0
+
+    def contact(
+        self,
+        slave: tuple[str, str],
+        master: tuple[str, str],
+        sliding: Literal["small", "finite"] = "small",
+    ) -> ContactPair:
+        """Return a pair of boundaries with this friction."""
+        return ContactPair(
+            slave=slave,
+            master=master,
+            friction=self.friction,
+            shear_limit=self.shear_limit or math.inf,
+            sliding=sliding,
+        )
+
+
+def law_of(parameters: MaterialParameters, material: Material) -> Law:
+    """Return the law of the parameters.
+
+    Parameters
+    ----------
+    parameters : of the scene
+    material : the same constants with linear hardening, where there is any
+
+    Raises
+    ------
+    ModelError
+        naming the parameter, if those of the rule are wrong or do not go with the yield condition
+    """
+    p = parameters
+    if p.yield_condition == "tresca":
+        if p.hardening not in _ISOTROPIC:
+            allowed = f"must be one of {', '.join(_ISOTROPIC)} where yield_condition is tresca"
+            raise ModelError("hardening", p.hardening, allowed)
+        return TrescaMaterial(elasticity=material.elasticity, curve=_curve(p, material))
+    if p.hardening in LINEAR:
+        return material
+    if p.hardening == "layered":
+        return _layered(p, material.elasticity)
+    back = tuple(BackStress(*each) for each in p.back_stresses)
+    if p.hardening == "chaboche" and not back:
+        allowed = "must be given with chaboche hardening: [modulus C in MPa, recall gamma] of each"
+        raise ModelError("back_stresses", p.back_stresses, allowed)
+    used = back if p.hardening == "chaboche" else ()
+    return Chaboche(elasticity=material.elasticity, curve=_curve(p, material), back_stresses=used)
+
+
+def _curve(p: MaterialParameters, material: Material) -> Curve:
+    """Return how the yield surface grows."""
+    if p.hardening == "table":
+        strain, stress = _points(p)
+        return Table(plastic_strain=tuple(strain.tolist()), stress=tuple(stress.tolist()))
+    if p.hardening in ("voce", "chaboche"):
+        return Voce(yield_stress=p.yield_stress, saturation=p.saturation, rate=p.saturation_rate)
+    return Voce(yield_stress=p.yield_stress, modulus=material.isotropic_modulus)
+
+
+def _layered(p: MaterialParameters, elasticity: Elasticity) -> Layered:
+    strain, stress = _points(p)
+    total = strain + stress / elasticity.youngs_modulus
+    try:
+        return Layered.of_curve(elasticity, total.tolist(), stress.tolist())
+    except ModelError as error:
+        raise ModelError("curve", p.curve, error.allowed) from None
+
+
+def _points(p: MaterialParameters) -> tuple[np.ndarray, np.ndarray]:
+    """Return plastic strain and stress of the points of the curve."""
+    strain, stress = np.reshape(p.curve, (-1, 2)).T
+    begins = bool(p.curve) and (strain[0], stress[0]) == (0.0, p.yield_stress)
+    rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
+    if not (begins and rises and np.isfinite(stress).all()):
+        raise ModelError(
+            "curve", p.curve,
+            f"must be points [plastic strain, stress in MPa] with {p.hardening} hardening: the "
+            "first [0, yield_stress], strain increasing, stress not falling",
+        )  # fmt: skip
+    return strain, stress

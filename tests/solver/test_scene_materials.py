@@ -1,0 +1,135 @@
+"""The laws that the parameters of a scene stand for, and the punch with each of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from solver import SCENES, ModelError, Status
+from solver.materials import (
+    Chaboche,
+    Layered,
+    Material,
+    PlaneStress,
+    Table,
+    TrescaMaterial,
+    Voce,
+)
+from solver.scenes.punch import PunchParameters
+from solver.scenes.rolling_parameters import RollingParameters
+
+CURVE = ((0.0, 350.0), (0.002, 420.0), (0.02, 480.0))
+BACK = ((60_000.0, 600.0), (4000.0, 20.0))
+LAWS: dict[str, dict[str, Any]] = {
+    "voce": {"hardening": "voce", "saturation": 100.0, "saturation_rate": 50.0},
+    "table": {"hardening": "table", "curve": CURVE},
+    "chaboche": {"hardening": "chaboche", "back_stresses": BACK},
+    "layered": {"hardening": "layered", "curve": CURVE},
+    "tresca": {"yield_condition": "tresca"},
+    "tresca, isotropic": {"yield_condition": "tresca", "hardening": "isotropic"},
+    "tresca, table": {"yield_condition": "tresca", "hardening": "table", "curve": CURVE},
+}
+ROUGH: dict[str, Any] = {
+    "smallest_element": 0.02, "growth": 1.8, "load_step": 0.1, "half_plane_size": 8.0,
+    "friction": 0.4, "load_ratio": 0.6, "state": "plane_strain",
+}  # fmt: skip
+
+
+def test_each_word_stands_for_its_law() -> None:
+    laws = {name: PunchParameters(**own).material() for name, own in LAWS.items()}
+    kinds = {name: type(law) for name, law in laws.items()}
+    assert kinds == {
+        "voce": Chaboche, "table": Chaboche, "chaboche": Chaboche, "layered": Layered,
+        "tresca": TrescaMaterial, "tresca, isotropic": TrescaMaterial,
+        "tresca, table": TrescaMaterial,
+    }  # fmt: skip
+    voce, table, chaboche = (laws[name] for name in ("voce", "table", "chaboche"))
+    assert isinstance(voce, Chaboche) and isinstance(table, Chaboche)
+    assert isinstance(chaboche, Chaboche)
+    assert voce.curve == Voce(yield_stress=350.0, saturation=100.0, rate=50.0)
+    assert table.curve == Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0))
+    assert chaboche.back_stresses == BACK
+    assert not (voce.back_stresses or table.back_stresses)
+    hard = laws["tresca, isotropic"]
+    assert isinstance(hard, TrescaMaterial)
+    linear = PunchParameters(hardening="isotropic").material()
+    assert isinstance(linear, Material)
+    assert hard.curve == Voce(yield_stress=350.0, modulus=linear.isotropic_modulus)
+    assert PunchParameters(**LAWS["layered"]).material(elastic=True).elastic
+
+
+def test_a_curve_that_another_rule_of_the_sweep_needs_is_no_mistake() -> None:
+    assert isinstance(PunchParameters(curve=CURVE, back_stresses=BACK).material(), Material)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field", "words"),
+    [
+        ({"hardening": "table"}, "curve", "first \\[0, yield_stress\\]"),
+        ({"hardening": "layered", "curve": ((0.0, 300.0),)}, "curve", "yield_stress"),
+        ({"hardening": "layered", "curve": ((0.0, 350.0), (0.01, 340.0))}, "curve", "not falling"),
+        ({"hardening": "layered", "curve": ((0.0, 350.0), (0.01, 400.0), (0.02, 600.0))},
+         "curve", "slope falls"),
+        ({"hardening": "table", "curve": ((0.0, 350.0), (0.0, 400.0))}, "curve", "increasing"),
+        ({"hardening": "table", "curve": ((0.0, 350.0), (0.1, float("nan")))}, "curve", "points"),
+        ({"hardening": "chaboche"}, "back_stresses", "must be given"),
+        ({"hardening": "chaboche", "back_stresses": ((1.0, -1.0),)}, "back_stresses.1.recall",
+         "negative"),
+        ({"yield_condition": "tresca", "hardening": "kinematic"}, "hardening",
+         "none, isotropic, voce, table"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_together_is_refused(
+    wrong: dict[str, Any], field: str, words: str
+) -> None:
+    with pytest.raises(ModelError, match=words) as refusal:
+        PunchParameters(**wrong)
+    assert refusal.value.field == field
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_steady_passes_refuse_what_they_do_not_know(name: str) -> None:
+    own = LAWS[name]
+    with pytest.raises(ModelError, match="or track a length") as refusal:
+        RollingParameters(**(own | {"curve": ((0.0, 502.0), (0.01, 520.0))}))
+    assert refusal.value.field in own
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_punch_is_pressed_and_released_with_each_law(name: str) -> None:
+    scene = SCENES["punch"]
+    (record,) = scene.path(scene.parameters(**ROUGH, **LAWS[name]), [0.6], lambda fraction: None)
+    assert record.status is Status.OK, record.message
+    assert record.scalars["max_plastic_strain_half_plane"] > 1e-4
+    assert record.scalars["audit_law"] < 1e-8
+
+
+def test_without_friction_tresca_lets_the_half_plane_yield_in_plane_stress_alone() -> None:
+    # published: none with von Mises; with Tresca a little in plane stress, none in plane strain
+    scene = SCENES["punch"]
+    own = ROUGH | {"friction": 0.0}
+    strains = {}
+    for condition, state in (("mises", "plane_stress"), ("tresca", "plane_stress"),
+                             ("tresca", "plane_strain")):  # fmt: skip
+        parameters = scene.parameters(**(own | {"yield_condition": condition, "state": state}))
+        (record,) = scene.path(replace(parameters, load_ratio=0.6), [0.6], lambda fraction: None)
+        assert record.status is Status.OK, record.message
+        strains[condition, state] = record.scalars["max_plastic_strain_half_plane"]
+        assert record.scalars["max_plastic_strain_punch"] > 1e-4
+    assert strains["mises", "plane_stress"] == 0.0
+    assert strains["tresca", "plane_strain"] == 0.0
+    assert strains["tresca", "plane_stress"] > 0.0
+
+
+def test_no_tangent_in_a_corner_of_the_yield_surface_is_no_limit_load() -> None:
+    # a punch without hardening bears this load; on fine meshes whole elements stand in corners
+    scene = SCENES["punch"]
+    fine = {"friction": 0.0, "smallest_element": 0.005, "state": "plane_stress"}
+    parameters = scene.parameters(**(ROUGH | fine), yield_condition="tresca")
+    (record,) = scene.path(parameters, [0.6], lambda fraction: None)
+    assert record.status in (Status.OK, Status.NOT_CONVERGED)
+    law, strained = parameters.material().in_plane_stress(), PlaneStress(parameters.material())
+    assert law is None and strained.cornered
+    assert not PlaneStress(PunchParameters().material()).cornered
