@@ -195,13 +195,17 @@ def _describe(schema: Mapping[str, Any]) -> str:
     if "const" in schema:
         return str(schema["const"])
     kind = schema.get("type", "value")
+    if "prefixItems" in schema:
+        return "[" + ", ".join(map(_describe, schema["prefixItems"])) + "]"
+    if kind == "array":
+        return f"a list of {_describe(schema['items'])}" if "items" in schema else "a list"
     words = {
         "number": "a finite number",
         "integer": "an integer",
         "string": "a text",
         "boolean": "true or false",
         "null": "left out",
-        "array": "a list",
+        "object": "tables",
     }
     limits = [
         f"{relation} {schema[key]:g}" for key, relation in _RELATIONS.items() if key in schema

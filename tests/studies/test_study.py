@@ -58,6 +58,11 @@ def with_(**changes: Any) -> dict[str, Any]:
         (with_(parameters={"half_width": {}}), "parameters.half_width", "a finite number"),
         (with_(parameters={"points": 2.5}), "parameters.points", "an integer >= 2 and <= 400"),
         (with_(parameters={"hardening": "soft"}), "parameters.hardening", "none, isotropic"),
+        (
+            with_(scene="punch", parameters={"curve": [[0.0, 350.0], [0.002]]}),
+            "parameters.curve",
+            "a list of [a finite number, a finite number]",
+        ),
         (with_(parameters={"friction": 0.1}), "parameters.friction", "swept too"),
         (with_(parameters=[1]), "parameters", "a table"),
         (with_(sweep={"friction": [0.1, -0.1]}), "sweep.friction[1]", ">= 0 and <= 1"),
