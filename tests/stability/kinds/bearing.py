@@ -16,7 +16,7 @@ without bound."""
 NEAR = 0.75
 """Of what is borne. A wheel that sinks in leans on what is before it, and needs more than its
 traction tells: that there is an equilibrium is certain only well below."""
-NEAR_LARGE, ENOUGH = 0.5, 0.024
+NEAR_LARGE, ENOUGH = 0.7, 0.024
 """The same where a steady pass that adds more than 30 % of plastic strain counts as a limit, which
 may be well before the limit load; the slope / Young's modulus from which hardening lets it add
 more."""
