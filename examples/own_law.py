@@ -2,9 +2,10 @@
 
     flow stress R(p) = Y + Q (1 - exp(-b p))
 
-The package has linear hardening only. What a law must give is `solver.materials.Law`: its
-elasticity, its flow stress, and its response to a strain. Everything else (yield value, plane
-stress, strength in shear, what the audit checks) follows from these.
+The package has it too, as a curve of `Chaboche`. Written out here it shows what a law of your own
+must give (`solver.materials.Law`): its elasticity, its flow stress, and its response to a strain.
+Everything else (yield value, plane stress, strength in shear, what the audit checks) follows from
+these.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Inside the solver strain and stress are Mandel vectors, components first, points last:
 ``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three,
 so that the dot product of two vectors is the double contraction of the tensors, the norm is the
-tensor norm and every tangent is a symmetric matrix. Results leave the solver as tensor components
-(``xy`` without the factor): `to_tensor`.
+tensor norm and a tangent that has a potential is a symmetric matrix. Results leave the solver as
+tensor components (``xy`` without the factor): `to_tensor`.
 """
 
 from __future__ import annotations

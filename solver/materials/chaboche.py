@@ -70,7 +70,8 @@ class Chaboche(Law):
         for k, (modulus, recall) in enumerate(self.back_stresses, start=1):
             for name, value in (("modulus", modulus), ("recall", recall)):
                 if not (math.isfinite(value) and value >= 0):
-                    raise ModelError(f"back_stresses.{k}.{name}", value, "must not be negative")
+                    allowed = "must be finite and not negative"
+                    raise ModelError(f"back_stresses.{k}.{name}", value, allowed)
 
     # -- the law, see `Law` --------------------------------------------------------------------
 
@@ -114,6 +115,20 @@ class Chaboche(Law):
         p = state.accumulated
         parts = (C * (-np.expm1(-g * p) / g if g else p) for C, g in self.back_stresses)
         return self.curve.flow_stress(p) + sum(parts)
+
+    def dissipation(self, before: PlasticState, response: Response) -> Array:
+        """Return the work (n_points,) that an increment turns into heat [N mm/mm3].
+
+        Back stresses that fade give what they had stored: 3 gamma / (2 C) X:X dp each.
+        """
+        after = response.state
+        assert isinstance(after, ChabocheState)
+        heat = Law.dissipation(self, before, response)
+        dp = after.accumulated - before.accumulated
+        for (C, gamma), X in zip(self.back_stresses, after.back, strict=True):
+            if C:
+                heat = heat + 1.5 * gamma / C * (X**2).sum(axis=0) * dp
+        return np.asarray(heat)
 
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState

@@ -37,7 +37,7 @@ class Voce:
     Attributes
     ----------
     yield_stress : Re, tensile stress at first yield [MPa]
-    saturation : Q, growth in the end; negative for a material that softens [MPa]
+    saturation : Q, growth in the end [MPa]
     rate : b, how fast
     modulus : slope of the linear part [MPa]
 
@@ -55,11 +55,11 @@ class Voce:
         for name, low in (("yield_stress", 0.0), ("rate", 0.0)):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > low):
-                raise ModelError(name, value, "must be positive")
+                raise ModelError(name, value, "must be finite and positive")
         for name in ("saturation", "modulus"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
-                raise ModelError(name, value, "must not be negative [MPa]")
+                raise ModelError(name, value, "must be finite and not negative [MPa]")
 
     def flow_stress(self, accumulated: Array) -> Array:
         """See `Curve`."""

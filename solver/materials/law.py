@@ -8,8 +8,9 @@ the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
 A new law must define `elasticity`, `flow_stress` and `respond`. All else has a default for
 associated flow on a von Mises surface and isotropic hardening that comes to an end. Override
 `back_stress` and `strength` with kinematic hardening, `hardens` where stress grows without end,
-`ultimate_shear_stress` without hardening, `surface` for another yield condition. What is
-marked as an attribute here may be a property or a field of a dataclass there.
+`ultimate_shear_stress` without hardening, `surface` for another yield condition, `stray` and
+`cornered` where that has edges, `symmetric` where the tangent is not. What is marked as an
+attribute here may be a property or a field of a dataclass there.
 """
 
 from __future__ import annotations
@@ -117,9 +118,10 @@ class Law(ABC):
 
     @attribute
     def cornered(self) -> bool:
-        """Whether stress may stay in a corner of the yield surface while strain changes.
+        """Whether stress may stay in a corner, or on an edge, of its yield surface.
 
-        No tangent is left there, though the body may bear more: softness proves no limit load.
+        Little tangent or none is left there, though the body may bear more: softness proves no
+        limit load.
         """
         return False
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,7 +40,7 @@ class LayeredState(PlasticState):
     layer_accumulated: Array
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Layered(Law):
     """Besseling's material of layers under one strain.
 
@@ -67,8 +66,9 @@ class Layered(Law):
             raise ModelError("layers", lengths, "must have as many weights as yield stresses")
         if not (min(self.weights) > 0 and sum(self.weights) <= 1 + 1e-12):
             raise ModelError("weights", self.weights, "must be positive, and at most 1 together")
-        if not (self.yields[0] > 0 and (np.diff(self.yields) > 0).all()):
-            raise ModelError("yields", self.yields, "must be positive and increase [MPa]")
+        rises = self.yields[0] > 0 and (np.diff(self.yields) > 0).all()
+        if not (rises and np.isfinite(self.yields).all()):
+            raise ModelError("yields", self.yields, "must be finite, positive and increase [MPa]")
 
     @classmethod
     def of_curve(
@@ -99,8 +99,9 @@ class Layered(Law):
         if not (s[0] > 0 and abs(E * e[0] - s[0]) <= 1e-6 * s[0]):
             allowed = f"must begin at the end of the elastic line: {s[0] / E:.6g} at {s[0]:g} MPa"
             raise ModelError("curve.strain", float(e[0]), allowed)
-        slopes = np.append(np.diff(s) / np.diff(e), slope)
-        falls = (np.diff(e) > 0).all() and (np.diff(slopes, prepend=E) < 0).all()
+        grows = bool((np.diff(e) > 0).all())
+        slopes = np.append(np.diff(s) / np.diff(e) if grows else np.diff(s), slope)
+        falls = grows and (np.diff(slopes, prepend=E) < 0).all()
         if not (falls and slope >= 0):
             allowed = "must be a curve whose slope falls from line to line, and is not negative"
             raise ModelError("curve.stress", list(map(float, s)), allowed)
@@ -114,7 +115,7 @@ class Layered(Law):
 
     # -- its layers ----------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def _layers(self) -> list[tuple[float, Material]]:
         """Weight and law of each layer that yields."""
         E, nu = self.elasticity.youngs_modulus, self.elasticity.poisson_ratio

@@ -9,7 +9,6 @@ import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.state import Response
-from solver.materials.yield_surface import VonMises
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -102,8 +101,8 @@ class PlaneStress(Law):
 
     @property
     def cornered(self) -> bool:
-        """Whether the yield surface has edges: stresses in the plane alone then meet corners."""
-        return not isinstance(self.surface, VonMises)
+        """Whether the yield surface of the wrapped law has corners or edges."""
+        return self.law.cornered
 
     @property
     def symmetric(self) -> bool:

@@ -38,6 +38,11 @@ class TrescaMaterial(Law):
         return Tresca()
 
     @property
+    def cornered(self) -> bool:
+        """Yes: its surface has edges."""
+        return True
+
+    @property
     def hardens(self) -> bool:
         """Whether stress grows with plastic strain without bound."""
         return math.isinf(self.curve.limit)

@@ -102,18 +102,23 @@ def _returned(trial: Array, before: Array, G: float, curve: Curve) -> _Returned:
     inside = (np.diff(trial - 2 * G * face, axis=0) <= 0).all(axis=0)
     out = np.outer(_FACE, _FACE)[:, :, None] * (2 * G / (4 * G + slope))
 
+    derivative = np.eye(3)[:, :, None] - out
+    at = np.flatnonzero(~inside)
+    if len(at):
+        face[:, at], growth[at], derivative[:, :, at] = _on_edge(trial[:, at], before[at], G, curve)
+    return _Returned(face, growth, derivative)
+
+
+def _on_edge(trial: Array, before: Array, G: float, curve: Curve) -> _Returned:
+    """Return to the edge that the trial stress is nearer to."""
     other = np.where(trial[0] + trial[2] > 2 * trial[1], _EDGES[0][:, None], _EDGES[1][:, None])
     first, second = trial[0] - trial[2], (other * trial).sum(axis=0)
-    both, edge_slope = _grown(3 * G, 0.5 * (first + second), before, curve)
+    both, slope = _grown(3 * G, 0.5 * (first + second), before, curve)
     mean, half = 0.5 * (_FACE[:, None] + other), 0.5 * (_FACE[:, None] - other)
     edge = both * mean + (first - second) / (2 * G) * half
-    stiff = 2 * G / (3 * G + edge_slope)
-    edge_out = stiff * mean[:, None] * mean[None] + 2 * half[:, None] * half[None]
-    return _Returned(
-        flow=np.where(inside, face, edge),
-        growth=np.where(inside, growth, both),
-        derivative=np.eye(3)[:, :, None] - np.where(inside, out, edge_out),
-    )
+    stiff = 2 * G / (3 * G + slope)
+    out = stiff * mean[:, None] * mean[None] + 2 * half[:, None] * half[None]
+    return _Returned(edge, both, np.eye(3)[:, :, None] - out)
 
 
 def _grown(stiff: float, trial: Array, before: Array, curve: Curve) -> tuple[Array, Array]:

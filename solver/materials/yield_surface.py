@@ -82,8 +82,9 @@ class Tresca:
         """Return by how much a flow is not associated (n_points,).
 
         In the principal directions of stress its components off the diagonal vanish, but where two
-        principal stresses are the same. On the diagonal the largest is the multiplier, and the
-        middle one vanishes, but on the edge that it points to.
+        principal stresses are the same. Its principal values keep the volume, the largest is the
+        multiplier, the middle one vanishes, but on the edge that it points to, and stress does the
+        work of the flow stress on it.
 
         Parameters
         ----------
@@ -92,12 +93,14 @@ class Tresca:
         unit : stress whose difference counts as much as a strain of 1 [MPa]
         """
         values, directions = principal(stress)
-        n = len(stress)
-        along = [(flow * dyad(directions, i, i, n)).sum(axis=0) for i in range(3)]
-        worst = np.abs(np.maximum(along[0], -along[2]) - growth)
-        edge = np.where(along[1] > 0, values[0] - values[1], values[1] - values[2])
-        worst = np.maximum(worst, np.minimum(np.abs(along[1]), edge / unit))
+        high, middle, low = principal(flow)[0]
+        worst = np.abs(flow[:3].sum(axis=0))
+        worst = np.maximum(worst, np.abs(np.maximum(high, -low) - growth))
+        edge = np.where(middle > 0, values[0] - values[1], values[1] - values[2])
+        worst = np.maximum(worst, np.minimum(np.abs(middle), edge / unit))
         for i, j in PAIRS:
-            mixed = np.abs((flow * dyad(directions, i, j, n)).sum(axis=0))
+            mixed = np.abs((flow * dyad(directions, i, j, len(stress))).sum(axis=0))
             worst = np.maximum(worst, np.minimum(mixed, (values[i] - values[j]) / unit))
-        return np.asarray(worst)
+        size = np.maximum(values[0] - values[2], _NOTHING)
+        lacking = growth - (stress * flow).sum(axis=0) / size
+        return np.asarray(np.maximum(worst, lacking))

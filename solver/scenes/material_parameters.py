@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
@@ -158,7 +158,7 @@ def law_of(parameters: MaterialParameters, material: Material) -> Law:
         return material
     if p.hardening == "layered":
         return _layered(p, material.elasticity)
-    back = tuple(BackStress(*each) for each in p.back_stresses)
+    back = tuple(BackStress(*each) for each in _pairs(p, "back_stresses"))
     if p.hardening == "chaboche" and not back:
         allowed = "must be given with chaboche hardening: [modulus C in MPa, recall gamma] of each"
         raise ModelError("back_stresses", p.back_stresses, allowed)
@@ -171,9 +171,27 @@ def _curve(p: MaterialParameters, material: Material) -> Curve:
     if p.hardening == "table":
         strain, stress = _points(p)
         return Table(plastic_strain=tuple(strain.tolist()), stress=tuple(stress.tolist()))
+    if p.hardening == "voce" and not p.saturation:
+        raise ModelError("saturation", p.saturation, "must be given with voce hardening")
     if p.hardening in ("voce", "chaboche"):
         return Voce(yield_stress=p.yield_stress, saturation=p.saturation, rate=p.saturation_rate)
     return Voce(yield_stress=p.yield_stress, modulus=material.isotropic_modulus)
+
+
+def _pairs(p: MaterialParameters, name: str) -> tuple[tuple[float, float], ...]:
+    """Return the pairs of numbers that a parameter must be."""
+    value = getattr(p, name)
+    known = isinstance(value, tuple) and all(
+        isinstance(pair, Sequence) and len(pair) == 2 and all(map(_finite, pair)) for pair in value
+    )
+    if not known:
+        raise ModelError(name, value, "must be pairs of finite numbers")
+    return value
+
+
+def _finite(value: object) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(cast("float", value))
 
 
 def _layered(p: MaterialParameters, elasticity: Elasticity) -> Layered:
@@ -187,10 +205,10 @@ def _layered(p: MaterialParameters, elasticity: Elasticity) -> Layered:
 
 def _points(p: MaterialParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return plastic strain and stress of the points of the curve."""
-    strain, stress = np.reshape(p.curve, (-1, 2)).T
+    strain, stress = np.reshape(_pairs(p, "curve"), (-1, 2)).T
     begins = bool(p.curve) and (strain[0], stress[0]) == (0.0, p.yield_stress)
     rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
-    if not (begins and rises and np.isfinite(stress).all()):
+    if not (begins and rises):
         raise ModelError(
             "curve", p.curve,
             f"must be points [plastic strain, stress in MPa] with {p.hardening} hardening: the "

@@ -96,7 +96,7 @@ def walk(
         nonlocal told, since
         now = time.monotonic()
         try:
-            if fraction >= told + _WORTH or now >= since + _SILENCE:
+            if fraction >= min(told + _WORTH, 1.0) or now >= since + _SILENCE:
                 report({"path": task.path.id, "fraction": float(fraction)})
                 told, since = fraction, now
             stop = should_stop()

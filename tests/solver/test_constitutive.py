@@ -112,7 +112,7 @@ def test_plastic_flow_is_isochoric_and_dissipates(law, n_components):
     dissipation = law.dissipation(state, response)
     assert dissipation.min() >= -1e-12
     dp = response.state.accumulated - state.accumulated
-    if one_surface(law):  # on it stress less back stress does the work flow stress times dp
+    if one_surface(law) and law.symmetric:  # stress less back stress does flow stress times dp
         assert dissipation == pytest.approx(law.flow_stress(response.state) * dp, rel=1e-9)
     else:
         assert dissipation[response.yielding].min() > 0

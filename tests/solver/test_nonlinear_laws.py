@@ -11,7 +11,8 @@ import pytest
 from solver import ModelError
 from solver.materials import BackStress, Chaboche, Elasticity, Layered, PlaneStress, Table, Voce
 from solver.materials.tresca import TrescaMaterial
-from tests.solver.laws import BACK_STRESSES, CURVES, LAYERED, SOFT, STEEL, chaboche, steel
+from solver.materials.yield_surface import Tresca
+from tests.solver.laws import CURVES, LAYERED, SOFT, STEEL, chaboche, steel
 
 RE, E, G = 350.0, 2e5, STEEL.shear_modulus
 
@@ -27,6 +28,7 @@ def uniaxial(law, strains):
             if abs(found.stress[1, 0]) < 1e-9:
                 break
             strain[1:3, 0] -= found.stress[1, 0] / found.tangent[1, 1:3, 0].sum()
+        assert abs(found.stress[1, 0]) < 1e-9
         state = found.state
         stresses.append(found.stress[0, 0])
     return np.array(stresses), state
@@ -102,6 +104,59 @@ def _mandel(tensor):
 def _full(mandel):
     a, b, c = mandel[3:] / np.sqrt(2)
     return np.diag(mandel[:3]) + np.array([[0, a, c], [a, 0, b], [c, b, 0]])
+
+
+@pytest.mark.parametrize("n", [4, 6])
+@pytest.mark.parametrize("strain", [(0.01, -0.005, -0.005), (0.005, 0.005, -0.01)])
+def test_the_tangent_is_right_where_two_trial_stresses_are_the_same(n, strain):
+    law = TrescaMaterial(elasticity=STEEL, curve=CURVES["linear"])
+    at, state = np.zeros((n, 1)), law.initial(1, n)
+    at[:3, 0] = strain
+    h = 1e-8
+    steps = h * np.eye(n)[:, :, None]
+    change = [law.respond(at + s, state).stress - law.respond(at - s, state).stress for s in steps]
+    difference = np.stack([each[:, 0] for each in change], axis=1) / (2 * h)
+    assert np.abs(difference - law.respond(at, state).tangent[:, :, 0]).max() < 1e-5 * E
+
+
+@pytest.mark.parametrize(
+    ("stress", "flow", "right"),
+    [
+        ((200.0, 20.0, -150.0), (1.0, 0.0, -1.0), True),
+        ((200.0, 20.0, -150.0), (1.0, 0.0, -0.3), False),  # does not keep the volume
+        ((200.0, 20.0, -150.0), (1.0, -0.4, -0.6), False),  # off the face
+        ((200.0, 20.0, -150.0), (-1.0, 0.0, 1.0), False),
+        ((350.0, 0.0, 0.0), (1.0, -0.4, -0.6), True),  # between two normals
+        ((350.0, 0.0, 0.0), (1.0, -1.0, 0.0), True),
+        ((350.0, 0.0, 0.0), (1.0, -0.5, 0.0), False),
+        ((350.0, 0.0, 0.0), (1.0, -1.0, -1.0), False),
+        ((350.0, 0.0, 0.0), (1.0, 0.5, -1.5), False),
+        ((350.0, 0.0, 0.0), (1.0, 1.0, -2.0), False),
+        ((350.0, 0.0, 0.0), (1.0, -2.0, 1.0), False),
+    ],
+)
+def test_only_flow_between_the_normals_of_tresca_is_associated(stress, flow, right):
+    dp = 0.01
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        tensors = [_mandel(turn @ np.diag(v) @ turn.T)[:, None] for v in (stress, flow)]
+        stray = Tresca().stray(tensors[0], dp * tensors[1], np.array([dp]), 2 * G)[0]
+        assert (stray < 1e-9) if right else (stray > 0.1 * dp)
+
+
+def test_a_return_asks_its_curve_a_few_times():
+    asked = []
+
+    class Counting(Voce):
+        def flow_stress(self, accumulated):
+            asked.append(accumulated.shape)
+            return Voce.flow_stress(self, accumulated)
+
+    law = TrescaMaterial(elasticity=STEEL, curve=Counting(yield_stress=RE, saturation=100, rate=50))
+    strain = 5e-3 * np.random.default_rng(2).standard_normal((6, 500))
+    assert law.respond(strain, law.initial(500, 6)).yielding.sum() > 300
+    assert len(asked) < 25
 
 
 # -- curves ------------------------------------------------------------------------------------
@@ -180,6 +235,24 @@ def test_ratchetting_between_two_stresses_is_that_of_armstrong_and_frederick():
     assert again > back > 0
     assert strain[:4] == pytest.approx(plastic, rel=5e-4)
     assert np.diff(strain[1::2]) == pytest.approx(again - back, rel=2e-3)
+
+
+def test_in_a_closed_cycle_all_work_becomes_heat():
+    law = chaboche("fading", "none")
+    turns = np.array([0.02, -0.02] * 6)
+    strain, state, now = np.zeros((4, 1)), law.initial(1, 4), 0.0
+    stress = np.zeros((4, 1))
+    work, heat = np.zeros(len(turns)), np.zeros(len(turns))
+    for k, end in enumerate(turns):
+        for shear in np.linspace(now, end, 801)[1:]:
+            step = shear - strain[3, 0]
+            strain[3] = shear
+            found = law.respond(strain, state)
+            work[k] += 0.5 * (stress[3, 0] + found.stress[3, 0]) * step
+            heat[k] += law.dissipation(state, found)[0]
+            state, stress = found.state, found.stress
+        now = end
+    assert heat[-2:].sum() == pytest.approx(work[-2:].sum(), rel=0.01)
 
 
 def _cycles(law, top, bottom, count, steps):
@@ -314,9 +387,8 @@ def test_a_wrong_layer_is_a_misfit_even_if_the_sum_is_right():
     assert LAYERED.misfit(strain, stress, before, wrong).min() > 1.0
 
 
-def test_stress_below_the_curve_needs_no_poisson_ratio_of_its_own():
+def test_layers_of_a_material_without_lateral_contraction_follow_the_curve():
     elasticity = Elasticity(youngs_modulus=E, poisson_ratio=0.0)
     law = Layered.of_curve(elasticity, (RE / E, 0.01), (RE, 450.0), slope=100.0)
     stress, _ = uniaxial(law, np.linspace(0.001, 0.01, 10))
     assert stress[-1] == pytest.approx(450.0, rel=1e-9)
-    assert BACK_STRESSES["prager"][0].recall == 0.0

@@ -50,8 +50,8 @@ class Bar:
 
     @property
     def cornered(self) -> bool:
-        """Whether the stress of the bar lies in a corner of its hexagon."""
-        return self.kind.startswith("tresca") and not self.round
+        """Whether the stress of the bar lies on an edge: softness then proves no limit."""
+        return self.law.cornered
 
     def solve(self) -> Solution:
         """Pull the bar and let it go."""
