@@ -73,7 +73,7 @@ def test_a_curve_that_another_rule_of_the_sweep_needs_is_no_mistake() -> None:
         ({"hardening": "layered", "curve": ((0.0, 350.0), (0.01, 400.0), (0.02, 600.0))},
          "curve", "slope falls"),
         ({"hardening": "table", "curve": ((0.0, 350.0), (0.0, 400.0))}, "curve", "increasing"),
-        ({"hardening": "table", "curve": ((0.0, 350.0), (0.1, float("nan")))}, "curve", "pairs of finite"),
+        ({"hardening": "table", "curve": ((0.0, 350.0), (0.1, float("nan")))}, "curve", "pairs"),
         ({"hardening": "chaboche"}, "back_stresses", "must be given"),
         ({"hardening": "chaboche", "back_stresses": ((1.0, -1.0),)}, "back_stresses.1.recall",
          "negative"),
