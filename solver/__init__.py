@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     from solver.loading.program import Program, Stage
     from solver.loading.walker import Walker
     from solver.materials.material import Material
+    from solver.model.amplitude import Amplitude
     from solver.model.body import Body
+    from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
     from solver.model.model import ContactPair, Model
+    from solver.model.rigid import Moved, Pushed, RigidBody
     from solver.results.audit.report import Audit
     from solver.results.record import Record, Status
     from solver.results.solution import Solution, solve
@@ -32,20 +35,27 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Amplitude": "model.amplitude",
     "Audit": "results.audit.report",
     "Body": "model.body",
     "Branch": "loading.path",
     "ContactPair": "model.model",
+    "Displacement": "model.loads",
+    "InitialStress": "model.loads",
     "LimitLoad": "errors",
     "Material": "materials.material",
     "Model": "model.model",
     "ModelError": "errors",
+    "Moved": "model.rigid",
     "NotConverged": "errors",
     "Outcome": "loading.outcome",
     "Path": "loading.path",
     "PathControl": "loading.control",
+    "Pressure": "model.loads",
     "Program": "loading.program",
+    "Pushed": "model.rigid",
     "Record": "results.record",
+    "RigidBody": "model.rigid",
     "Scene": "scenes",
     "SCENES": "scenes",
     "Solution": "results.solution",
@@ -54,33 +64,44 @@ _HOMES = {
     "Stage": "loading.program",
     "Status": "results.record",
     "System": "contact.system",
+    "Temperature": "model.loads",
     "Tolerances": "loading.control",
+    "Traction": "model.loads",
     "Walker": "loading.walker",
 }
 
 __all__ = [
     "SCENES",
+    "Amplitude",
     "Audit",
     "Body",
     "Branch",
     "ContactPair",
+    "Displacement",
+    "InitialStress",
     "LimitLoad",
     "Material",
     "Model",
     "ModelError",
+    "Moved",
     "NotConverged",
     "Outcome",
     "Path",
     "PathControl",
+    "Pressure",
     "Program",
+    "Pushed",
     "Record",
+    "RigidBody",
     "Scene",
     "Solution",
     "SolverError",
     "Stage",
     "Status",
     "System",
+    "Temperature",
     "Tolerances",
+    "Traction",
     "Walker",
     "solve",
 ]

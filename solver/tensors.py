@@ -27,6 +27,13 @@ def to_tensor(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
     return tensor
 
 
+def to_mandel(tensor: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return Mandel components ``(n_components, ...)`` from tensor components of that shape."""
+    mandel = np.array(tensor, dtype=float)
+    mandel[3:] *= SQRT2
+    return mandel
+
+
 def identity(n_components: int) -> NDArray[np.float64]:
     """Return the Mandel components (n_components,) of the unit tensor."""
     one = np.zeros(n_components)

@@ -10,7 +10,6 @@ import numpy as np
 from solver.contact.geometry import Pairing, pair
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
-from solver.fem import surface
 from solver.model.model import effective_friction
 
 if TYPE_CHECKING:
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from solver.fem.discretisation import Discretisation
     from solver.fem.part import Part
+    from solver.fem.rigid import RigidPart
     from solver.fem.surface import Surface
     from solver.model.model import ContactPair, Model
 
@@ -67,14 +67,14 @@ class Interface:
 
 
 def surfaces_of(
-    model: Model, wholes: Mapping[str, Discretisation]
+    model: Model, wholes: Mapping[str, Discretisation | RigidPart]
 ) -> dict[tuple[str, str], Surface]:
     """Return the surfaces of all pairs in the numbering of the whole bodies.
 
     Where a surface continues as the surface of another pair, contact may pass on: no end is there.
     """
     found = {
-        side: surface.extract(wholes[side[0]], side[1])
+        side: wholes[side[0]].chain(side[1])
         for contact in model.contacts
         for side in (contact.slave, contact.master)
     }
@@ -108,7 +108,8 @@ def interface_of(
     (slave, slave_surface), (master, master_surface) = sides
     both = (parts[slave], parts[master])
     check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
-    reference, reach = None, float(np.ptp(both[0].body.mesh.p, axis=1).max())
+    sizes = [float(part.body.box.max()) for part in both]
+    reference, reach = None, sizes[0] if np.isfinite(sizes[0]) else sizes[1]
     if contact.sliding == "small":
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
         reach = largest_overlap(both[0].body, both[1].body)

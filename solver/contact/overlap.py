@@ -12,6 +12,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.mesh.shapes import shape_functions
+from solver.model.rigid import RigidBody
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,18 +24,22 @@ if TYPE_CHECKING:
 _ALLOWED = 0.05
 
 
-def largest_overlap(first: Body, second: Body) -> float:
+def largest_overlap(first: Body | RigidBody, second: Body | RigidBody) -> float:
     """Return the overlap allowed: a twentieth of the smaller body's narrow side [mm].
 
     The sides are those of the box around a body.
     """
-    return _ALLOWED * float(min(np.ptp(body.mesh.p, axis=1).min() for body in (first, second)))
+    return _ALLOWED * float(min(body.box.min() for body in (first, second)))
 
 
-def check_overlap(slave: Body, master: Body, sides: tuple[Surface, Surface]) -> None:
-    """Raise `ModelError` where a vertex of either surface is too deep inside the other body."""
+def check_overlap(
+    slave: Body | RigidBody, master: Body | RigidBody, sides: tuple[Surface, Surface]
+) -> None:
+    """Raise `ModelError` where a vertex of either surface is too deep inside a meshed body."""
     allowed = largest_overlap(slave, master)
     for body, other, surface in ((slave, master, sides[0]), (master, slave, sides[1])):
+        if isinstance(other, RigidBody):
+            continue
         points = surface.X[:, surface.vertices]
         depth = _depth(points, other, allowed)
         if depth.max(initial=0.0) > allowed:

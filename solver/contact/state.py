@@ -70,7 +70,7 @@ class Energy:
     Attributes
     ----------
     stored : elastic energy of the bodies at the beginning
-    external : work of loads and prescribed motions
+    external : work of loads, of prescribed motions and of heat
     plastic : work of stress on plastic strain, by the mean of stress before and after
     friction : work of friction on slip, positive
     contact : work against contact where points open or close within an increment: an error of

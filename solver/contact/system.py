@@ -14,6 +14,7 @@ from solver.contact.state import ContactState, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import recovery
+from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from solver.fem.surface import Surface
     from solver.fem.wheel import Hub
     from solver.materials.state import Response
+    from solver.model.loads import Load
     from solver.model.model import Model
 
 
@@ -35,27 +37,38 @@ _SET_DOWN = 1e-9
 """Gap / radius of a wheel that is set down, below which vertices touch."""
 
 
-def _part(whole: Discretisation, own: list[Surface], linear_solver: str) -> Part:
+def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: str) -> Part:
+    if isinstance(whole, RigidPart):
+        return whole
     body = whole.body
     if body.axle is not None:
         return Wheel(whole, own, linear_solver)
-    if body.material.elastic and body.condense and own:
+    if body.material.elastic and body.condense and own and not whole.driven.cases:
         return Substructure(whole, own, linear_solver)
     return whole
 
 
 class System:
-    """A model's parts, operators and interfaces, built once and shared by all its runs."""
+    """A model's parts, operators and interfaces, built once and shared by all its runs.
+
+    Attributes
+    ----------
+    names : of the bodies, the rigid ones last, in the order of ``parts``
+    """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
         self.model = model
+        round_axis = model.bodies[0].kinematics == "axisymmetric"
         self._wholes = {body.name: Discretisation(body) for body in model.bodies}
-        surfaces = surfaces_of(model, self._wholes)
-        own = [[chain for (name, _), chain in surfaces.items() if name == body.name]
-               for body in model.bodies]  # fmt: skip
+        rigid = {body.name: RigidPart(body, round_axis) for body in model.rigid}
+        wholes: dict[str, Discretisation | RigidPart] = {**self._wholes, **rigid}
+        self._chains = wholes
+        surfaces = surfaces_of(model, wholes)
+        own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
+        self.names = list(wholes)
         self.parts: tuple[Part, ...] = tuple(
             _part(whole, chains, linear_solver)
-            for whole, chains in zip(self._wholes.values(), own, strict=True)
+            for whole, chains in zip(wholes.values(), own, strict=True)
         )
         self.operators = tuple(
             part.operators(chains, linear_solver)
@@ -88,14 +101,9 @@ class System:
             if size and np.abs(loose[end - size : end]).max(initial=0.0) > 1e-6:
                 raise ModelError(
                     "supports",
-                    dict(part.body.supports),
+                    getattr(part.body, "supports", {}),
                     f"body {part.body.name!r} can move freely: support it, or hold it by contact",
                 )
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the bodies."""
-        return [body.name for body in self.model.bodies]
 
     @property
     def n_unknowns(self) -> int:
@@ -114,16 +122,28 @@ class System:
         return any(part.moves for part in self.parts)
 
     @property
+    def _loads(self) -> list[Load]:
+        return [load for part in self.parts for load in part.body.every_load]
+
+    @property
     def has_amplitude(self) -> bool:
-        """Whether a pressure follows an amplitude of its own, not the time."""
-        return any(body.amplitude is not None for body in self.model.bodies)
+        """Whether a load follows an amplitude of its own, not the time."""
+        return any(load.amplitude is not None for load in self._loads)
+
+    @property
+    def prestressed(self) -> bool:
+        """Whether a body has stress before any load."""
+        return any(not load.varies for load in self._loads)
 
     @cached_property
     def overlapping(self) -> bool:
-        """Whether bodies overlap before loading; moving loads are set down so that they touch."""
-        return not self.moves and any(
-            (contact.gap < -self.touching).any() for contact in self.initial().contacts
-        )
+        """Whether bodies overlap before loading."""
+        return self.overlaps(self.initial())
+
+    def overlaps(self, state: State) -> bool:
+        """Whether bodies overlap in a state; moving loads are set down so that they touch."""
+        gaps = (contact.gap for contact in state.contacts)
+        return not self.moves and any((gap < -self.touching).any() for gap in gaps)
 
     @cached_property
     def proportional(self) -> bool:
@@ -146,6 +166,10 @@ class System:
     def full(self, name: str) -> Discretisation:
         """Return the whole body called ``name``."""
         return self._wholes[name]
+
+    def chain(self, name: str, boundary: str) -> Surface:
+        """Return a surface of a whole body, meshed or rigid."""
+        return self._chains[name].chain(boundary)
 
     def displacement(self, name: str, state: State) -> NDArray[np.float64]:
         """Return the displacements (n,) of a whole body [mm]."""
@@ -171,17 +195,21 @@ class System:
         number = self.part(name)
         if not self.parts[number].meshed:
             whole = self.full(name)
-            return whole.respond(self.displacement(name, converged.state), whole.virgin())
+            state = converged.state
+            return whole.respond(self.displacement(name, state), whole.virgin(), state.time)
         return converged.responses[number]
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""
         u = tuple(part.start() for part in self.parts)
-        contacts = []
-        for interface in self.interfaces:
-            gap = interface.pairing(u).gap
-            contacts.append(ContactState.at_rest(gap, gap <= self.touching))
-        return State(0.0, u, tuple(part.virgin() for part in self.parts), tuple(contacts))
+        plastic = tuple(part.virgin() for part in self.parts)
+        return self.at_rest(State(0.0, u, plastic, ()))
+
+    def at_rest(self, state: State) -> State:
+        """Return a state without contact forces; vertices that touch stick."""
+        gaps = [interface.pairing(state.u).gap for interface in self.interfaces]
+        contacts = (ContactState.at_rest(gap, gap <= self.touching) for gap in gaps)
+        return replace(state, contacts=tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:
         """Return a state with prescribed motions at their values for a time."""

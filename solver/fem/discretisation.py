@@ -9,16 +9,26 @@ import numpy as np
 from scipy import linalg, sparse
 
 from solver.fem import kinematics
+from solver.fem.assembly import Assembly, whole_matrix
+from solver.fem.loads import (
+    Superposed,
+    eigenstrains,
+    nodal_forces,
+    prescribed,
+    travelling_forces,
+)
 from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part, same_unknowns
-from solver.fem.surface import edges_of, pressure_forces, shortest, travelling_forces
+from solver.fem.surface import edges_of, extract, shortest
+from solver.linear import solvers as linear
 from solver.mesh.elements import element_type
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.surface import Surface
+    from solver.linear.solvers import LinearSolver
     from solver.materials import PlasticState, Response
     from solver.model.body import Body
 
@@ -39,11 +49,14 @@ class Discretisation(Nodes, Part):
     dofs : (n_elements, 2 n_element_nodes)
     B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
     weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
-    load_vector : (n,) nodal forces of the pressures at load factor one [N]
+    loads : nodal forces (n,) of pressures and tractions [N]
+    condensable : the same, with the forces of an elastic body whose eigenstrain is held [N]
     free : unknowns that no support holds, copies left out
     active : unknowns of ``free`` that are not pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
     """
+
+    body: Body
 
     def __init__(self, body: Body) -> None:
         super().__init__(body)
@@ -61,14 +74,14 @@ class Discretisation(Nodes, Part):
             self.B = kinematics.mean_dilatation(self.B, self.weights)
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.moves = body.travelling is not None
-        self.load_vector = np.zeros(self.n)
-        for boundary, pressure in body.pressure.items():
-            self.load_vector += pressure_forces(self, boundary, pressure)
+        self.loads = nodal_forces(self)
+        self._eigenstrains = eigenstrains(self)
+        self.driven, self._prescribed = prescribed(self)
         self._hold()
 
     def _hold(self) -> None:
         """Find the supported unknowns, the rigid motions left, and one pin for each of these."""
-        fixed = np.zeros(self.n, dtype=bool)
+        fixed = self._prescribed.copy()
         for boundary, axes in self.body.supports.items():
             nodes = self.boundary_nodes(boundary)
             for axis in axes:
@@ -83,6 +96,10 @@ class Discretisation(Nodes, Part):
         self.rigid = motions
         self.free = free
         self.active = choose_pins(motions, free)
+
+    def chain(self, boundary: str) -> Surface:
+        """Return the surface of a named boundary, which must be one open chain."""
+        return extract(self, boundary)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
         """Return the operators of this part, whose contact surfaces are given."""
@@ -130,7 +147,7 @@ class Discretisation(Nodes, Part):
     # -- the law at all points ---------------------------------------------------------------
 
     def virgin(self) -> PlasticState:
-        """Return the state of the body before any load."""
+        """Return the internal variables of the body before any load."""
         return self.body.law.initial(self.weights.size, self.B.shape[2])
 
     def strain(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -138,13 +155,55 @@ class Discretisation(Nodes, Part):
         flat = np.matmul(self._flat_B, u[self.dofs][:, :, None])
         return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
 
-    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+    def eigenstrain(self, time: float) -> NDArray[np.float64]:
+        """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""
+        return self._eigenstrains.at(time).reshape(4, -1)
+
+    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
         """Return stress, tangent and new state at all points; the tangent is symmetric."""
-        response = self.body.law.respond(self.strain(u), state)
+        strain = self.strain(u)
+        if self._eigenstrains.cases:
+            strain -= self.eigenstrain(time)
+        response = self.body.law.respond(strain, state)
         if self.body.law.symmetric:
             return response
         tangent = response.tangent
         return response._replace(tangent=0.5 * (tangent + tangent.swapaxes(0, 1)))
+
+    @cached_property
+    def condensable(self) -> Superposed:
+        """Nodal forces (n,) of all loads on an elastic body, those of its eigenstrain included."""
+        C = self.body.law.stiffness(self.B.shape[2])
+        strains = self._eigenstrains
+        pushed = [self.internal_force(C @ strain.reshape(4, -1)) for strain in strains.fields.T]
+        both = (*self.loads.cases, *strains.cases), (*self.loads.fields.T, *pushed)
+        return Superposed.of(self.n, zip(*both, strict=True))
+
+    def force_level(self, time: float) -> float:
+        """Return the size of the forces that load the body at a time, eigenstrain included [N]."""
+        if not self._eigenstrains.cases:
+            return super().force_level(time)
+        return float(np.linalg.norm(self.condensable.at(time)))
+
+    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """Return ``u`` with prescribed displacements at their values for a time.
+
+        The rest of the body follows elastically, so that no element is torn.
+        """
+        if not self.driven.cases:
+            return u
+        change = np.where(self._prescribed, self.driven.at(time) - u, 0.0)
+        if not change.any():
+            return u
+        force = self.elastic_matrix() @ change
+        change[self.active] = self._elastic_solver.solve(-force[self.active])
+        return u + change[self.copied]
+
+    @cached_property
+    def _elastic_solver(self) -> LinearSolver:
+        solver = linear.analyse(self.pattern)
+        solver.factorise(self.elastic_data)
+        return solver
 
     def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
@@ -191,35 +250,13 @@ class Discretisation(Nodes, Part):
         return np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape))
 
     @cached_property
-    def _pattern(self) -> tuple[sparse.csr_array, NDArray[np.int64]]:
-        """Upper triangle on the active unknowns, and where each element entry goes in it."""
-        number = np.full(self.n, -1)
-        number[self.active] = np.arange(len(self.active))
-        local = number[self.dofs]
-        rows = np.broadcast_to(local[:, :, None], (*local.shape, local.shape[1])).ravel()
-        columns = np.broadcast_to(local[:, None, :], (*local.shape, local.shape[1])).ravel()
-        kept = (rows >= 0) & (columns >= rows)
-        key = rows.astype(np.int64) * len(self.active) + columns
-        unique, slot = np.unique(key[kept], return_inverse=True)
-        m = len(self.active)
-        indptr = np.searchsorted(unique, np.arange(m + 1, dtype=np.int64) * m)
-        upper = sparse.csr_array((np.zeros(len(unique)), unique % m, indptr), shape=(m, m))
-        place = np.full(len(key), len(unique))
-        place[kept] = slot
-        return upper, place.reshape(len(local), -1)
-
-    def _scatter(
-        self, elements: NDArray[np.int64] | slice, matrices: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        upper, place = self._pattern
-        size = upper.nnz + 1
-        data = np.bincount(place[elements].ravel(), weights=matrices.ravel(), minlength=size)
-        return np.asarray(data[:-1], dtype=float)
+    def _assembly(self) -> Assembly:
+        return Assembly(self.dofs, self.active, self.n)
 
     @property
     def pattern(self) -> sparse.csr_array:
         """Upper triangle of the stiffness on the active unknowns, values not set."""
-        return self._pattern[0]
+        return self._assembly.pattern
 
     @cached_property
     def _elastic_elements(self) -> NDArray[np.float64]:
@@ -229,14 +266,11 @@ class Discretisation(Nodes, Part):
     @cached_property
     def elastic_data(self) -> NDArray[np.float64]:
         """Values of the elastic stiffness on `pattern`."""
-        return self._scatter(slice(None), self._elastic_elements)
+        return self._assembly.values(slice(None), self._elastic_elements)
 
     def elastic_matrix(self) -> sparse.csr_array:
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
-        rows = np.broadcast_to(self.dofs[:, :, None], self._elastic_elements.shape)
-        columns = np.broadcast_to(self.dofs[:, None, :], rows.shape)
-        entries = (self._elastic_elements.ravel(), (rows.ravel(), columns.ravel()))
-        return sparse.csr_array(entries, shape=(self.n, self.n))
+        return whole_matrix(self.dofs, self._elastic_elements, self.n)
 
     def tangent_data(self, response: Response) -> NDArray[np.float64]:
         """Return the values of the consistent tangent on `pattern`.
@@ -250,4 +284,4 @@ class Discretisation(Nodes, Part):
         tangent = response.tangent.reshape(*response.tangent.shape[:2], *shape)
         tangent = tangent[:, :, elements].transpose(2, 3, 0, 1)
         change = self._element_stiffness(elements, tangent) - self._elastic_elements[elements]
-        return self.elastic_data + self._scatter(elements, change)
+        return self.elastic_data + self._assembly.values(elements, change)

@@ -12,10 +12,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
 
+    from solver.fem.loads import Superposed
     from solver.fem.operators import PartOperators
     from solver.fem.surface import Surface
     from solver.materials.state import PlasticState, Response
     from solver.model.body import Body
+    from solver.model.rigid import RigidBody
 
 
 _SAME = 1e-6
@@ -39,7 +41,7 @@ class Part(ABC):
     n : number of unknowns ``u``
     nodes : (2, n_nodes) positions of the nodes that the unknowns belong to, node by node [mm]
     body : as declared
-    load_vector : (n,) nodal forces of the body's pressures at load factor one [N]
+    loads : nodal forces (n,) of the body's loads [N]
     copied : (n,) for each unknown the one whose value it takes
     free : unknowns that no support holds
     active : those of them that are not pinned to hold its rigid motions
@@ -50,8 +52,8 @@ class Part(ABC):
 
     n: int
     nodes: NDArray[np.float64]
-    body: Body
-    load_vector: NDArray[np.float64]
+    body: Body | RigidBody
+    loads: Superposed
     copied: NDArray[np.int64]
     free: NDArray[np.int64]
     active: NDArray[np.int64]
@@ -70,7 +72,7 @@ class Part(ABC):
         """Return the internal variables before any load."""
 
     @abstractmethod
-    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
         """Return stress, tangent and new internal variables at all points."""
 
     @abstractmethod
@@ -117,12 +119,20 @@ class Part(ABC):
 
     def external(self, time: float) -> NDArray[np.float64]:
         """Return the external nodal forces (n,) at a time [N]."""
-        return self.body.load_factor(time) * self.load_vector
+        return self.loads.at(time)
+
+    def force_level(self, time: float) -> float:
+        """Return the size of the forces that load the part at a time [N]."""
+        return float(np.linalg.norm(self.external(time)))
+
+    def eigenstrain(self, time: float) -> NDArray[np.float64]:
+        """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""
+        del time
+        return np.zeros((4, len(self.volumes)))
 
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
-        less, more = (abs(self.body.load_factor(time)) for time in (before, after))
-        return more > less and bool(self.load_vector.any())
+        return self.loads.grows(before, after)
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the unknowns with prescribed motions at their values for a time."""

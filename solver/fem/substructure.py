@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.fem.discretisation import choose_pins
+from solver.fem.loads import Superposed
 from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
@@ -47,8 +48,9 @@ class _Condensed:
         self._solver = linear.analyse(upper, linear_solver) if len(self.inner) else None
         if self._solver is not None:
             self._solver.factorise(upper.data)
-        self._load = part.load_vector[self.inner]
-        self.load_vector = part.load_vector[kept] - self._couple.T @ self._inside(self._load)
+        forces = part.condensable.fields
+        self._load = forces[self.inner]
+        self.forces = forces[kept] - self._couple.T @ self._inside(self._load)
         self.stiffness = K[kept][:, kept].toarray()
         for first in range(0, len(kept), _BLOCK):
             some = slice(first, first + _BLOCK)
@@ -58,13 +60,15 @@ class _Condensed:
 
     def _inside(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return inner displacements for inner forces, the kept unknowns held."""
-        return force if self._solver is None else self._solver.solve(force)
+        return force if self._solver is None or not force.size else self._solver.solve(force)
 
-    def expand(self, u: NDArray[np.float64], factor: float, size: int) -> NDArray[np.float64]:
-        """Return all displacements (size,) from those kept, at a load factor."""
+    def expand(
+        self, u: NDArray[np.float64], factors: NDArray[np.float64], size: int
+    ) -> NDArray[np.float64]:
+        """Return all displacements (size,) from those kept, at the factors of the loads."""
         full = np.zeros(size)
         full[self.kept] = u
-        full[self.inner] = self._inside(factor * self._load - self._couple @ u)
+        full[self.inner] = self._inside(self._load @ factors - self._couple @ u)
         return full
 
 
@@ -87,7 +91,7 @@ class Substructure(Part):
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]
         self.copied = np.arange(self.n)
-        self.load_vector = self._condensed.load_vector
+        self.loads = Superposed(whole.condensable.cases, self._condensed.forces)
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
         self.active = choose_pins(self.rigid, self.free)
@@ -107,9 +111,9 @@ class Substructure(Part):
         """Return the law's state for zero points: nothing here can yield."""
         return self.body.law.initial(0, self.whole.B.shape[2])
 
-    def respond(self, u: NDArray[np.float64], state: PlasticState) -> Response:
+    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
         """Return the law's response for zero points."""
-        del u
+        del u, time
         return self.body.law.respond(np.zeros_like(state.plastic_strain), state)
 
     def residual(
@@ -145,15 +149,15 @@ class Substructure(Part):
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the displacements of the whole body [mm]; those of a wheel in its hub's frame."""
-        factor = self.body.load_factor(time)
-        return self._condensed.expand(u[self.elastic], factor, self.whole.n)[self.whole.copied]
+        factors = self.loads.factors(time)
+        return self._condensed.expand(u[self.elastic], factors, self.whole.n)[self.whole.copied]
 
 
 def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> str:
     """Return a key made from the content: equal bodies share their condensation."""
     digest, body = sha256(), part.body
     elastic = body.law.stiffness(part.B.shape[2])
-    for array in (body.mesh.doflocs, body.mesh.t, nodes, elastic):
+    for array in (body.mesh.doflocs, body.mesh.t, nodes, elastic, part.condensable.fields):
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(
         repr((
@@ -161,8 +165,6 @@ def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> 
             body.full_integration, body.thickness, body.periodic,
             sorted((name, held, body.facets(name).tobytes())
                    for name, held in body.supports.items()),
-            sorted((name, value, body.facets(name).tobytes())
-                   for name, value in body.pressure.items()),
         )).encode()
     )  # fmt: skip
     return digest.hexdigest()

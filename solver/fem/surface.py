@@ -8,15 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.mesh.shapes import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from solver.fem.nodes import Nodes
-    from solver.model.motion import TravellingPressure
 
 
 _CORNER = float(np.cos(np.radians(30.0)))
@@ -160,43 +156,3 @@ def _repeated(
     everywhere = np.hstack([X, X - across, X + across])
     used, local = np.unique(edges, return_inverse=True)
     return np.tile(nodes, 3)[used], everywhere[:, used], local.reshape(edges.shape)
-
-
-def pressure_forces(part: Nodes, boundary: str, pressure: float) -> NDArray[np.float64]:
-    """Return the nodal forces (n,) of a pressure on a boundary, positive when pushing [N]."""
-    return _tractions(part, boundary, lambda x: (np.full(x.shape[1], pressure), 0.0), 4)
-
-
-def travelling_forces(
-    part: Nodes, travelling: TravellingPressure, time: float
-) -> NDArray[np.float64]:
-    """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
-    return _tractions(
-        part, travelling.boundary, lambda x: travelling.at(time, x[0], part.period), 8
-    )
-
-
-def _tractions(
-    part: Nodes,
-    boundary: str,
-    traction: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], float]],
-    points: int,
-) -> NDArray[np.float64]:
-    """Return the nodal forces (n,) of a traction [N].
-
-    ``traction`` gives the pressure at positions and the ratio of shear to it; shear acts against
-    the direction of the edges.
-    """
-    edges = edges_of(part, boundary)
-    X, edges = part.X[:, edges], part.same[edges]
-    force = np.zeros((2, part.X.shape[1]))
-    for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
-        N = shape_functions(np.array(xi), edges.shape[1])
-        t = X @ shape_derivatives(np.array(xi), edges.shape[1])
-        pressure, ratio = traction(X @ N)
-        direction = np.stack([-t[1], t[0]]) - ratio * t
-        push = weight * pressure * direction * part.measure(X @ N)
-        for k, value in enumerate(N):
-            for component in (0, 1):
-                np.add.at(force[component], edges[:, k], push[component] * value)
-    return np.asarray(force.T.ravel())

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from solver.fem.loads import Superposed
 from solver.fem.part import same_unknowns
 from solver.fem.substructure import Substructure
 
@@ -54,7 +55,7 @@ class Wheel(Substructure):
         self._hub = self.n
         self.n += 3
         self.copied = np.arange(self.n)
-        self.load_vector = np.zeros(self.n)
+        self.loads = Superposed.of(self.n, ())
         free = [_Y] if axle.rotation is not None else [_Y, _TURN]
         self.rigid = np.zeros((self.n, len(free)))
         self.rigid[self._hub + np.array(free), np.arange(len(free))] = 1.0

@@ -25,6 +25,7 @@ def worked(parts: Sequence[Part], before: Converged, now: Converged) -> Energy:
     """Return the work so far, that of the increment from ``before`` to ``now`` included."""
     moves = zip(before.state.u, now.state.u, before.forces, now.forces, strict=True)
     work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
+    work -= _heat(parts, before, now)
     so_far = before.energy
     return Energy(
         stored=so_far.stored,
@@ -33,6 +34,17 @@ def worked(parts: Sequence[Part], before: Converged, now: Converged) -> Energy:
         friction=so_far.friction + now.contact_work[0],
         contact=so_far.contact + now.contact_work[1],
     )
+
+
+def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
+    """Return the work of stress on the change of eigenstrain [N mm]."""
+    times = before.state.time, now.state.time
+    work = 0.0
+    for part, old, new in zip(parts, before.responses, now.responses, strict=True):
+        grown = part.eigenstrain(times[1]) - part.eigenstrain(times[0])
+        if grown.any():
+            work += float(((old.stress + new.stress) * grown).sum(axis=0) @ part.volumes) / 2
+    return work
 
 
 def _plastic_work(parts: Sequence[Part], before: Converged, now: Converged) -> float:

@@ -62,7 +62,7 @@ class Increment:
 
     Parameters
     ----------
-    guess : state to iterate from, usually predicted; ``start`` when absent
+    guess : state to iterate from, ``start`` when absent; prescribed motions are those at ``time``
     contact : False takes the bodies apart
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
@@ -95,7 +95,8 @@ class Increment:
         self.tolerances = tolerances or Tolerances()
         self._pivoted = 0
         self._blended = 0
-        self._drifted = False
+        # in a corner of the yield surface no tangent is left: a little elastic stiffness stays
+        self._softened = any(part.body.law.cornered for part in system.parts)
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
 
     def solve(self) -> Converged:
@@ -105,7 +106,7 @@ class Increment:
 
     def _iterate(self) -> Converged:
         tolerances = self.tolerances
-        origin = self.guess or self.start
+        origin = self.system.moved(self.guess or self.start, self.time)
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
         best, since_best, softest, moving = np.inf, 0, Flow(), False
@@ -126,7 +127,7 @@ class Increment:
             if balanced and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
-            first = len(_BLENDS) - 1 if elastic_first else int(self._drifted)
+            first = len(_BLENDS) - 1 if elastic_first else int(self._softened)
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
@@ -157,7 +158,7 @@ class Increment:
 
     def _respond(self, u: Vectors) -> tuple[Response, ...]:
         return tuple(
-            part.respond(ui, plastic)
+            part.respond(ui, plastic, self.time)
             for part, ui, plastic in zip(self.system.parts, u, self.start.plastic, strict=True)
         )
 
@@ -178,7 +179,7 @@ class Increment:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
         inner = on_parts(self.system, candidates, candidates.forces)
-        external = norm([part.external(self.time) for part in parts])
+        external = float(np.hypot.reduce([part.force_level(self.time) for part in parts]))
         level = external + norm(inner)
         if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
@@ -222,7 +223,7 @@ class Increment:
             except Singular:
                 continue
             if step and not blend and adrift(self.system.parts, self.time, step.u, responses):
-                self._drifted = True
+                self._softened = True
             elif step is not None:
                 self._pivoted += step.pivoted
                 self._blended += 0 < blend and len(blends) > 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.state import Converged, Energy, State
-from solver.errors import LimitLoad, NotConverged
+from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
 from solver.loading.carrying import MEMORY, Carrier
@@ -63,11 +63,13 @@ class Stepper:
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
 
-        This is done before any load acts, so that its failure is not taken for a limit load. Raises
-        `PathEnded` where overlapping bodies find no equilibrium.
+        Stress that the bodies have before any load is brought to equilibrium first, each body by
+        itself. All this is done before any load acts, so that its failure is not taken for a limit
+        load. Raises `PathEnded` where overlapping bodies find no equilibrium, and `ModelError`
+        where an initial stress finds none.
         """
-        point = self.rest(self.system.set_down(state, time), tally)
-        if not self.system.overlapping:
+        point = self.rest(self.system.set_down(self._balanced(state), time), tally)
+        if not self.system.overlaps(point.now.state):
             return point
         try:
             pushed = Increment(
@@ -81,6 +83,19 @@ class Stepper:
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
         pushed = self._worked(point.now, pushed)
         return Point(pushed, (), self._timed(point.tally.plus(pushed)))
+
+    def _balanced(self, state: State) -> State:
+        """Return the state in which the initial stress of each body is in equilibrium."""
+        if not self.system.prestressed:
+            return state
+        try:
+            balanced = Increment(self.system, state, state.time, contact=False).solve()
+        except IncrementFailed as failure:
+            raise ModelError(
+                "initial_stress", "this field",
+                f"must be one that the material bears in equilibrium: {failure}",
+            ) from failure  # fmt: skip
+        return self.system.at_rest(balanced.state)
 
     def again(self, point: Point, time: float) -> Point:
         """Return the first point of a further lap: wheels are set down, the rest waits for it."""
@@ -154,15 +169,14 @@ class Stepper:
         """Return the state to iterate from, None for the last one, and whether it is a prediction.
 
         Under a load that moves along a body the next state is not on the line through the last two:
-        where no earlier increment can be carried along with the load, only prescribed motions go
-        on.
+        where no earlier increment can be carried along with the load, there is no prediction.
         """
         if not self.system.moves:
             guess = extrapolate(past, now, time)
             return guess, guess is not None
         with one_thread():
             guess = self._carrier.carried(past, now, time)
-        return guess or self.system.moved(now, time), guess is not None
+        return guess, guess is not None
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began."""

@@ -13,12 +13,14 @@ from solver.deprecation import renamed
 from solver.errors import ModelError
 from solver.materials import PlaneStress
 from solver.model.kinematics import KINEMATICS, Kinematics
+from solver.model.loads import Pressure
 
 if TYPE_CHECKING:
     from skfem import Mesh
 
     from solver.materials import Law
     from solver.model.amplitude import Amplitude
+    from solver.model.loads import Load
     from solver.model.motion import Axle, TravellingPressure
 
 
@@ -39,6 +41,7 @@ class Body:
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
     pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]
     amplitude : load factor of the pressures over time; when absent, time is the load factor
+    loads : further loads, each with an amplitude of its own (`solver.model.loads`)
     condense : reduce the body to its contact surfaces where its material is elastic
     axle : makes an elastic body a wheel; its supports then hold it to the hub
     travelling : a pressure that moves along a boundary
@@ -56,6 +59,7 @@ class Body:
     supports: Mapping[str, str] = field(default_factory=dict)
     pressure: Mapping[str, float] = field(default_factory=dict)
     amplitude: Amplitude | None = None
+    loads: tuple[Load, ...] = ()
     condense: bool = True
     axle: Axle | None = None
     travelling: TravellingPressure | None = None
@@ -82,9 +86,12 @@ class Body:
         check_mesh(self.mesh, self.name, element)
         if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:
             raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
-        for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
-            for boundary in names:
-                self.facets(boundary, kind, outer=kind == "pressure")
+        for boundary in self.supports:
+            self.facets(boundary, "supports")
+        for load in self.every_load:
+            load.check()
+            for boundary in load.boundaries:
+                self.facets(boundary, load.name, outer=load.outside)
         for boundary, held in self.supports.items():
             if held not in ("x", "y", "xy"):
                 raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
@@ -97,12 +104,9 @@ class Body:
         if self.periodic is not None:
             self._check_periodic(self.periodic)
         moved = self.axle is not None or self.travelling is not None
-        if moved and self.pressure:
-            allowed = "must be empty on a body with an axle or a travelling pressure"
-            raise ModelError("pressure", dict(self.pressure), allowed)
-        for boundary, value in self.pressure.items():
-            if not np.isfinite(value):
-                raise ModelError(f"pressure.{boundary}", value, "must be finite [MPa]")
+        for load in self.every_load if moved else ():
+            allowed = "must not be given on a body with an axle or a travelling pressure"
+            raise ModelError(load.name, load.boundaries, allowed)
 
     @cached_property
     def law(self) -> Law:
@@ -111,9 +115,17 @@ class Body:
             return self.material
         return self.material.in_plane_stress() or PlaneStress(self.material)
 
-    def load_factor(self, time: float) -> float:
-        """Return the load factor of the pressures at a time."""
-        return time if self.amplitude is None else self.amplitude.at(time)
+    @property
+    def box(self) -> np.ndarray:
+        """Sides (2,) of the box around the body [mm]."""
+        return np.ptp(self.mesh.p, axis=1)
+
+    @cached_property
+    def every_load(self) -> tuple[Load, ...]:
+        """All loads, the pressures first."""
+        each = self.pressure.items()
+        pushing = (Pressure(boundary=b, value=p, amplitude=self.amplitude) for b, p in each)
+        return (*pushing, *self.loads)
 
     def _check_periodic(self, sides: tuple[str, str]) -> None:
         if not isinstance(sides, tuple) or len(sides) != 2:
@@ -122,10 +134,11 @@ class Body:
             raise ModelError("periodic", sides, "an axisymmetric body cannot be periodic")
         for boundary in sides:
             self.facets(boundary, "periodic", outer=True)
-            for kind, names in (("supports", self.supports), ("pressure", self.pressure)):
+            loads = ((load.name, load.boundaries) for load in self.every_load)
+            for kind, names in (("supports", self.supports), *loads):
                 if boundary in names:
                     allowed = "must not be given on a side of a periodic body"
-                    raise ModelError(f"{kind}.{boundary}", names[boundary], allowed)
+                    raise ModelError(f"{kind}.{boundary}", boundary, allowed)
 
     def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:
         """Return the facet numbers of a named boundary.

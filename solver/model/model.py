@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.model.body import Body
+from solver.model.rigid import Pushed, RigidBody
 
 LEAST_FRICTION = 1e-10
 """A coefficient of friction up to this value counts as zero. The forces it allows are below the
@@ -62,23 +63,32 @@ class Model:
     Attributes
     ----------
     bodies : bodies with different names and the same kinematics
+    rigid : rigid bodies, with names of their own
     contacts : pairs of boundaries that may touch
     """
 
     bodies: tuple[Body, ...]
     contacts: tuple[ContactPair, ...] = ()
+    rigid: tuple[RigidBody, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [body.name for body in self.bodies]
-        if not names or len(set(names)) < len(names):
+        names = [body.name for body in self.bodies] + [body.name for body in self.rigid]
+        if not self.bodies or len(set(names)) < len(names):
             raise ModelError("bodies", names, "must be at least one, with different names")
         kinds = {body.kinematics for body in self.bodies}
         if len(kinds) > 1:
             raise ModelError("bodies.kinematics", sorted(kinds), "must be the same for all bodies")
+        for body in self.rigid if "axisymmetric" in kinds else ():
+            if isinstance(body.x, Pushed) or isinstance(body.rotation, Pushed):
+                allowed = "must have x and rotation Moved where bodies are axisymmetric"
+                raise ModelError("rigid", body.name, allowed)
         for contact in self.contacts:
             sides = (("slave", contact.slave), ("master", contact.master))
             for side, (name, boundary) in sides:
                 self.body(name, side).facets(boundary, side, outer=True)
+            if all(isinstance(self.body(name), RigidBody) for _, (name, _) in sides):
+                pair = (contact.slave, contact.master)
+                raise ModelError("contacts", pair, "must not be two rigid bodies")
             elastic = all(self.body(name, side).material.elastic for side, (name, _) in sides)
             if elastic and not math.isinf(contact.shear_limit):
                 raise ModelError(
@@ -107,10 +117,11 @@ class Model:
         body = self.body(one[0])
         return len(np.intersect1d(body.facets(one[1]), body.facets(other[1]))) > 0
 
-    def body(self, name: str, field: str = "body") -> Body:
+    def body(self, name: str, field: str = "body") -> Body | RigidBody:
         """Return the body called ``name``."""
-        for body in self.bodies:
+        bodies: tuple[Body | RigidBody, ...] = (*self.bodies, *self.rigid)
+        for body in bodies:
             if body.name == name:
                 return body
-        allowed = "must be one of " + ", ".join(b.name for b in self.bodies)
+        allowed = "must be one of " + ", ".join(b.name for b in bodies)
         raise ModelError(field, name, allowed)

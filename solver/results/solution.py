@@ -10,6 +10,7 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.rigid import RigidMotion, RigidPart
 from solver.loading.control import PathControl
 from solver.loading.outcome import Tally
 from solver.loading.walker import Walker
@@ -76,6 +77,31 @@ class Solution:
         pressure, shear = contact_pressure(self.system, self._at(stage).state, pair)
         return chain.X[:, chain.vertices], pressure, shear
 
+    def motion(self, body: str, stage: StageName = "loaded") -> RigidMotion:
+        """Return the motion of a rigid body: x, y [mm] and rotation [rad]."""
+        part, u, _ = self._rigid(body, stage)
+        return part.motion_of(u)
+
+    def reaction(self, body: str, stage: StageName = "loaded") -> tuple[float, float, float]:
+        """Return what acts on a rigid body besides contact: forces [N] and moment [N mm].
+
+        A prescribed motion needs them; where a force is given, it is that force.
+        """
+        part, _, (x, y, turning) = self._rigid(body, stage)
+        return float(x), float(y), float(turning) * part.arm
+
+    def _rigid(
+        self, body: str, stage: StageName
+    ) -> tuple[RigidPart, NDArray[np.float64], NDArray[np.float64]]:
+        known = [rigid.name for rigid in self.system.model.rigid]
+        if body not in known:
+            allowed = "must be a rigid body: " + (", ".join(known) or "the model has none")
+            raise ModelError("body", body, allowed)
+        number, converged = self.system.part(body), self._at(stage)
+        part = self.system.parts[number]
+        assert isinstance(part, RigidPart)
+        return part, converged.state.u[number], converged.forces[number]
+
     def audit(self) -> Audit:
         """Return the audit: figures of this solution, violated conditions and warnings."""
         return audit(self.system, self.loaded, self.unloaded, self.tally.dissipation)
@@ -105,7 +131,7 @@ def solve(
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
     for body in model.bodies:
-        if body.amplitude is not None:
+        if any(load.amplitude is not None and load.varies for load in body.every_load):
             allowed = "must be absent: solve raises a load factor; walk a Program by a Walker"
             raise ModelError("amplitude", body.name, allowed)
     system = System(model, linear_solver)

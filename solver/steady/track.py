@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
-from solver.fem.surface import extract, travelling_forces
+from solver.fem.loads import travelling_forces
+from solver.fem.surface import extract
 from solver.materials.material import Material
 from solver.mesh import grid, with_middle
 from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_elements

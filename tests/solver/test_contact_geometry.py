@@ -161,6 +161,6 @@ def test_thin_elements_along_a_curve_have_their_body_on_the_right_side():
         lambda p: np.stack([p[0], p[1] + p[0] ** 2 / 200]),
     )
     bent = Body(name="bent", mesh=curve, material=STEEL, pressure={"bottom": 100.0})
-    assert Discretisation(bent).load_vector[1::2].sum() == pytest.approx(100.0 * 20.0)
+    assert Discretisation(bent).external(1.0)[1::2].sum() == pytest.approx(100.0 * 20.0)
     chain = extract(Discretisation(bent), "bottom")
     assert chain.X[0, chain.vertices] == pytest.approx([0.0, 10.0, 20.0])

@@ -150,7 +150,8 @@ def master_stands_still(patch: Patch) -> None:
 
 
 def other_material(**changes: float) -> Fault:
-    def with_other(self: Any, u: Any, state: Any) -> Any:
+    def with_other(self: Any, u: Any, state: Any, time: float) -> Any:
+        del time
         material = self.body.material
         fields = {name: factor * getattr(material, name) for name, factor in changes.items()}
         other = replace(self.body, material=replace(material, **fields))
@@ -165,8 +166,8 @@ def other_material(**changes: float) -> Fault:
 def more_flow(patch: Patch) -> None:
     respond = Discretisation.respond
 
-    def flowing(self: Any, u: Any, state: Any) -> Any:
-        found = respond(self, u, state)
+    def flowing(self: Any, u: Any, state: Any, time: float) -> Any:
+        found = respond(self, u, state, time)
         plastic = state.plastic_strain + 1.3 * (found.state.plastic_strain - state.plastic_strain)
         return found._replace(state=PlasticState(plastic, found.state.accumulated))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.model.loads import Displacement
 from solver.results.audit.law import increment_error
 
 if TYPE_CHECKING:
@@ -45,9 +46,9 @@ class AuditedBody:
         return self.part.meshed
 
     def _strain(self, state: State) -> Array:
-        """Return Mandel strain (4, n_points), from the displacements."""
+        """Return Mandel strain (4, n_points) from the displacements, without the eigenstrain."""
         strain = self.plain.strain(self._system.displacement(self.name, state))
-        return strain.reshape(len(strain), -1)
+        return strain.reshape(len(strain), -1) - self.plain.part.eigenstrain(state.time)
 
     @cached_property
     def _reached(self) -> Array:
@@ -77,19 +78,22 @@ class AuditedBody:
         """Return the resultant of the loads (2,) [N]."""
         time, travelling = self._converged.state.time, self.plain.body.travelling
         if travelling is None:
-            return self.plain.applied(self.plain.body.load_factor(time))
+            return self.plain.applied(time)
         share, _, ratio = travelling.now(time)
         whole = np.pi / 2 * travelling.half_width * travelling.peak * share
         return whole * self.plain.body.thickness * np.array([ratio, -1.0])
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
-        """Which displacements (n_nodes, 2) supports hold."""
+        """Which displacements (n_nodes, 2) supports hold, or loads prescribe."""
+        body = self.plain.body
         held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
-        for boundary, axes in self.plain.body.supports.items():
-            nodes = self.plain.part.boundary_nodes(boundary)
-            for axis in axes:
-                held[nodes, "xy".index(axis)] = True
+        each = [(boundary, "xy".index(axis)) for boundary, axes in body.supports.items()
+                for axis in axes]  # fmt: skip
+        each += [(load.boundary, axis) for load in body.every_load
+                 if isinstance(load, Displacement) for axis in load.components]  # fmt: skip
+        for boundary, axis in each:
+            held[self.plain.part.boundary_nodes(boundary), axis] = True
         return held
 
     @property

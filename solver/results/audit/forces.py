@@ -31,7 +31,9 @@ def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
     state = converged.state
     candidates = find_candidates(system, state, state.u, state.contacts)
     out = {}
-    for i, (body, part) in enumerate(zip(system.model.bodies, system.parts, strict=True)):
+    for body in system.model.bodies:
+        i = system.part(body.name)
+        part = system.parts[i]
         force = candidates.on_part(i, candidates.forces, part.n)
         out[body.name] = part.on_whole(force).reshape(-1, 2)
     return out

@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.fem.surface import edges_of
 from solver.mesh.elements import element_type
+from solver.model.loads import Pressure, Traction
 from solver.tensors import SQRT2, to_tensor
 
 if TYPE_CHECKING:
@@ -104,20 +105,25 @@ class PlainBody:
         nodes = self._nodes.ravel()
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in (x, y)], axis=1)
 
-    def applied(self, factor: float) -> Array:
-        """Return the resultant (2,) of the pressures at a load factor [N].
+    def applied(self, time: float) -> Array:
+        """Return the resultant (2,) of pressures and tractions at a time [N].
 
         A pressure p on an edge from A to B pushes with p times the depth and the length of AB,
-        against its normal.
+        against its normal; a traction with the depth and the length.
         """
         total = np.zeros(2)
-        for boundary, pressure in self.body.pressure.items():
-            edges = edges_of(self.part, boundary)
+        for load in self.body.every_load:
+            if not isinstance(load, Pressure | Traction):
+                continue
+            edges = edges_of(self.part, load.boundary)
             start, end = self.part.X[:, edges[:, 0]], self.part.X[:, edges[:, 1]]
             along = end - start
             depth = np.broadcast_to(self._depth((start + end) / 2), along.shape[1:])
-            push = factor * pressure * depth * np.array([-along[1], along[0]])
-            total += push.sum(axis=1)
+            if isinstance(load, Pressure):
+                force = load.value * np.array([-along[1], along[0]])
+            else:
+                force = np.array([[load.x], [load.y]]) * np.linalg.norm(along, axis=0)
+            total += load.factor(time) * (depth * force).sum(axis=1)
         return total
 
     def elastic_energy(self, stress: Array) -> float:

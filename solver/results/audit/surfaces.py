@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.overlap import largest_overlap
-from solver.fem.surface import extract
+from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
 from solver.mesh.shapes import shape_derivatives, shape_functions
 
@@ -37,15 +37,26 @@ _BESIDE = 1e-9
 
 def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
     """Return the positions of the nodes of a whole body (2, n) [mm], and its rotation (2, 2)."""
-    whole, part = system.full(name), system.parts[system.part(name)]
+    part, u = system.parts[system.part(name)], state.u[system.part(name)]
+    if isinstance(part, RigidPart):
+        x, y, angle = part.motion_of(u)
+        return _turned(part.nodes, part.centre, angle, (x, y)), np.eye(2)
+    whole = system.full(name)
     d = system.displacement(name, state).reshape(-1, 2).T
     if not isinstance(part, Wheel):
         return whole.X + d, np.eye(2)
-    at = part.hub(state.u[system.part(name)])
-    angle, centre = at.rotation, part.centre[:, None]
-    Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    hub = np.array([[at.x], [at.y]])
-    return centre + hub + Q @ (whole.X - centre + d), Q
+    at = part.hub(u)
+    return _turned(whole.X + d, part.centre, at.rotation, (at.x, at.y)), _rotation(at.rotation)
+
+
+def _rotation(angle: float) -> Array:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _turned(x: Array, centre: Array, angle: float, moved: tuple[float, float]) -> Array:
+    """Return where points (2, n) are after a rotation about a centre, which then moves [mm]."""
+    from_centre = _rotation(angle) @ (x - centre[:, None])
+    return np.asarray(from_centre + (centre + np.array(moved))[:, None])
 
 
 @dataclass(frozen=True)
@@ -78,12 +89,13 @@ class Surfaces:
         self._system = system
         self.pair = pair
         self.slave, self.master = (
-            extract(system.full(name), boundary) for name, boundary in (pair.slave, pair.master)
+            system.chain(name, boundary) for name, boundary in (pair.slave, pair.master)
         )
 
         bodies = [system.model.body(name) for name, _ in (pair.slave, pair.master)]
         self._overlap = largest_overlap(*bodies)
-        self._thickness = float(np.ptp(bodies[0].mesh.p, axis=1).min())
+        narrow = [float(body.box.min()) for body in bodies]
+        self._thickness = narrow[0] if np.isfinite(narrow[0]) else narrow[1]
 
     def _at(self, state: State) -> tuple[Array, Array]:
         (slave, _), (master, _) = self.pair.slave, self.pair.master

@@ -1,0 +1,139 @@
+"""The loads of a body on its nodes and points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.surface import edges_of
+from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
+from solver.tensors import to_mandel
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from numpy.typing import NDArray
+
+    from solver.fem.nodes import Nodes
+    from solver.model.loads import Load
+    from solver.model.motion import TravellingPressure
+
+    Array = NDArray[np.float64]
+    Push = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Superposed:
+    """Fields that add up, each times the factor of its load.
+
+    Attributes
+    ----------
+    cases : the loads
+    fields : (n, n_cases) what each gives at load factor one
+    """
+
+    cases: tuple[Load, ...]
+    fields: Array
+
+    @classmethod
+    def of(cls, size: int, each: Iterable[tuple[Load, Array]]) -> Superposed:
+        """Return the fields (size,) of some loads."""
+        pairs = list(each)
+        fields = [np.ravel(field) for _, field in pairs]
+        together = np.stack(fields, axis=1) if pairs else np.zeros((size, 0))
+        return cls(tuple(load for load, _ in pairs), together)
+
+    def factors(self, time: float) -> Array:
+        """Return the load factors (n_cases,) at a time."""
+        return np.array([load.factor(time) for load in self.cases])
+
+    def at(self, time: float) -> Array:
+        """Return the sum (n,) at a time."""
+        return np.asarray(self.fields @ self.factors(time))
+
+    def grows(self, before: float, after: float) -> bool:
+        """Whether one of the fields grows from one time to another."""
+        more = np.abs(self.factors(after)) > np.abs(self.factors(before))
+        return bool((more & self.fields.any(axis=0)).any())
+
+
+def nodal_forces(part: Nodes) -> Superposed:
+    """Return the nodal forces (n,) of the pressures and tractions on a body [N]."""
+    loads = [load for load in part.body.every_load if isinstance(load, Pressure | Traction)]
+    return Superposed.of(part.n, ((load, _tractions(part, load.boundary, _push(load), 4))
+                                  for load in loads))  # fmt: skip
+
+
+def _push(load: Pressure | Traction) -> Push:
+    if isinstance(load, Pressure):
+        return lambda x, t: load.value * np.stack([-t[1], t[0]])
+    force = np.array([[load.x], [load.y]])
+    return lambda x, t: force * np.linalg.norm(t, axis=0)
+
+
+def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
+    """Return the displacements (n,) that loads prescribe [mm], and which unknowns they hold."""
+    loads = [load for load in part.body.every_load if isinstance(load, Displacement)]
+    held = np.zeros(part.n, dtype=bool)
+    each = []
+    for load in loads:
+        field, nodes = np.zeros(part.n), part.boundary_nodes(load.boundary)
+        for axis, value in load.components.items():
+            # where two boundaries meet, the first that holds a component keeps it
+            own = nodes[~held[2 * nodes + axis]]
+            field[2 * own + axis] = value
+            held[2 * own + axis] = True
+        each.append((load, field))
+    return Superposed.of(part.n, each), held
+
+
+def eigenstrains(part: Nodes) -> Superposed:
+    """Return the Mandel strain (4 n_points,) that causes no stress: thermal, or of making.
+
+    An initial stress s is that of the eigenstrain ``-C^-1 s`` in a body that has not moved.
+    """
+    x = part.points.reshape(2, -1)
+    each: list[tuple[Load, Array]] = []
+    for load in part.body.every_load:
+        if isinstance(load, Temperature):
+            strain = np.zeros((4, x.shape[1]))
+            strain[:3] = load.expansion * load.at(x)
+            each.append((load, strain))
+        elif isinstance(load, InitialStress):
+            compliance = np.linalg.inv(part.body.material.stiffness(4))
+            each.append((load, -compliance @ to_mandel(load.at(x))))
+    return Superposed.of(4 * x.shape[1], each)
+
+
+def travelling_forces(
+    part: Nodes, travelling: TravellingPressure, time: float
+) -> NDArray[np.float64]:
+    """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
+
+    def push(x: Array, t: Array) -> Array:
+        pressure, ratio = travelling.at(time, x[0], part.period)
+        return pressure * (np.stack([-t[1], t[0]]) - ratio * t)
+
+    return _tractions(part, travelling.boundary, push, 8)
+
+
+def _tractions(part: Nodes, boundary: str, push: Push, points: int) -> Array:
+    """Return the nodal forces (n,) of a traction [N].
+
+    ``push`` gives the force (2, n) for positions and tangents (2, n), the body on their left; it is
+    a force per area times the length of the tangent.
+    """
+    edges = edges_of(part, boundary)
+    X, edges = part.X[:, edges], part.same[edges]
+    force = np.zeros((2, part.X.shape[1]))
+    for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
+        N = shape_functions(np.array(xi), edges.shape[1])
+        t = X @ shape_derivatives(np.array(xi), edges.shape[1])
+        pushed = weight * push(X @ N, t) * part.measure(X @ N)
+        for k, value in enumerate(N):
+            for component in (0, 1):
+                np.add.at(force[component], edges[:, k], pushed[component] * value)
+    return np.asarray(force.T.ravel())

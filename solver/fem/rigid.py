@@ -1,0 +1,176 @@
+"""A rigid body as the increments see it: three unknowns, finite rotation.
+
+Unknowns are the displacement (x, y) of the centre and the arc that rotation makes at the distance
+of the farthest point. A point is at ``c0 + c + Q (X - c0)``. Motions under a force are free, as
+those of a body held by contact alone; the others are prescribed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from solver.fem.loads import Superposed
+from solver.fem.operators import Fixed
+from solver.fem.part import Part
+from solver.fem.surface import Surface
+from solver.linear.solvers import Begun
+from solver.model.rigid import Moved, RigidBody
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials import PlasticState, Response
+
+    Array = NDArray[np.float64]
+
+
+class RigidMotion(NamedTuple):
+    """Displacement of the centre along x and y [mm], counter-clockwise rotation [rad]."""
+
+    x: float
+    y: float
+    rotation: float
+
+
+class Unmoved:
+    """The operator of a part without elastic displacements."""
+
+    def __init__(self, n: int) -> None:
+        self._nothing = np.zeros(n)
+
+    def begin(self, force: Array) -> Begun:
+        """See `Operator`."""
+        del force
+        return Begun(self._nothing, lambda change: self._nothing)
+
+    def compliance(self, dofs: NDArray[np.int64], rows: Array) -> Array:
+        """See `Operator`."""
+        del dofs
+        return np.zeros((len(rows), len(rows)))
+
+
+class RigidPart(Part):
+    """A part with the unknowns x, y and the arc of its rotation."""
+
+    body: RigidBody
+    meshed = False
+
+    def __init__(self, body: RigidBody, axisymmetric: bool) -> None:
+        self.body = body
+        self.n = 3
+        self._axisymmetric = axisymmetric
+        self.centre = np.asarray(body.centre, dtype=float)
+        points = [np.asarray(curve.points, dtype=float) for curve in body.surfaces.values()]
+        self.nodes = np.hstack(points)
+        self._first = dict(zip(
+            body.surfaces, np.cumsum([0, *(p.shape[1] for p in points)]).tolist(), strict=False
+        ))  # fmt: skip
+        self.arm = float(np.linalg.norm(self.nodes - self.centre[:, None], axis=0).max())
+        # a moment acts as a force at the arm
+        scale = np.diag([1.0, 1.0, self.arm])
+        moved = [isinstance(motion, Moved) for motion in body.every_load]
+        each = list(zip(body.every_load, moved, np.eye(3), scale, strict=True))
+        self.loads = Superposed.of(3, ((m, m.value * e / s.sum()) for m, held, e, s in each
+                                       if not held))  # fmt: skip
+        self._driven = Superposed.of(3, ((m, m.value * s) for m, held, _, s in each if held))
+        self._held = np.array(moved)
+        self.free = np.flatnonzero(~self._held)
+        self.active = np.zeros(0, dtype=np.int64)
+        self.rigid = np.eye(3)[:, self.free]
+        self.copied = np.arange(3)
+
+    # -- its surfaces --------------------------------------------------------------------------
+
+    def chain(self, boundary: str) -> Surface:
+        """Return a surface by its name."""
+        curve = self.body.surfaces[boundary]
+        count = np.asarray(curve.points).shape[1]
+        step = 2 if curve.quadratic else 1
+        starts = np.arange(0, count - 1, step)
+        ends = (starts, starts + step, starts + 1)[: 3 if curve.quadratic else 2]
+        nodes = self._first[boundary] + np.arange(count)
+        X = self.nodes[:, nodes]
+        depth = 2 * np.pi * X[0] if self._axisymmetric else np.full(count, self.body.thickness)
+        return Surface(nodes, np.stack(ends, axis=1), X, depth, (curve.goes_on, curve.goes_on))
+
+    # -- kinematics ----------------------------------------------------------------------------
+
+    def motion_of(self, u: Array) -> RigidMotion:
+        """Return the motion of the body."""
+        return RigidMotion(float(u[0]), float(u[1]), float(u[2] / self.arm))
+
+    def _from_centre(self, X: Array, u: Array) -> Array:
+        """Return where points (2, n) are from the centre, turned [mm]."""
+        angle = self.motion_of(u).rotation
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, -s], [s, c]]) @ (X - self.centre[:, None])
+
+    def motion(self, surface: Surface, u: Array) -> Array:
+        """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
+        return self._from_centre(surface.X, u) + (self.centre + u[:2])[:, None] - surface.X
+
+    def pull_back(
+        self, surface: Surface, u: Array, block: Array, gaps: int
+    ) -> tuple[NDArray[np.int64], Array]:
+        """Return derivative rows on the three unknowns, after their numbers."""
+        del gaps
+        nodal = block.reshape(len(block), block.shape[1] // 2, 2)
+        x, y = self._from_centre(surface.X, u) / self.arm
+        turning = (nodal * np.stack([-y, x], axis=1)).sum(axis=(1, 2))
+        return np.arange(3), np.hstack([nodal.sum(axis=1), turning[:, None]])
+
+    def moved(self, u: Array, time: float) -> Array:
+        """Return ``u`` with prescribed motions at their values for a time."""
+        return np.where(self._held, self._driven.at(time), u)
+
+    def start(self) -> Array:
+        """Return the unknowns (3,) before any load."""
+        return self.moved(np.zeros(3), 0.0)
+
+    def passed(self, before: Array, after: Array, way: float) -> float:
+        """Return 0: it is the same everywhere."""
+        del before, after, way
+        return 0.0
+
+    def sources(self, way: float) -> NDArray[np.int64]:
+        """Return the unknowns themselves."""
+        del way
+        return np.arange(3)
+
+    # -- it has no points, and no stiffness ------------------------------------------------------
+
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
+        """Return the operator of a part without elastic displacements."""
+        del surfaces, linear_solver
+        return Fixed(Unmoved(3))
+
+    def virgin(self) -> PlasticState:
+        """Return the internal variables of no points."""
+        return self.body.law.initial(0, 4)
+
+    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+        """Return the response of no points."""
+        del u, time
+        return self.body.law.respond(np.zeros((4, 0)), state)
+
+    def residual(self, time: float, u: Array, response: Response) -> Array:
+        """Return the external forces (3,) [N]."""
+        del u, response
+        return self.external(time)
+
+    def elastic_matrix(self) -> sparse.csr_array:
+        """Return no stiffness (3, 3)."""
+        return sparse.csr_array((3, 3))
+
+    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+        """Return zero: it stores no energy."""
+        del step, response
+        return 0.0, 0.0
+
+    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+        """Return zero."""
+        del before, response
+        return 0.0, 0.0

@@ -1,0 +1,37 @@
+"""The law of what does not deform."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
+from solver.materials.state import Response
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.state import PlasticState
+
+
+class Rigid(Law):
+    """A law without strain: infinitely stiff, never yielding."""
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """An infinite modulus."""
+        return Elasticity(youngs_modulus=np.inf, poisson_ratio=0.0)
+
+    def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
+        """Return inf: it never yields."""
+        return np.full(state.accumulated.shape, np.inf)
+
+    def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
+        """Return no stress for zero points; a rigid body has no others."""
+        if strain.shape[1]:
+            raise ValueError("a rigid body has no points")
+        count = len(strain)
+        empty = np.zeros(0, dtype=bool)
+        return Response(np.zeros((count, 0)), np.zeros((count, count, 0)), state, empty)

@@ -1,0 +1,146 @@
+"""Rigid bodies: surfaces that move as a whole, such as an indenter or a plate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.materials.rigid import Rigid
+from solver.model.loads import Load
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials import Law
+
+_RIGID = Rigid()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moved(Load):
+    """A prescribed motion at load factor one: a displacement [mm] or a rotation [rad]."""
+
+    value: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pushed(Load):
+    """A motion left free under a force [N] or a moment [N mm], given at load factor one."""
+
+    value: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """A surface of a rigid body: a chain of points, the body on the left of one who walks along it.
+
+    Attributes
+    ----------
+    points : (2, n) positions [mm]
+    quadratic : whether every second point is the middle of a curved edge
+    goes_on : whether the body continues smoothly beyond the ends; contact must not reach them then
+    """
+
+    points: NDArray[np.float64]
+    quadratic: bool = False
+    goes_on: bool = False
+
+    def check(self, name: str) -> None:
+        """Raise `ModelError` where the points make no chain of edges."""
+        points = np.asarray(self.points, dtype=float)
+        if points.ndim != 2 or points.shape[0] != 2 or points.shape[1] < 2 + self.quadratic:
+            raise ModelError(f"surfaces.{name}", points.shape, "must be points (2, n), two or more")
+        if self.quadratic and points.shape[1] % 2 == 0:
+            allowed = "must be an odd number of points where edges are quadratic"
+            raise ModelError(f"surfaces.{name}", points.shape[1], allowed)
+        if not np.isfinite(points).all():
+            raise ModelError(f"surfaces.{name}", "nan or inf", "must be finite [mm]")
+        if not np.linalg.norm(np.diff(points), axis=0).all():
+            raise ModelError(f"surfaces.{name}", "a point twice", "must be points apart [mm]")
+
+
+def line(start: tuple[float, float], end: tuple[float, float], edges: int = 1) -> Curve:
+    """Return a straight surface of equal edges."""
+    return Curve(points=np.linspace(start, end, edges + 1).T)
+
+
+def arc(
+    centre: tuple[float, float], radius: float, angles: tuple[float, float], edges: int
+) -> Curve:
+    """Return an arc of a circle from one angle to another [rad], a part of a larger surface.
+
+    Counter-clockwise the body is inside the circle.
+    """
+    angle = np.linspace(*angles, 2 * edges + 1)
+    points = np.array(centre)[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
+    return Curve(points=points, quadratic=True, goes_on=True)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RigidBody:
+    """A body that does not deform, given by its surfaces alone.
+
+    Attributes
+    ----------
+    name : unique in its model
+    surfaces : its contact surfaces by name
+    centre : the point (x, y) that displacements and moments refer to [mm]
+    x, y, rotation : its three motions, each prescribed (`Moved`; held where it is by default) or
+        free under a force or moment (`Pushed`); rotation is positive counter-clockwise
+    thickness : of plane bodies [mm]
+    """
+
+    name: str
+    surfaces: Mapping[str, Curve]
+    centre: tuple[float, float] = (0.0, 0.0)
+    x: Moved | Pushed = field(default_factory=Moved)
+    y: Moved | Pushed = field(default_factory=Moved)
+    rotation: Moved | Pushed = field(default_factory=Moved)
+    thickness: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.surfaces:
+            raise ModelError("surfaces", {}, "must be at least one")
+        for name, curve in self.surfaces.items():
+            curve.check(name)
+        if not np.isfinite(self.centre).all():
+            raise ModelError("centre", self.centre, "must be finite [mm]")
+        if not (np.isfinite(self.thickness) and self.thickness > 0):
+            raise ModelError("thickness", self.thickness, "must be positive [mm]")
+        for name in ("x", "y", "rotation"):
+            motion = getattr(self, name)
+            if not isinstance(motion, Moved | Pushed):
+                raise ModelError(name, motion, "must be Moved or Pushed")
+            if not np.isfinite(motion.value):
+                raise ModelError(name, motion.value, "must be finite")
+
+    @property
+    def every_load(self) -> tuple[Moved | Pushed, ...]:
+        """Its three motions, x, y and rotation."""
+        return self.x, self.y, self.rotation
+
+    @property
+    def material(self) -> Law:
+        """The law of what does not deform."""
+        return _RIGID
+
+    law = material
+
+    def facets(
+        self, boundary: str, field: str = "boundary", outer: bool = False
+    ) -> NDArray[np.int64]:
+        """Return the number of a surface (1,)."""
+        del outer
+        if boundary not in self.surfaces:
+            allowed = "must name a surface of the rigid body: " + ", ".join(self.surfaces)
+            raise ModelError(field, boundary, allowed)
+        return np.array([list(self.surfaces).index(boundary)])
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        """Infinite: how far a rigid body reaches behind its surface is not known."""
+        return np.full(2, np.inf)

@@ -1,0 +1,161 @@
+"""Rigid bodies: an indenter or a plate pressed by a force, a moment or a displacement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import Body, ContactPair, Material, Model, ModelError, solve
+from solver.loading.control import PathControl
+from solver.mesh import graded, grid
+from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc, line
+
+E, NU = 2.0e5, 0.3
+MODULUS = E / (1 - NU**2)
+ELASTIC = Material(youngs_modulus=E, poisson_ratio=NU)
+SOFT = replace(ELASTIC, yield_stress=400.0, hardening="isotropic", hardening_ratio=0.024)
+
+
+def half_plane(smallest: float = 0.02, size: float = 200.0, **own: Any) -> Body:
+    """Return a block that reaches far around contact at |x| < 1."""
+    inside = 1.0 - graded(1.0, smallest, 1.4, 0.1)[::-1]
+    outside = 1.0 + graded(size - 1.0, smallest, 1.4, size / 4)
+    right = np.concatenate([inside, outside[1:]])
+    x = right if own.get("kinematics") == "axisymmetric" else np.append(-right[:0:-1], right)
+    y = -graded(size, smallest, 1.4, size / 4)[::-1]
+    symmetric = {"left": "x"} if own.get("kinematics") == "axisymmetric" else {}
+    own = {"material": ELASTIC, "supports": {"bottom": "xy", **symmetric}} | own
+    return Body(name="half_plane", mesh=grid(x, y), **own)
+
+
+def punch(**motions: Any) -> RigidBody:
+    return RigidBody(name="punch", surfaces={"base": line((-1.0, 0.0), (1.0, 0.0))}, **motions)
+
+
+def pressed(body: Body, rigid: RigidBody, surface: str = "base", **own: Any) -> Any:
+    sliding, steps = own.pop("sliding", "small"), own.pop("steps", 1)
+    pair = ContactPair(slave=("half_plane", "top"), master=(rigid.name, surface),
+                       sliding=sliding, **own)  # fmt: skip
+    model = Model(bodies=(body,), rigid=(rigid,), contacts=(pair,))
+    return solve(model, control=PathControl(load_step=1.0 / steps))
+
+
+def test_a_flat_punch_has_the_pressure_of_the_closed_form() -> None:
+    force = 100.0
+    found = pressed(half_plane(), punch(y=Pushed(value=-force)))
+    x, pressure, _ = found.contact()
+    inside = np.abs(x[0]) < 0.9
+    exact = force / (np.pi * np.sqrt(1 - x[0][inside] ** 2))
+    assert pressure[inside] == pytest.approx(exact, rel=0.01)
+    assert found.loaded.state.contacts[0].normal.sum() == pytest.approx(force, rel=1e-9)
+    assert found.audit().passed, found.audit().violations
+
+
+def test_an_eccentric_force_turns_the_punch_as_the_closed_form() -> None:
+    # K.L. Johnson, Contact Mechanics (1985), section 2.9: slope 4 M / (pi E* a^2)
+    force, moment = 100.0, 20.0
+    found = pressed(half_plane(), punch(y=Pushed(value=-force), rotation=Pushed(value=moment)))
+    turned = found.motion("punch", "loaded").rotation
+    assert turned == pytest.approx(4 * moment / (np.pi * MODULUS), rel=0.01)
+    x, pressure, _ = found.contact()
+    inside = np.abs(x[0]) < 0.9
+    at = x[0][inside]
+    exact = (force - 2 * moment * at) / (np.pi * np.sqrt(1 - at**2))
+    assert pressure[inside] == pytest.approx(exact, rel=0.015)
+    assert found.audit().passed, found.audit().violations
+
+
+@pytest.mark.parametrize("material", [ELASTIC, SOFT])
+def test_the_same_displacement_needs_the_same_force(material: Material) -> None:
+    body = half_plane(0.1, material=material)
+    by_force = pressed(body, punch(y=Pushed(value=-1200.0)), friction=0.2, steps=5)
+    depth = by_force.motion("punch", "loaded").y
+    by_depth = pressed(body, punch(y=Moved(value=depth)), friction=0.2, steps=5)
+    fx, fy, moment = by_depth.reaction("punch", "loaded")
+    assert fy == pytest.approx(-1200.0, rel=1e-3 if material is SOFT else 1e-6)
+    assert abs(fx) < 1e-3
+    assert abs(moment) < 1e-3
+    assert by_depth.motion("punch", "unloaded").y == 0.0
+    if material is SOFT:
+        assert by_depth.plastic_strain("half_plane").max() > 1e-3
+    for found in (by_force, by_depth):
+        assert found.audit().passed, found.audit().violations
+
+
+@pytest.mark.parametrize("rigid_is_slave", [False, True])
+def test_a_rigid_ball_on_a_half_space_is_the_contact_of_hertz(rigid_is_slave: bool) -> None:
+    radius, force = 100.0, 2500.0
+    a = (3 * force * radius / (4 * MODULUS)) ** (1 / 3)
+    body = half_plane(0.03, size=100.0, kinematics="axisymmetric")
+    edges = 25 if rigid_is_slave else 80
+    ball = RigidBody(
+        name="ball",
+        # a slave finer than its master could not be followed by it
+        surfaces={"cap": arc((0.0, radius), radius, (-np.pi / 2, 0.03 - np.pi / 2), edges)},
+        y=Pushed(value=-force),
+    )
+    sides = [("half_plane", "top"), ("ball", "cap")]
+    slave, master = sides[::-1] if rigid_is_slave else sides
+    pair = ContactPair(slave=slave, master=master, sliding="finite")
+    found = solve(Model(bodies=(body,), rigid=(ball,), contacts=(pair,)),
+                  control=PathControl(load_step=0.5))  # fmt: skip
+    x, pressure, _ = found.contact()
+    touching = found.loaded.state.contacts[0].normal > 0
+    assert pressure.max() == pytest.approx(3 * force / (2 * np.pi * a**2), rel=0.01)
+    assert x[0][touching].max() == pytest.approx(a, abs=0.12)  # an edge
+    assert -found.motion("ball", "loaded").y == pytest.approx(a**2 / radius, rel=0.01)
+
+
+def test_a_rotation_larger_than_small_moves_points_on_circles() -> None:
+    body = half_plane(0.1, size=20.0)
+    lever = RigidBody(
+        name="lever", surfaces={"base": line((5.0, 0.0), (7.0, 0.0))}, centre=(0.0, 0.0),
+        rotation=Moved(value=0.5), y=Moved(value=-0.5),
+    )  # fmt: skip
+    found = pressed(body, lever, sliding="finite")
+    part, u = found.system.parts[1], found.loaded.state.u[1]
+    chain = part.chain("base")
+    at = chain.X + part.motion(chain, u)
+    angle = 0.5
+    assert at[:, 0] == pytest.approx([5 * np.cos(angle), 5 * np.sin(angle) - 0.5])
+
+
+@pytest.mark.parametrize(
+    ("own", "message"),
+    [
+        ({"surfaces": {}}, "surfaces = .*: must be at least one"),
+        ({"surfaces": {"base": Curve(points=np.zeros((2, 1)))}}, "surfaces.base .* two or more"),
+        ({"surfaces": {"base": Curve(points=np.zeros((2, 2)))}}, "must be points apart"),
+        ({"surfaces": {"base": Curve(points=np.full((2, 2), np.nan))}}, "must be finite"),
+        (
+            {"surfaces": {"base": Curve(points=np.eye(2), quadratic=True)}},
+            "surfaces.base = .*must be points",
+        ),
+        ({"y": Pushed(value=np.inf)}, "y = inf: must be finite"),
+        ({"y": -100.0}, "y = -100.0: must be Moved or Pushed"),
+        ({"centre": (np.nan, 0.0)}, "centre = .*: must be finite"),
+        ({"thickness": 0.0}, "thickness = 0.0: must be positive"),
+    ],
+)
+def test_bad_rigid_bodies_are_refused(own: dict[str, Any], message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        replace(punch(), **own)
+
+
+def test_models_with_bad_rigid_bodies_are_refused() -> None:
+    body, one = half_plane(0.1, size=10.0), punch()
+    with pytest.raises(ModelError, match="different names"):
+        Model(bodies=(body,), rigid=(replace(one, name="half_plane"),))
+    with pytest.raises(ModelError, match="must name a surface of the rigid body: base"):
+        pressed(body, one, surface="side")
+    with pytest.raises(ModelError, match="must not be two rigid bodies"):
+        pair = ContactPair(slave=("punch", "base"), master=("other", "base"))
+        Model(bodies=(body,), rigid=(one, replace(one, name="other")), contacts=(pair,))
+    with pytest.raises(ModelError, match="must have x and rotation Moved"):
+        ring = half_plane(0.1, size=10.0, kinematics="axisymmetric")
+        Model(bodies=(ring,), rigid=(replace(one, x=Pushed(value=1.0)),))
+    with pytest.raises(ModelError, match="'punch' can move freely"):
+        pressed(body, replace(one, x=Pushed(value=1.0), y=Pushed(value=-1.0)))
