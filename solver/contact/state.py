@@ -92,6 +92,7 @@ class Converged:
     ----------
     forces : on each part, in balance with contact: loads, and the forces of supports and
         prescribed motions [N]
+    contact_forces : of contact on the unknowns of each part [N]
     responses : of each part at its points
     iterations : Newton iterations
     plastic_work : of the increment [N mm]
@@ -106,6 +107,7 @@ class Converged:
     start: State
     state: State
     forces: tuple[NDArray[np.float64], ...]
+    contact_forces: tuple[NDArray[np.float64], ...]
     contact_work: tuple[float, float]
     responses: tuple[Response, ...]
     iterations: int

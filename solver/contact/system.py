@@ -53,7 +53,8 @@ class System:
 
     Attributes
     ----------
-    names : of the bodies, the rigid ones last, in the order of ``parts``
+    names : of the meshed bodies
+    all_names : of these and of the rigid ones after them, in the order of ``parts``
     """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
@@ -65,7 +66,8 @@ class System:
         self._chains = wholes
         surfaces = surfaces_of(model, wholes)
         own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
-        self.names = list(wholes)
+        self.names = [body.name for body in model.bodies]
+        self.all_names = list(wholes)
         self.parts: tuple[Part, ...] = tuple(
             _part(whole, chains, linear_solver)
             for whole, chains in zip(wholes.values(), own, strict=True)
@@ -75,7 +77,8 @@ class System:
             for part, chains in zip(self.parts, own, strict=True)
         )
         self.interfaces = tuple(
-            interface_of(contact, self.parts, self.names, surfaces) for contact in model.contacts
+            interface_of(contact, self.parts, self.all_names, surfaces)
+            for contact in model.contacts
         )
 
         self._check_held()
@@ -161,7 +164,7 @@ class System:
 
     def part(self, name: str) -> int:
         """Return the number of the part called ``name``."""
-        return self.names.index(name)
+        return self.all_names.index(name)
 
     def full(self, name: str) -> Discretisation:
         """Return the whole body called ``name``."""

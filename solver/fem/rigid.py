@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+_AXIS = 1e-9
+"""Distance from the axis / size of the body, below which a point is on the axis."""
+
+
 class RigidMotion(NamedTuple):
     """Displacement of the centre along x and y [mm], counter-clockwise rotation [rad]."""
 
@@ -94,7 +98,9 @@ class RigidPart(Part):
         nodes = self._first[boundary] + np.arange(count)
         X = self.nodes[:, nodes]
         depth = 2 * np.pi * X[0] if self._axisymmetric else np.full(count, self.body.thickness)
-        return Surface(nodes, np.stack(ends, axis=1), X, depth, (curve.goes_on, curve.goes_on))
+        on_axis = (np.abs(X[0, [0, -1]]) < _AXIS * self.arm) & self._axisymmetric
+        start, end = (on and not axis for on, axis in zip(curve.goes_on, on_axis, strict=True))
+        return Surface(nodes, np.stack(ends, axis=1), X, depth, (start, end))
 
     # -- kinematics ----------------------------------------------------------------------------
 

@@ -58,7 +58,7 @@ _LATE = 1
 
 
 class Increment:
-    """One increment of ``system`` from the state ``start`` to the time ``time``.
+    """One increment of ``system`` from the state ``start`` to ``time``.
 
     Parameters
     ----------
@@ -191,10 +191,7 @@ class Increment:
         return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
 
     def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
-        """Return the elastic stiffness of the contact points [N/mm], as where they were first met.
-
-        It is a scale: how the rows turn within an increment does not matter.
-        """
+        """Return the elastic stiffness of the contact points [N/mm]: a scale, kept once found."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self._stiff:
             W = candidates.compliance([o.elastic for o in self.system.operators])
@@ -288,6 +285,7 @@ class Increment:
         return Converged(
             start=self.start,
             forces=tuple(part.external(self.time) - r - c for part, r, c in held),
+            contact_forces=inner,
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),

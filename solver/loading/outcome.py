@@ -59,11 +59,15 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A converged state, those before it in their order, to predict from, and the cost so far."""
+    """A converged state, those before it in their order, to predict from, and the cost so far.
+
+    ``history`` is what was kept of every increment up to it.
+    """
 
     now: Converged
     past: tuple[State, ...]
     tally: Tally
+    history: tuple[Any, ...] = ()
 
 
 class PathEnded(Exception):
@@ -101,6 +105,7 @@ class Outcome:
     last : the last state reached
     points : states at the ends of the stages of the last lap, by name
     traces : what the walker's ``trace`` returned for each complete lap
+    history : what its ``watch`` returned for each increment, and for the state before the first
     error : why the program was not walked to its end; None if it was
     settled : how finely it was walked
     """
@@ -109,5 +114,6 @@ class Outcome:
     last: Any
     points: Mapping[str, Any] = field(default_factory=dict)
     traces: tuple[Any, ...] = ()
+    history: tuple[Any, ...] = ()
     error: NotConverged | None = None
     settled: Settled = field(default_factory=Settled)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from solver.loading.control import Control
 
     Report = Callable[[], None]
+    Watch = Callable[[Converged], Any]
 
 
 class Stepper:
@@ -34,6 +35,7 @@ class Stepper:
     Parameters
     ----------
     report : called after every increment
+    watch : (converged increment) -> what is kept of it
 
     Attributes
     ----------
@@ -45,11 +47,13 @@ class Stepper:
         system: System,
         control: Control,
         report: Report | None = None,
+        watch: Watch | None = None,
     ) -> None:
         self.system = system
         self.control = control
         self.place: Callable[[float], str] = "load factor {:.6g}".format
         self._report = report or (lambda: None)
+        self._watch = watch
         self._carrier = Carrier(system)
         self._clock = clock.process_time()
 
@@ -58,7 +62,8 @@ class Stepper:
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         stresses = zip(self.system.parts, at_rest.responses, strict=True)
         energy = Energy(stored=sum(elastic_energy(part, r.stress) for part, r in stresses))
-        return Point(replace(at_rest, state=state, energy=energy), (), tally or Tally())
+        now = replace(at_rest, state=state, energy=energy)
+        return Point(now, (), tally or Tally(), self._watched((), now))
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
@@ -82,7 +87,7 @@ class Stepper:
             )
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
         pushed = self._worked(point.now, pushed)
-        return Point(pushed, (), self._timed(point.tally.plus(pushed)))
+        return self._after(point, pushed, ())
 
     def _balanced(self, state: State) -> State:
         """Return the state in which the initial stress of each body is in equilibrium."""
@@ -101,7 +106,8 @@ class Stepper:
         """Return the first point of a further lap: wheels are set down, the rest waits for it."""
         state = point.now.state
         if self.system.moves:
-            return self.begin(state, time, point.tally)
+            begun = self.begin(state, time, point.tally)
+            return replace(begun, history=(*point.history, *begun.history))
         return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
@@ -134,7 +140,7 @@ class Stepper:
                 continue
             converged = self._worked(point.now, converged)
             past = (*point.past[1 - MEMORY :], state)
-            point = Point(converged, past, self._timed(point.tally.plus(converged)))
+            point = self._after(point, converged, past)
             if converged.strayed:
                 error = NotConverged(f"{self.place(time)}: {converged.strayed}", state.time, time)
                 raise PathEnded(error, point)
@@ -163,7 +169,7 @@ class Stepper:
             return None
         converged = self._worked(point.now, converged)
         self._report()
-        return Point(converged, (), self._timed(point.tally.plus(converged)))
+        return self._after(point, converged, ())
 
     def _predict(self, past: Sequence[State], now: State, time: float) -> tuple[State | None, bool]:
         """Return the state to iterate from, None for the last one, and whether it is a prediction.
@@ -182,6 +188,14 @@ class Stepper:
         """Return the increment ``now`` with the work since the lap began."""
         with one_thread():
             return replace(now, energy=worked(self.system.parts, before, now))
+
+    def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
+        """Return the point after one more increment."""
+        history = self._watched(point.history, converged)
+        return Point(converged, past, self._timed(point.tally.plus(converged)), history)
+
+    def _watched(self, history: tuple[Any, ...], now: Converged) -> tuple[Any, ...]:
+        return (*history, self._watch(now)) if self._watch else history
 
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
         way = f"between {self.place(reached)} and {self.place(attempted)}"

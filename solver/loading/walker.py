@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from solver.loading.outcome import Point
     from solver.loading.program import Program, Target
     from solver.loading.settling import Settling
-    from solver.loading.stepper import Report
+    from solver.loading.stepper import Report, Watch
 
     Points = Mapping[str, Converged]
 
@@ -60,6 +60,7 @@ class Walker:
     ----------
     trace : (states at the ends of a lap's stages, by name) -> what is kept of the lap
     settling : how increments are halved; when absent, those of the program are used
+    watch : (converged increment) -> what is kept of it in `Outcome.history`
     report : called after every increment
     """
 
@@ -71,11 +72,12 @@ class Walker:
         trace: Callable[[Points], Any] | None = None,
         settling: Settling | None = None,
         report: Report | None = None,
+        watch: Watch | None = None,
     ) -> None:
         self._system = system
         self._trace = trace
         self._settling = settling
-        self._stepper = Stepper(system, control, report)
+        self._stepper = Stepper(system, control, report, watch)
 
     def walk(self, programs: Sequence[Program]) -> Iterator[Outcome]:
         """Yield the outcome of each program as soon as it is known.
@@ -112,6 +114,7 @@ class Walker:
                 last=walk.point.now,
                 points=walk.points,
                 traces=walk.traces,
+                history=walk.point.history,
                 error=walk.error,
                 settled=settled,
             )
@@ -137,7 +140,8 @@ class Walker:
         reached = self._stepper.elastic(start.point, stages[0].target)
         if reached is None:
             return None
-        back = replace(start.point, tally=reached.tally)
+        history = (*reached.history, *start.point.history[-1:])
+        back = replace(start.point, tally=reached.tally, history=history)
         points = {stages[0].name: reached.now, stages[-1].name: start.point.now}
         return self._closed(replace(start, point=back, points=points), program)
 

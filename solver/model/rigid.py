@@ -42,12 +42,13 @@ class Curve:
     ----------
     points : (2, n) positions [mm]
     quadratic : whether every second point is the middle of a curved edge
-    goes_on : whether the body continues smoothly beyond the ends; contact must not reach them then
+    goes_on : whether the body continues smoothly beyond the start and the end; contact must not
+        reach such an end. On the axis of axisymmetric bodies it never does
     """
 
     points: NDArray[np.float64]
     quadratic: bool = False
-    goes_on: bool = False
+    goes_on: tuple[bool, bool] = (False, False)
 
     def check(self, name: str) -> None:
         """Raise `ModelError` where the points make no chain of edges."""
@@ -69,7 +70,11 @@ def line(start: tuple[float, float], end: tuple[float, float], edges: int = 1) -
 
 
 def arc(
-    centre: tuple[float, float], radius: float, angles: tuple[float, float], edges: int
+    centre: tuple[float, float],
+    radius: float,
+    angles: tuple[float, float],
+    edges: int,
+    goes_on: tuple[bool, bool] = (True, True),
 ) -> Curve:
     """Return an arc of a circle from one angle to another [rad], a part of a larger surface.
 
@@ -77,7 +82,7 @@ def arc(
     """
     angle = np.linspace(*angles, 2 * edges + 1)
     points = np.array(centre)[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
-    return Curve(points=points, quadratic=True, goes_on=True)
+    return Curve(points=points, quadratic=True, goes_on=goes_on)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

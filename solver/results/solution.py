@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -10,11 +11,11 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.contact.system import System
 from solver.errors import ModelError
-from solver.fem.rigid import RigidMotion, RigidPart
 from solver.loading.control import PathControl
 from solver.loading.outcome import Tally
 from solver.loading.walker import Walker
 from solver.results.audit.report import Audit, audit
+from solver.results.history import Observed, observe
 from solver.results.samples import Nodal
 from solver.tensors import to_tensor
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
+    from solver.fem.rigid import RigidMotion
     from solver.model.model import Model
 
 StageName = Literal["loaded", "unloaded"]
@@ -37,6 +39,7 @@ class Solution:
     load : the load factor reached
     loaded, unloaded : the converged states
     tally : its cost
+    history : every increment in a few numbers, the state before the first one too
     """
 
     system: System
@@ -44,6 +47,7 @@ class Solution:
     loaded: Converged
     unloaded: Converged
     tally: Tally
+    history: tuple[Observed, ...] = ()
 
     def _at(self, stage: StageName) -> Converged:
         if stage not in ("loaded", "unloaded"):
@@ -79,28 +83,18 @@ class Solution:
 
     def motion(self, body: str, stage: StageName = "loaded") -> RigidMotion:
         """Return the motion of a rigid body: x, y [mm] and rotation [rad]."""
-        part, u, _ = self._rigid(body, stage)
-        return part.motion_of(u)
+        return self._observed(body, stage).motions[body]
 
     def reaction(self, body: str, stage: StageName = "loaded") -> tuple[float, float, float]:
-        """Return what acts on a rigid body besides contact: forces [N] and moment [N mm].
+        """Return what acts on a rigid body besides contact: forces [N] and moment [N mm]."""
+        return self._observed(body, stage).reactions[body]
 
-        A prescribed motion needs them; where a force is given, it is that force.
-        """
-        part, _, (x, y, turning) = self._rigid(body, stage)
-        return float(x), float(y), float(turning) * part.arm
-
-    def _rigid(
-        self, body: str, stage: StageName
-    ) -> tuple[RigidPart, NDArray[np.float64], NDArray[np.float64]]:
+    def _observed(self, body: str, stage: StageName) -> Observed:
         known = [rigid.name for rigid in self.system.model.rigid]
         if body not in known:
             allowed = "must be a rigid body: " + (", ".join(known) or "the model has none")
             raise ModelError("body", body, allowed)
-        number, converged = self.system.part(body), self._at(stage)
-        part = self.system.parts[number]
-        assert isinstance(part, RigidPart)
-        return part, converged.state.u[number], converged.forces[number]
+        return observe(self.system, self._at(stage))
 
     def audit(self) -> Audit:
         """Return the audit: figures of this solution, violated conditions and warnings."""
@@ -136,7 +130,8 @@ def solve(
             raise ModelError("amplitude", body.name, allowed)
     system = System(model, linear_solver)
     control = control or PathControl(load_step=load / 20)
-    (outcome,) = Walker(system, control).walk([control.program(load)])
+    walker = Walker(system, control, watch=partial(observe, system))
+    (outcome,) = walker.walk([control.program(load)])
     if outcome.error is not None:
         raise outcome.error
     return Solution(
@@ -145,4 +140,5 @@ def solve(
         loaded=outcome.points["loaded"],
         unloaded=outcome.points["unloaded"],
         tally=outcome.tally,
+        history=outcome.history,
     )

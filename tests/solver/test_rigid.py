@@ -12,6 +12,7 @@ from solver import Body, ContactPair, Material, Model, ModelError, solve
 from solver.loading.control import PathControl
 from solver.mesh import graded, grid
 from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc, line
+from solver.results.history import curve
 
 E, NU = 2.0e5, 0.3
 MODULUS = E / (1 - NU**2)
@@ -79,6 +80,14 @@ def test_the_same_displacement_needs_the_same_force(material: Material) -> None:
     assert abs(fx) < 1e-3
     assert abs(moment) < 1e-3
     assert by_depth.motion("punch", "unloaded").y == 0.0
+    time, _, y, *_, force, turning = curve(by_depth.history, "punch")
+    assert time.max() == 1.0
+    assert y == pytest.approx(depth * time)
+    assert force[np.argmax(time)] == pytest.approx(fy)
+    assert np.abs(turning).max() < 1e-3
+    assert (np.diff(force[: np.argmax(time) + 1]) < 0).all()
+    held = [o.reactions["half_plane"][1] for o in by_depth.history]
+    assert held == pytest.approx(-force, abs=1e-4)
     if material is SOFT:
         assert by_depth.plastic_strain("half_plane").max() > 1e-3
     for found in (by_force, by_depth):

@@ -1,0 +1,68 @@
+"""What is kept of every increment: motions of rigid bodies, reactions, forces of contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.rigid import RigidPart
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.fem.rigid import RigidMotion
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """A converged increment in a few numbers.
+
+    Attributes
+    ----------
+    time : of the program; the load factor where loads have no amplitude
+    motions : of each rigid body
+    reactions : forces x, y [N] of the supports and prescribed displacements of each body; on a
+        rigid body all forces but contact, given ones and those that its motion needs, and their
+        moment about its centre [N mm]
+    contact : of each pair, the sums of normal and of tangential forces on the slave [N]
+    """
+
+    time: float
+    motions: Mapping[str, RigidMotion]
+    reactions: Mapping[str, tuple[float, float, float]]
+    contact: Sequence[tuple[float, float]]
+
+
+def observe(system: System, converged: Converged) -> Observed:
+    """Return what is kept of an increment."""
+    state = converged.state
+    motions, reactions = {}, {}
+    for name, part, u, touch, forces in zip(
+        system.all_names, system.parts, state.u, converged.contact_forces, converged.forces,
+        strict=True,
+    ):  # fmt: skip
+        if isinstance(part, RigidPart):
+            motions[name] = part.motion_of(u)
+            x, y, turning = forces
+            reactions[name] = (float(x), float(y), float(turning) * part.arm)
+        elif part.body.axle is None:  # type: ignore[union-attr]
+            # in equilibrium: this holds for a condensed body too, whose supports are inside
+            loads = system.full(name).external(state.time).reshape(-1, 2).sum(axis=0)
+            x, y = -loads - touch.reshape(-1, 2).sum(axis=0)
+            reactions[name] = (float(x), float(y), np.nan)
+    pairs = [(float(c.normal.sum()), float(c.tangential.sum())) for c in state.contacts]
+    return Observed(state.time, motions, reactions, pairs)
+
+
+def curve(history: Sequence[Observed], body: str) -> NDArray[np.float64]:
+    """Return the course of a rigid body.
+
+    Time, displacement x and y [mm], rotation [rad], forces x and y [N], moment [N mm] (7, n).
+    """
+    return np.array([[o.time, *o.motions[body], *o.reactions[body]] for o in history]).T
