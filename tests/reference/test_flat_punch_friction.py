@@ -57,7 +57,7 @@ def constant_elements(friction: float, n: int) -> tuple[Array, Array, Array, Arr
     raise AssertionError("stick and slip do not settle")
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.3, 0.4])
+@pytest.mark.parametrize("friction", [0.2, 0.3, 0.4, 0.5])
 def test_elements_that_know_nothing_of_the_stick_zone_find_the_same(friction: float) -> None:
     edges, p, q, motion = constant_elements(friction, 600)
     slips = motion > 1e-12
