@@ -30,7 +30,7 @@ def by_accuracy(description: str) -> Any:
 
 
 Ratio = Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")]
-Friction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
+Friction = Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")]
 HardeningRatio = Annotated[float, Interval(ge=0.0, le=0.9), Unit("1")]
 Fraction = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
 Stress = Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")]

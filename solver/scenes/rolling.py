@@ -14,7 +14,6 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.2.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,11 +26,11 @@ from solver.results.free_surface import FreeSurface
 from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
-from solver.results.view import View
 from solver.scenes.passes import Trace, passes, shakedown_of
 from solver.scenes.rolling_effort import effort
 from solver.scenes.rolling_model import model
 from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_view import view
 from solver.scenes.scene import Method, Scene, by_increments
 
 if TYPE_CHECKING:
@@ -122,9 +121,6 @@ STEADY_NET_INCREMENT = declare(
 )
 
 
-_SEEN = 4.0  # reach of what is recorded on a track without ends / Hertz half-width
-
-
 def method(parameters: RollingParameters) -> Method:
     """Return how the passes are computed: steadily, or by increments."""
     if not parameters.endless:
@@ -137,46 +133,6 @@ def method(parameters: RollingParameters) -> Method:
 def program(parameters: RollingParameters) -> Program:
     """Return the passes."""
     return parameters.schedule.program
-
-
-def view(parameters: RollingParameters) -> View:
-    """Return where the results are taken: a function of dimensions, not of the mesh."""
-    if parameters.endless:
-        return _around_the_load(parameters.widest.half_width)
-    half, a = parameters.length / 2, parameters.half_width
-    depth = 5 * a
-    edge = math.ceil(half + 2 * a)
-    return View(
-        x=np.linspace(-edge, edge, 2 * edge * 2 + 1),
-        y=-(np.arange(120) + 0.5) * depth / 120,
-        depth=_depths(a),
-        station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.length / 50.0),
-        s=np.linspace(-edge, edge, 8 * edge + 1),
-        profile_body="half_space",
-        surfaces={"half_space": "top"},
-        stages=("loaded", "mid_track", "unloaded"),
-        loaded="mid_track",
-        following=("loaded",),
-    )
-
-
-def _around_the_load(a: float) -> View:
-    """Return where the results of a track without ends are taken, for the half-width a [mm]."""
-    return View(
-        x=a * np.linspace(-_SEEN, _SEEN, 161),
-        y=-(np.arange(120) + 0.5) * 5 * a / 120,
-        depth=_depths(a),
-        station=np.array([0.0]),
-        s=a * np.linspace(-_SEEN, _SEEN, 641),
-        profile_body="half_space",
-        surfaces={"half_space": "top"},
-        stages=("loaded", "unloaded"),
-    )
-
-
-def _depths(a: float) -> NDArray[np.float64]:
-    """Return the depths of profiles for the half-width a [mm]."""
-    return np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)])
 
 
 def settling(parameters: RollingParameters) -> Settling | None:

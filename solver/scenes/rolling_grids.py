@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
+_RECORDED = 30  # least recorded positions in a Hertz half-width
 _ROUNDING = 1e-12
 _HUB = 0.3  # radius of the rigid hub / R
 
@@ -37,6 +38,14 @@ def half_space_nodes(
     deep = graded(_DEEP * a, h, growth, _DEEP * a)
     deeper = deep[-1] + graded(far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[1:]
     return x, -np.concatenate([deep, deeper])[::-1]
+
+
+def recorded_step(a: float) -> float:
+    """Return the distance of recorded positions along a track of given length [mm].
+
+    It is 0.25 mm, halved as often as a small Hertz half-width ``a`` [mm] asks for.
+    """
+    return 0.25 / 2 ** max(0, math.ceil(math.log2(0.25 * _RECORDED / a)))
 
 
 def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:

@@ -19,13 +19,11 @@ if TYPE_CHECKING:
 
     from solver.scenes.rolling_parameters import RollingParameters
 
-_HALF_SPACE = 400.0  # width beyond the fine track, and depth / Hertz half-width
-
 
 def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
     """Return what `half_space_nodes` takes."""
     p, a = parameters, parameters.half_width
-    far = p.length if p.periodic else _HALF_SPACE * a
+    far = p.length if p.periodic else p.half_space_size * a
     return p.fine, far, a, p.element_size, p.growth, p.periodic
 
 
@@ -89,10 +87,6 @@ def _wheel(parameters: RollingParameters) -> Body:
         # without friction no moment turns the wheel: its rotation is prescribed as rolling
         turning = (1 - parameters.given_creepage) * position.value / R
         rotation = Amplitude(position.time, -turned - turning)
-    material = Material(
-        youngs_modulus=parameters.youngs_modulus * parameters.wheel_stiffness,
-        poisson_ratio=parameters.poisson_ratio,
-    )
     axle = Axle(
         centre=(0.0, R),
         radius=R,
@@ -102,7 +96,7 @@ def _wheel(parameters: RollingParameters) -> Body:
         rotation=rotation,
         turned=-turned,
     )
-    return wheel_body(axle, parameters.reach, parameters.element_size, material)
+    return wheel_body(axle, parameters.reach, parameters.element_size, parameters.wheel_material)
 
 
 def model(parameters: RollingParameters) -> Model:

@@ -65,6 +65,11 @@ class RollingParameters(WheelParameters):
         "whether the half-space, as deep as the track is long, repeats itself after each track "
         "length, together with its loads",
     )
+    half_space_size: Annotated[float, Interval(ge=5.0, le=1e5), Unit("1")] = described(
+        400.0,
+        "depth of the half-space under a track of given length, and width beyond it / Hertz "
+        "half-width; a track without ends has 1600",
+    )
     element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = by_accuracy(
         "element side along the track and at the surface"
     )
@@ -109,7 +114,9 @@ class RollingParameters(WheelParameters):
 
     def _check_endless(self) -> None:
         """Raise `ModelError` for what a track without ends cannot have."""
-        for name, usual in (("periodic", False), ("advance_tolerance", 0.0)):
+        for name, usual in (
+            ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
+        ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")
         for name, known in (("yield_condition", ("mises",)), ("hardening", LINEAR)):
@@ -148,6 +155,9 @@ class RollingParameters(WheelParameters):
                 f"make {increments:.0f} increments of press_steps, advance_step and unload_steps; "
                 f"at most {_MOST_INCREMENTS}",
             )  # fmt: skip
+        if self.periodic and self.half_space_size != 400.0:
+            allowed = "must be 400 where the half-space repeats itself"
+            raise ModelError("half_space_size", self.half_space_size, allowed)
         if self.periodic and self.length < _PERIOD * self.half_width:
             raise ModelError(
                 "track", self.track,
@@ -169,13 +179,14 @@ class RollingParameters(WheelParameters):
     def usual(self) -> Mapping[str, float]:
         """Return the elements and increments of an accuracy, in lengths of two digits.
 
-        Errors: docs/accuracy.md.
+        Errors: docs/accuracy.md. The wheel's Poisson ratio is another that may be left out.
         """
         endless, of_length = _ELEMENTS[self.accuracy]
         side = self.mesh_width / endless if self.endless else self.half_width / of_length
         h = self.element_size or float(f"{min(side, _LARGEST):.2g}")
         advance = h / 2 if self.endless else min(h / 2, self.length / 2)
-        return {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
+        sides = {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
+        return {**WheelParameters.usual(self), **sides}
 
     @property
     def endless(self) -> bool:

@@ -83,15 +83,13 @@ def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
 def rim_of(parameters: RollingParameters) -> Rim:
     """Return the rim of the wheel, condensed once for all runs of a process with the same wheel."""
     p = parameters
-    elasticity = p.youngs_modulus * p.wheel_stiffness, p.poisson_ratio
-    return _rim(p.radius, p.widest.reach, p.element_size, *elasticity)
+    return _rim(p.radius, p.widest.reach, p.element_size, p.wheel_material)
 
 
 @lru_cache(maxsize=4)
-def _rim(radius: float, reach: float, h: float, youngs_modulus: float, poisson_ratio: float) -> Rim:
+def _rim(radius: float, reach: float, h: float, material: Material) -> Rim:
     still = Amplitude.constant(0.0)
     axle = Axle(centre=(0.0, radius), radius=radius, force=still, moment=still, position=still)
-    material = Material(youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio)
     return Rim(wheel_body(axle, reach, h, material), "rim")
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.materials.material import Material
 from solver.scenes.material_parameters import ContactParameters
-from solver.scenes.parameters import Friction, Length, described
+from solver.scenes.parameters import Friction, Length, Poisson, described
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +42,9 @@ class WheelParameters(ContactParameters):
     wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
         1.0, "Young's modulus of the wheel / that of the half-space"
     )
+    wheel_poisson_ratio: Poisson = described(
+        None, "Poisson ratio of the wheel; left out, that of the half-space"
+    )
     wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
         0.0, "angle by which the wheel is turned before it is set down"
     )
@@ -55,6 +60,19 @@ class WheelParameters(ContactParameters):
         if self.given_creepage and not prescribed:
             raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
 
+    def usual(self) -> Mapping[str, float]:
+        """Return the values of parameters that may be left out."""
+        return {"wheel_poisson_ratio": self.poisson_ratio}
+
+    @property
+    def wheel_material(self) -> Material:
+        """The elastic material of the wheel."""
+        left_out = self.wheel_poisson_ratio is None
+        return Material(
+            youngs_modulus=self.youngs_modulus * self.wheel_stiffness,
+            poisson_ratio=self.poisson_ratio if left_out else self.wheel_poisson_ratio,
+        )
+
     @property
     def peak_pressure(self) -> float:
         """p0 of the elastic Hertz contact [MPa]."""
@@ -63,8 +81,9 @@ class WheelParameters(ContactParameters):
     @property
     def contact_modulus(self) -> float:
         """E* of wheel and half-space [MPa]."""
-        half = (1 - self.poisson_ratio**2) / self.youngs_modulus
-        return 1 / (half + half / self.wheel_stiffness)
+        own = (1 - self.poisson_ratio**2) / self.youngs_modulus
+        wheel = self.wheel_material
+        return 1 / (own + 1 / wheel.elasticity.plane_strain_modulus)
 
     @property
     def half_width(self) -> float:

@@ -1,0 +1,59 @@
+"""Where the results of rolling are taken."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.view import View
+from solver.scenes.rolling_grids import recorded_step
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.scenes.rolling_parameters import RollingParameters
+
+_SEEN = 4.0  # reach of what is recorded on a track without ends / Hertz half-width
+
+
+def view(parameters: RollingParameters) -> View:
+    """Return where the results are taken: a function of dimensions, not of the mesh."""
+    if parameters.endless:
+        return _around_the_load(parameters.widest.half_width)
+    half, a = parameters.length / 2, parameters.half_width
+    depth = 5 * a
+    edge = math.ceil(half + 2 * a)
+    places = round(edge / recorded_step(a))
+    return View(
+        x=np.linspace(-edge, edge, places + 1),
+        y=-(np.arange(120) + 0.5) * depth / 120,
+        depth=_depths(a),
+        station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.length / 50.0),
+        s=np.linspace(-edge, edge, 2 * places + 1),
+        profile_body="half_space",
+        surfaces={"half_space": "top"},
+        stages=("loaded", "mid_track", "unloaded"),
+        loaded="mid_track",
+        following=("loaded",),
+    )
+
+
+def _around_the_load(a: float) -> View:
+    """Return where the results of a track without ends are taken, for the half-width a [mm]."""
+    return View(
+        x=a * np.linspace(-_SEEN, _SEEN, 161),
+        y=-(np.arange(120) + 0.5) * 5 * a / 120,
+        depth=_depths(a),
+        station=np.array([0.0]),
+        s=a * np.linspace(-_SEEN, _SEEN, 641),
+        profile_body="half_space",
+        surfaces={"half_space": "top"},
+        stages=("loaded", "unloaded"),
+    )
+
+
+def _depths(a: float) -> NDArray[np.float64]:
+    """Return the depths of profiles for the half-width a [mm]."""
+    return np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)])
