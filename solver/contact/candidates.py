@@ -197,7 +197,8 @@ def find_candidates(
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
     it touched, if the rates of its approach are known from the last increment.
     """
-    pairings = [interface.pairing(u) for interface in system.interfaces]
+    time = start.time + span
+    pairings = [interface.pairing(u, time) for interface in system.interfaces]
     vertices = [
         _near(pairing, contact, interface.floating)
         for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)

@@ -26,11 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A contact pair on its two parts.
+    """A contact pair, as it was declared, on its two parts.
 
     ``shear_strength`` is the largest shear it carries at any pressure [MPa].
     """
 
+    declared: ContactPair
     slave: int
     master: int
     slave_surface: Surface
@@ -54,8 +55,12 @@ class Interface:
         """Whether contact has to hold a rigid motion of either part."""
         return any(part.rigid.shape[1] for part in self.parts)
 
-    def pairing(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
-        """Return gap, area and derivative rows at displacements ``u``."""
+    def pairing(self, u: tuple[NDArray[np.float64], ...], time: float = 0.0) -> Pairing:
+        """Return gap, area and derivative rows at displacements ``u`` and a time."""
+        as_meshed = self._as_meshed(u)
+        return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
+
+    def _as_meshed(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
         motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
         if self.reference is not None:
             change = sum(
@@ -122,6 +127,7 @@ def interface_of(
             )  # fmt: skip
     strength = min(part.body.material.shear_yield_stress for part in both)
     return Interface(
+        declared=contact,
         slave=slave,
         master=master,
         slave_surface=slave_surface,

@@ -131,7 +131,9 @@ class System:
     @property
     def has_amplitude(self) -> bool:
         """Whether a load follows an amplitude of its own, not the time."""
-        return any(load.amplitude is not None for load in self._loads)
+        amplitudes = [load.amplitude for load in self._loads]
+        amplitudes += [contact.amplitude for contact in self.model.contacts]
+        return any(amplitude is not None for amplitude in amplitudes)
 
     @property
     def prestressed(self) -> bool:
@@ -210,7 +212,7 @@ class System:
 
     def at_rest(self, state: State) -> State:
         """Return a state without contact forces; vertices that touch stick."""
-        gaps = [interface.pairing(state.u).gap for interface in self.interfaces]
+        gaps = [interface.pairing(state.u, state.time).gap for interface in self.interfaces]
         contacts = (ContactState.at_rest(gap, gap <= self.touching) for gap in gaps)
         return replace(state, contacts=tuple(contacts))
 
@@ -227,7 +229,7 @@ class System:
                 continue
             u[number] = part.placed(time)
             own = [k for k, i in enumerate(self.interfaces) if number in (i.slave, i.master)]
-            gaps = [self.interfaces[k].pairing(tuple(u)).gap for k in own]
+            gaps = [self.interfaces[k].pairing(tuple(u), time).gap for k in own]
             least = min(gap.min() for gap in gaps)
             u[number] = part.lowered(u[number], least)
             for k, gap in zip(own, gaps, strict=True):

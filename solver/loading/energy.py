@@ -18,14 +18,17 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from solver.contact.state import Converged
+    from solver.contact.system import System
     from solver.fem.part import Part
 
 
-def worked(parts: Sequence[Part], before: Converged, now: Converged) -> Energy:
+def worked(system: System, before: Converged, now: Converged) -> Energy:
     """Return the work so far, that of the increment from ``before`` to ``now`` included."""
+    parts = system.parts
     moves = zip(before.state.u, now.state.u, before.forces, now.forces, strict=True)
     work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
     work -= _heat(parts, before, now)
+    work -= _spread(system, before, now)
     so_far = before.energy
     return Energy(
         stored=so_far.stored,
@@ -44,6 +47,16 @@ def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
         grown = part.eigenstrain(times[1]) - part.eigenstrain(times[0])
         if grown.any():
             work += float(((old.stress + new.stress) * grown).sum(axis=0) @ part.volumes) / 2
+    return work
+
+
+def _spread(system: System, before: Converged, now: Converged) -> float:
+    """Return the work of normal forces on the change of gaps that are given [N mm]."""
+    work = 0.0
+    for k, interface in enumerate(system.interfaces):
+        offset = interface.declared.offset
+        force = before.state.contacts[k].normal.sum() + now.state.contacts[k].normal.sum()
+        work += float(force) / 2 * (offset(now.state.time) - offset(before.state.time))
     return work
 
 

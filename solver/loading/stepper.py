@@ -187,7 +187,7 @@ class Stepper:
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began."""
         with one_thread():
-            return replace(now, energy=worked(self.system.parts, before, now))
+            return replace(now, energy=worked(self.system, before, now))
 
     def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
         """Return the point after one more increment."""

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.model.body import Body
 from solver.model.rigid import Pushed, RigidBody
+
+if TYPE_CHECKING:
+    from solver.model.amplitude import Amplitude
 
 LEAST_FRICTION = 1e-10
 """A coefficient of friction up to this value counts as zero. The forces it allows are below the
@@ -39,6 +42,10 @@ class ContactPair:
     sliding : ``small`` pairs the surfaces in their positions before loading, consistent with
         small strains (and exactly linear between changes of status); ``finite`` pairs them
         anew in every iteration
+    gap : by how much the surfaces stand farther apart than they are meshed [mm]
+    interference : by how much they overlap at load factor one, more than they are meshed [mm]: a
+        load, which pushes the bodies apart under friction
+    amplitude : load factor of the interference; when absent, time is the load factor
     """
 
     slave: tuple[str, str]
@@ -46,6 +53,9 @@ class ContactPair:
     friction: float = 0.0
     shear_limit: float = math.inf
     sliding: Literal["small", "finite"] = "small"
+    gap: float = 0.0
+    interference: float = 0.0
+    amplitude: Amplitude | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction >= 0):
@@ -54,6 +64,14 @@ class ContactPair:
             raise ModelError("shear_limit", self.shear_limit, "must be positive")
         if self.sliding not in ("small", "finite"):
             raise ModelError("sliding", self.sliding, "must be small or finite")
+        for name in ("gap", "interference"):
+            if not np.isfinite(getattr(self, name)):
+                raise ModelError(name, getattr(self, name), "must be finite [mm]")
+
+    def offset(self, time: float) -> float:
+        """Return what is added at a time to the distance of the surfaces as meshed [mm]."""
+        factor = time if self.amplitude is None else self.amplitude.at(time)
+        return self.gap - factor * self.interference
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

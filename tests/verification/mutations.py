@@ -139,9 +139,10 @@ def master_stands_still(patch: Patch) -> None:
     """Gaps do not see the master move."""
     pairing = solver.contact.interface.Interface.pairing
 
-    def still(self: Any, u: Any) -> Any:
+    def still(self: Any, u: Any, time: float = 0.0) -> Any:
         number = self.sides[1][0]
-        return pairing(self, tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u)))
+        seen = tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u))
+        return pairing(self, seen, time)
 
     patch.setattr(solver.contact.interface.Interface, "pairing", still)
 

@@ -145,10 +145,11 @@ class Surfaces:
         pressure, shear = ((hats * (f / safe)[ends]).sum(axis=0) for f in (normal, tangential))
         force = partner.faces * (-pressure * n + shear * t)
         true_gap = true.distance(on_slave(xs))
+        offset = self.pair.offset(state.time)
         return Touching(
             area=area,
-            gap=mean((apart * n).sum(axis=0), partner.faces),
-            true_gap=mean(true_gap, true.faces),
+            gap=mean((apart * n).sum(axis=0), partner.faces) + offset,
+            true_gap=mean(true_gap, true.faces) + offset,
             slip=mean((moved * t).sum(axis=0), partner.faces),
             edge=_edge_lengths(slave),
             on_slave=_spread(force, nodes, N, len(slave.nodes)),
