@@ -3,7 +3,8 @@
 Slave edges are cut where the master's vertices project on them, so every integrand is smooth
 on its segment and a uniform pressure passes across non-matching meshes exactly (up to the
 curvature of the edges). Points are projected along the slave's continuous normal field in the
-current configuration; areas are those of the reference configuration.
+current configuration. Gap and slip are means over the reference area: weights that changed with
+the strain would need derivatives of their own.
 
 M.A. Puso, T.A. Laursen, Comput. Methods Appl. Mech. Engng 193 (2004) 601-629; A. Popp et al.,
 Int. J. Numer. Meth. Engng 79 (2009) 1354-1391.
@@ -38,7 +39,8 @@ class Pairing:
 
     Attributes
     ----------
-    area : (n,) integral of the hat over the part that faces the master [mm2]
+    area, deformed : (n,) integral of the hat over the part that faces the master, over the
+        reference and over the current area [mm2]
     covered : (n,) share of the hat that faces the master
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
@@ -48,6 +50,7 @@ class Pairing:
     """
 
     area: NDArray[np.float64]
+    deformed: NDArray[np.float64]
     covered: NDArray[np.float64]
     length: NDArray[np.float64]
     gap: NDArray[np.float64]
@@ -208,11 +211,12 @@ def pair(
     at = at.ravel()
     point, n = on_slave(edge, at)
     eta, distance = _project_on_master(xm, master.edges[partner], point, n)
-    return _integrate(slave, master, edge, partner, at, eta, n, distance, weight)
+    return _integrate(slave, xs, master, edge, partner, at, eta, n, distance, weight)
 
 
 def _integrate(
     slave: Surface,
+    xs: NDArray[np.float64],
     master: Surface,
     edge: NDArray[np.int64],
     partner: NDArray[np.int64],
@@ -226,21 +230,21 @@ def _integrate(
     k = slave.edges.shape[1]
     Ns = shape_functions(xi, k)
     Nm = shape_functions(eta, master.edges.shape[1])
-    jacobian = np.linalg.norm(
-        (slave.X[:, slave.edges[edge]] * shape_derivatives(xi, k)).sum(axis=-1), axis=0
-    )
     bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
-    weight = weight * jacobian * (slave.measure[slave.edges[edge]] * Ns).sum(axis=-1)
-    hats = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
+    hats, deformed_hats = (
+        np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight * _area_per_xi(slave, x, edge, xi)
+        for x in (slave.X, xs)
+    )
     t = np.stack([-n[1], n[0]])
 
     rows = len(slave.edges) + 1
-    area, gap, facing = np.zeros((3, rows))
+    area, deformed, gap, facing = np.zeros((4, rows))
     on_slave = np.zeros((2, rows, len(slave.nodes), 2))
     on_master = np.zeros((2, rows, len(master.nodes), 2))
     for end, hat in enumerate(hats):
         vertex = edge + end
         np.add.at(area, vertex, hat)
+        np.add.at(deformed, vertex, deformed_hats[end])
         np.add.at(facing, vertex, bare[end])
         np.add.at(gap, vertex, hat * distance)
         for kind, direction in enumerate((n, -t)):
@@ -252,18 +256,28 @@ def _integrate(
                 np.add.at(target[kind], (vertex[:, None], nodes), value.swapaxes(0, 1))
 
     length = np.linalg.norm(np.diff(slave.X[:, slave.vertices]), axis=0)
-    full = _hat_sum(length * slave.measure[slave.edges[:, :2]].mean(axis=1) / 2)
+    full = _hat_sum(length * slave.depth(slave.X[:, slave.edges[:, :2]]).mean(axis=1) / 2)
     covered = area > _MIN_COVERED * full
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
     flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in (on_slave, on_master)]
     return Pairing(
         area=np.where(covered, area, 0.0),
+        deformed=np.where(covered, deformed, 0.0),
         covered=facing / _hat_sum(np.ones_like(length)),
         length=_hat_sum(length) / _hat_sum(np.ones_like(length)),
         gap=np.where(covered, gap * scale, np.inf),
         normal=(flat[0][0], flat[1][0]),
         tangent=(flat[0][1], flat[1][1]),
     )
+
+
+def _area_per_xi(
+    surface: Surface, x: NDArray[np.float64], edge: NDArray[np.int64], xi: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the derivative of area along edges, whose nodes are at x (2, n_nodes) [mm2]."""
+    xe, k = x[:, surface.edges[edge]], surface.edges.shape[1]
+    along = np.linalg.norm(_combine(xe, shape_derivatives(xi, k)), axis=0)
+    return np.asarray(along * surface.depth(_combine(xe, shape_functions(xi, k))))
 
 
 def _hat_sum(of_edges: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,26 +14,34 @@ if TYPE_CHECKING:
 
 
 def contact_pressure(
-    system: System, state: State, interface: int
+    system: System, state: State, interface: int, *, deformed: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return pressure and shear on the slave's vertices (n,) [MPa]: means under each hat.
 
     The multiplier field is piecewise linear. Its means under the hats have the same resultant as
     its values at the vertices, without the oscillation of these next to a sharp corner.
+
+    Over the area before loading they are what the stress of the slave, whose strains are small,
+    balances. Over the ``deformed`` area, which both surfaces share, they do not depend on which
+    of them is the slave. The two are one under small sliding.
     """
     contact, chain = state.contacts[interface], system.interfaces[interface].slave_surface
-    area = system.interfaces[interface].pairing(state.u).area
-    safe = np.where(area > 0, area, 1.0)
+    pairing = system.interfaces[interface].pairing(state.u)
+    safe = np.where(pairing.area > 0, pairing.area, 1.0)
     x = chain.X[:, chain.vertices]
     edge = np.linalg.norm(np.diff(x), axis=0)
-    measure = chain.measure[chain.edges[:, :2]]
+    measure = chain.depth(x)
     # consistent mass of the hats on each edge, the depth varying linearly along it
-    left = edge / 12 * (3 * measure[:, 0] + measure[:, 1])
-    right = edge / 12 * (measure[:, 0] + 3 * measure[:, 1])
-    cross = edge / 12 * (measure[:, 0] + measure[:, 1])
+    left = edge / 12 * (3 * measure[:-1] + measure[1:])
+    right = edge / 12 * (measure[:-1] + 3 * measure[1:])
+    cross = edge / 12 * (measure[:-1] + measure[1:])
     mass = np.diag(np.append(left, 0) + np.append(0, right))
     mass += np.diag(cross, 1) + np.diag(cross, -1)
     total = mass.sum(axis=1)
     smooth = mass / np.where(total > 0, total, 1.0)[:, None]
+    if deformed:
+        known = pairing.deformed > 0
+        shrunk = np.divide(pairing.area, pairing.deformed, out=np.ones_like(safe), where=known)
+        smooth = shrunk[:, None] * smooth
     pressure, shear = contact.normal / safe, contact.tangential / safe
     return smooth @ pressure, smooth @ shear

@@ -97,7 +97,7 @@ class RigidPart(Part):
         ends = (starts, starts + step, starts + 1)[: 3 if curve.quadratic else 2]
         nodes = self._first[boundary] + np.arange(count)
         X = self.nodes[:, nodes]
-        depth = 2 * np.pi * X[0] if self._axisymmetric else np.full(count, self.body.thickness)
+        depth = None if self._axisymmetric else self.body.thickness
         on_axis = (np.abs(X[0, [0, -1]]) < _AXIS * self.arm) & self._axisymmetric
         start, end = (on and not axis for on, axis in zip(curve.goes_on, on_axis, strict=True))
         return Surface(nodes, np.stack(ends, axis=1), X, depth, (start, end))

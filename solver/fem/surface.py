@@ -27,15 +27,21 @@ class Surface:
     nodes : (n_nodes,) node numbers in the body
     edges : (n_edges, 2 or 3) positions in ``nodes``: start, end (, middle)
     X : (2, n_nodes) reference positions [mm]
-    measure : (n_nodes,) thickness, or 2 pi r, at the nodes [mm]
+    thickness : across the plane [mm]; None of an axisymmetric body
     goes_on : whether the boundary of the body continues smoothly beyond the start and the end
     """
 
     nodes: NDArray[np.int64]
     edges: NDArray[np.int64]
     X: NDArray[np.float64]
-    measure: NDArray[np.float64]
+    thickness: float | None
     goes_on: tuple[bool, bool] = (False, False)
+
+    def depth(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the depth across the plane at positions x (2, ...): thickness or 2 pi r [mm]."""
+        if self.thickness is None:
+            return np.asarray(2 * np.pi * x[0])
+        return np.full(x.shape[1:], self.thickness)
 
     @property
     def vertices(self) -> NDArray[np.int64]:
@@ -104,10 +110,10 @@ def extract(part: Nodes, boundary: str) -> Surface:
             allowed = "a contact surface of a periodic body must run over the whole period"
             raise ModelError("boundary", boundary, allowed)
         nodes, X, chain = _repeated(part.same[nodes], X, chain)
-    measure = np.broadcast_to(part.measure(X), len(nodes)).astype(float)
+    thickness = None if part.body.kinematics == "axisymmetric" else part.body.thickness
     first, last = edges[order[0]], edges[order[-1]]
     beyond = (_goes_on(part, first, 0), _goes_on(part, last, 1))
-    return Surface(nodes, chain, X, measure, (True, True) if part.period else beyond)
+    return Surface(nodes, chain, X, thickness, (True, True) if part.period else beyond)
 
 
 def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:

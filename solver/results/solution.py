@@ -76,9 +76,14 @@ class Solution:
     def contact(
         self, pair: int = 0, stage: StageName = "loaded"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave."""
+        """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave.
+
+        Positions are those before loading. Under finite sliding the forces are over the deformed
+        area, which both surfaces share; under small sliding over the area before loading.
+        """
         chain = self.system.interfaces[pair].slave_surface
-        pressure, shear = contact_pressure(self.system, self._at(stage).state, pair)
+        state = self._at(stage).state
+        pressure, shear = contact_pressure(self.system, state, pair, deformed=True)
         return chain.X[:, chain.vertices], pressure, shear
 
     def motion(self, body: str, stage: StageName = "loaded") -> RigidMotion:

@@ -126,8 +126,7 @@ class Surfaces:
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)
 
         along = slave.X[:, nodes] * shape_derivatives(xi, slave.edges.shape[1])
-        depth = (slave.measure[nodes] * N).sum(axis=-1)
-        weight = length * depth
+        weight = length * slave.depth(on_slave(slave.X))
         weight *= np.linalg.norm(along.sum(axis=-1), axis=0)
         hats = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
         ends = np.stack([edges, edges + 1])
