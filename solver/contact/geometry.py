@@ -31,6 +31,8 @@ _LAST_STEP = 1e-9
 _BEYOND = 1.5
 _EDGE_TOLERANCE = 1e-8
 _MIN_COVERED = 1e-3
+_STRAIGHT = 1e-6
+"""Turn of the normal [rad] that rounding may make; the sagitta of an element is 1e-7 of it then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,12 @@ def vertex_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float
     n = np.concatenate([start, end[:, -1:]], axis=1)
     n[:, 1:-1] += end[:, :-1]
     return np.asarray(n / np.linalg.norm(n, axis=0))
+
+
+def is_curved(surface: Surface) -> bool:
+    """Whether the normals of a surface turn along it, before any load."""
+    n = np.hstack([_edge_normal(surface.X, surface, xi) for xi in (-1.0, 1.0)])
+    return bool(np.ptp(n, axis=1).max() > _STRAIGHT)
 
 
 def _combine(x: NDArray[np.float64], N: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.geometry import Pairing, pair
+from solver.contact.geometry import Pairing, is_curved, pair
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
 from solver.model.model import effective_friction
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 class Interface:
     """A contact pair, as it was declared, on its two parts.
 
-    ``shear_strength`` is the largest shear it carries at any pressure [MPa].
+    ``shear_strength`` is the largest shear it carries at any pressure [MPa]; ``reference`` is the
+    pairing before loading, which small sliding keeps.
     """
 
     declared: ContactPair
@@ -49,6 +50,11 @@ class Interface:
             (self.slave, self.parts[0], self.slave_surface),
             (self.master, self.parts[1], self.master_surface),
         )
+
+    @property
+    def finite(self) -> bool:
+        """Whether the surfaces are paired anew as they move: what ``auto`` has decided."""
+        return self.reference is None
 
     @property
     def floating(self) -> bool:
@@ -115,7 +121,8 @@ def interface_of(
     check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
     sizes = [float(part.body.box.max()) for part in both]
     reference, reach = None, sizes[0] if np.isfinite(sizes[0]) else sizes[1]
-    if contact.sliding == "small":
+    curved = any(is_curved(chain) for _, chain in sides)
+    if contact.sliding == "small" or (contact.sliding == "auto" and not curved):
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
         reach = largest_overlap(both[0].body, both[1].body)
         reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)

@@ -38,7 +38,8 @@ class ContactState:
         """Return the state of vertices without forces, those that touch sticking."""
         n = len(touching)
         status = np.where(touching, STICK, OPEN)
-        approach = np.stack([gap, np.full(n, np.nan), np.full(n, np.nan)])
+        unknown = np.full(n, np.nan)
+        approach = np.stack([np.where(np.isfinite(gap), gap, np.nan), unknown, unknown])
         return cls(np.zeros(n), np.zeros(n), status, touching, approach, gap)
 
     def halted(self) -> ContactState:

@@ -32,16 +32,23 @@ class ContactPair:
 
     Attributes
     ----------
-    slave, master : ``(body name, boundary name)``. Choose as slave the surface that ends at a
-        corner, else the one that is finer or yields; contact pressure belongs to its vertices
+    slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear belong to the
+        vertices of the slave: around each of them the slave must not enter the master on average.
+        Choose as slave the surface that ends at a corner, else the one that is finer or yields;
+        where none of this tells, either will do
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns
     shear_limit : largest contact shear / initial shear yield stress of the weaker body, at any
         pressure; inf (default) sets no limit. Where friction could carry more than the material,
         the surface layer flows instead of slipping, and its strain grows as the mesh is refined
-    sliding : ``small`` pairs the surfaces in their positions before loading, consistent with
-        small strains (and exactly linear between changes of status); ``finite`` pairs them
-        anew in every iteration
+    sliding : which point of the master a point of the slave meets, and along which normal.
+        ``small``: always the one it faces before loading, as if nothing moved; consistent with
+        small strains, and exactly linear between changes of status. ``finite``: the one it faces
+        as the bodies move and deform, found anew in every iteration; pressure is then force over
+        the deformed area. ``auto`` (default): ``finite`` where either surface is curved or bent
+        before loading, ``small`` where both are straight. Small sliding is wrong where surfaces
+        move along each other by more than an element, or curved ones by more than a hundredth of
+        the contact's length; the audit warns
     gap : by how much the surfaces stand farther apart than they are meshed [mm]
     interference : by how much they overlap at load factor one, more than they are meshed [mm]: a
         load, which pushes the bodies apart under friction
@@ -52,7 +59,7 @@ class ContactPair:
     master: tuple[str, str]
     friction: float = 0.0
     shear_limit: float = math.inf
-    sliding: Literal["small", "finite"] = "small"
+    sliding: Literal["auto", "small", "finite"] = "auto"
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
@@ -62,8 +69,8 @@ class ContactPair:
             raise ModelError("friction", self.friction, "must be finite and at least 0")
         if not self.shear_limit > 0:
             raise ModelError("shear_limit", self.shear_limit, "must be positive")
-        if self.sliding not in ("small", "finite"):
-            raise ModelError("sliding", self.sliding, "must be small or finite")
+        if self.sliding not in ("auto", "small", "finite"):
+            raise ModelError("sliding", self.sliding, "must be auto, small or finite")
         for name in ("gap", "interference"):
             if not np.isfinite(getattr(self, name)):
                 raise ModelError(name, getattr(self, name), "must be finite [mm]")

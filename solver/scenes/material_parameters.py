@@ -123,7 +123,7 @@ class ContactParameters(MaterialParameters):
         self,
         slave: tuple[str, str],
         master: tuple[str, str],
-        sliding: Literal["small", "finite"] = "small",
+        sliding: Literal["auto", "small", "finite"] = "auto",
     ) -> ContactPair:
         """Return a pair of boundaries with this friction."""
         return ContactPair(

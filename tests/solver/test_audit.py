@@ -177,7 +177,9 @@ def test_work_is_found_again_where_contact_spreads(element, friction):
                 pressure={"top": 100.0}, **fields)  # fmt: skip
     base = block("base", np.linspace(0, 4, 25), np.linspace(-4, 0, 9), material=soft,
                  supports={"left": "x", "bottom": "y"}, **fields)  # fmt: skip
-    pair = ContactPair(slave=("ball", "bottom"), master=("base", "top"), friction=friction)
+    # the work is exact where the directions of contact are fixed
+    pair = ContactPair(slave=("ball", "bottom"), master=("base", "top"), friction=friction,
+                       sliding="small")  # fmt: skip
     check = solve(Model(bodies=(ball, base), contacts=(pair,)),
                   control=PathControl(load_step=0.25)).audit()  # fmt: skip
     assert check.passed, check.violations

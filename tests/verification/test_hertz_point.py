@@ -20,7 +20,7 @@ MODULUS = 1 / sum(1 / plane_strain_modulus(m.youngs_modulus, m.poisson_ratio)
                   for m in (BALL, SPACE))  # fmt: skip
 
 
-def press(slave: str, radius: float, sliding: str = "finite") -> Solution:
+def press(slave: str, radius: float, sliding: str = "auto") -> Solution:
     """Press the ball with the force that gives Hertz's contact radius ``radius`` [mm]."""
     force = 4 * MODULUS * radius**3 / (3 * RADIUS)  # K.L. Johnson (1985), eq. 4.22
     h = radius / 10

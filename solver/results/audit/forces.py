@@ -86,7 +86,7 @@ def action_reaction(
     length of the contact).
     """
     scale = _LITTLE * converged.state.force_scale
-    turning = any(pair.surfaces.pair.sliding == "finite" for pair in pairs)
+    turning = any(pair.surfaces.finite for pair in pairs)
     worst = 0.0
     for body in bodies:
         own = [pair for pair in pairs if body.name in pair.bodies]

@@ -26,6 +26,10 @@ _GAP = 2e-3
 """Largest gap allowed / elastic approach."""
 _OVERLAP = (0.02, 2.5e-3)
 """Largest overlap allowed / elastic approach, and / side of an element; the larger one counts."""
+_STRAY = (1.0, 0.01, 5e-3)
+"""What small sliding may leave out: motion along the partner / side of an element and, where a
+surface is curved, / length of the contact; error of the gap / elastic approach. Means weighted with
+the force."""
 _STILL = 1e-3
 """Least slip / elastic approach, in the work that wrong slip is compared with."""
 
@@ -45,7 +49,7 @@ class AuditedPair:
         contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
         self.normal, self.tangential = contact.normal, contact.tangential
         self._closed = self.normal > _PRESSED * converged.state.force_scale
-        self.surfaces = Surfaces(system, self._pair)
+        self.surfaces = Surfaces(system, number)
         self.touching: Touching = self.surfaces.touching(
             converged.state, converged.start, self.normal, self.tangential
         )
@@ -83,6 +87,25 @@ class AuditedPair:
         touching = self._system.touching
         overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
         return {"audit_closed_gap": max(_GAP * self.approach, touching), "audit_overlap": overlap}
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return what small sliding leaves out, where it matters."""
+        if self.surfaces.finite or self.force <= 0.0:
+            return ()
+        share = np.where(self._closed, self.normal, 0.0) / self.force
+        edge, touching = self.touching.edge, self.touching
+        way = float(np.abs(np.nan_to_num(touching.way)) @ share)
+        sides, length = way / float(edge @ share), way / float(edge[self._closed].sum())
+        off = float(np.abs(np.nan_to_num(touching.true_gap - touching.gap)) @ share)
+        found = (sides, length if self.surfaces.curved else 0.0, off / (self.approach or np.inf))
+        if all(value <= limit for value, limit in zip(found, _STRAY, strict=True)):
+            return ()
+        slave, master = (".".join(side) for side in (self._pair.slave, self._pair.master))
+        return (
+            f"{slave} moved {way:.2g} mm along {master}: {sides:.2g} sides of an element, "
+            f"{length:.1%} of the length of contact; gaps differ by {found[2]:.1%} of the elastic "
+            'approach. Small sliding leaves this out: give this pair sliding = "finite"',
+        )
 
     @property
     def _bound(self) -> Array:

@@ -88,7 +88,8 @@ def audit(
     figures |= _strength(system, loaded) | _discretisation(system, states)
     largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
     violations = _violations(system, figures, loaded, pairs)
-    return Audit(figures, violations, warnings(figures, largest))
+    strayed = tuple(text for pair in pairs for text in pair.warnings())
+    return Audit(figures, violations, warnings(figures, largest) + strayed)
 
 
 def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tuple[float, float]:
@@ -155,7 +156,7 @@ def _violations(
     pairs: Sequence[AuditedPair],
 ) -> tuple[str, ...]:
     limits = limits_at(loaded.state.force_scale or 1.0)
-    if any(contact.sliding == "finite" for contact in system.model.contacts):
+    if any(interface.finite for interface in system.interfaces):
         limits["audit_energy"] = _TURNING
     if any(body.travelling for body in system.model.bodies):
         limits["audit_reactions"] = TRAVELLING

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.geometry import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
@@ -69,6 +70,7 @@ class Touching:
     gap : (n,) mean gap under the hat in the kinematics of the pair, NaN without a partner [mm]
     true_gap : (n,) the same on the deformed bodies, from which small sliding may differ [mm]
     slip : (n,) mean slip of the increment [mm]
+    way : (n,) mean motion of the slave along the master since the bodies were at rest [mm]
     edge : (n,) mean length of the edges at a vertex [mm]
     on_slave, on_master : nodal forces (n_nodes, 2) equivalent to the contact forces [N]
     """
@@ -77,6 +79,7 @@ class Touching:
     gap: Array
     true_gap: Array
     slip: Array
+    way: Array
     edge: Array
     on_slave: Array
     on_master: Array
@@ -85,13 +88,16 @@ class Touching:
 class Surfaces:
     """The two surfaces of a contact pair, on the whole bodies."""
 
-    def __init__(self, system: System, pair: ContactPair) -> None:
+    def __init__(self, system: System, number: int) -> None:
         self._system = system
-        self.pair = pair
+        self.pair: ContactPair = system.model.contacts[number]
+        self.finite = system.interfaces[number].finite
+        pair = self.pair
         self.slave, self.master = (
             system.chain(name, boundary) for name, boundary in (pair.slave, pair.master)
         )
 
+        self.curved = is_curved(self.slave) or is_curved(self.master)
         bodies = [system.model.body(name) for name, _ in (pair.slave, pair.master)]
         self._overlap = largest_overlap(*bodies)
         narrow = [float(body.box.min()) for body in bodies]
@@ -106,7 +112,7 @@ class Surfaces:
         """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
         slave, master = self.slave, self.master
         (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
-        small = self.pair.sliding == "small"
+        small = not self.finite
         edges, xi, length = _points(
             slave, slave.X if small else xs, master, master.X if small else xm
         )
@@ -124,6 +130,7 @@ class Surfaces:
         t = np.stack([-n[1], n[0]])
         apart = partner.of(xm) - on_slave(xs)
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)
+        since = on_slave(xs - slave.X) - partner.of(xm - master.X)
 
         along = slave.X[:, nodes] * shape_derivatives(xi, slave.edges.shape[1])
         weight = length * slave.depth(on_slave(slave.X))
@@ -150,6 +157,7 @@ class Surfaces:
             gap=mean((apart * n).sum(axis=0), partner.faces) + offset,
             true_gap=mean(true_gap, true.faces) + offset,
             slip=mean((moved * t).sum(axis=0), partner.faces),
+            way=mean((since * t).sum(axis=0), partner.faces),
             edge=_edge_lengths(slave),
             on_slave=_spread(force, nodes, N, len(slave.nodes)),
             on_master=_spread(-force, partner.nodes, partner.shape, len(master.nodes)),

@@ -1,0 +1,105 @@
+"""Which sliding a contact pair has, and when small sliding is warned of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import (
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    ModelError,
+    Moved,
+    Pushed,
+    RigidBody,
+    Solution,
+    System,
+    solve,
+)
+from solver.mesh import grid, mapped
+from solver.model.rigid import Curve, arc, line
+from tests.verification.test_hertz_point import press
+
+STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
+PAIR = {"slave": ("block", "top"), "master": ("plate", "base")}
+
+
+def block(bend: float = 0.0, element: str = "quad8") -> Body:
+    """A block of width 8 whose top is bent to y = bend x²."""
+
+    def arch(p: np.ndarray) -> np.ndarray:
+        return np.stack([p[0], p[1] + bend * p[0] ** 2 * (p[1] + 4) / 4])
+
+    mesh = mapped(grid(np.linspace(-4, 4, 17), np.linspace(-4, 0, 9)), arch)
+    return Body(name="block", mesh=mesh, element=element, material=STEEL,
+                supports={"bottom": "xy"})  # fmt: skip
+
+
+def plate(surface: Curve, way: float = 0.0) -> RigidBody:
+    return RigidBody(name="plate", surfaces={"base": surface}, x=Moved(value=way),
+                     y=Pushed(value=-100.0))  # fmt: skip
+
+
+STRAIGHT = line((-2.0, 0.0), (2.0, 0.0))
+ROUND = arc((0.0, 50.0), 50.0, (-np.pi / 2 - 0.05, -np.pi / 2 + 0.05), 20)
+KINKED = Curve(points=np.array([[-2.0, 0.0, 2.0], [0.1, 0.0, 0.1]]))
+
+
+def finite(body: Body, surface: Curve, sliding: str = "auto") -> bool:
+    pair = ContactPair(**PAIR, sliding=sliding)
+    (interface,) = System(
+        Model(bodies=(body,), rigid=(plate(surface),), contacts=(pair,))
+    ).interfaces
+    return interface.finite
+
+
+@pytest.mark.parametrize("element", ["quad8", "quad4"])
+def test_auto_is_small_where_both_surfaces_are_straight_and_else_finite(element: str) -> None:
+    assert ContactPair(**PAIR).sliding == "auto"
+    assert not finite(block(element=element), STRAIGHT)
+    assert finite(block(-1e-3, element), STRAIGHT)
+    assert finite(block(element=element), ROUND)
+    assert finite(block(element=element), KINKED)
+
+
+def test_a_slope_is_straight() -> None:
+    """Rounding of inclined positions does not count as a turn of the normals."""
+    slope = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    mesh = mapped(grid(np.linspace(-4, 4, 17), np.linspace(-4, 0, 9)), lambda p: slope @ p)
+    body = Body(name="block", mesh=mesh, material=STEEL, supports={"bottom": "xy"})
+    ends = slope @ np.array([[-2.0, 2.0], [0.0, 0.0]])
+    assert not finite(body, line(tuple(ends[:, 0]), tuple(ends[:, 1])))
+
+
+def test_what_is_asked_for_is_taken() -> None:
+    assert finite(block(), STRAIGHT, "finite")
+    assert not finite(block(-1e-3), ROUND, "small")
+    with pytest.raises(ModelError, match="must be auto, small or finite"):
+        ContactPair(**PAIR, sliding="large")
+
+
+def slid(way: float, sliding: str = "auto") -> Solution:
+    pair = ContactPair(**PAIR, sliding=sliding)
+    return solve(Model(bodies=(block(),), rigid=(plate(STRAIGHT, way),), contacts=(pair,)))
+
+
+def test_surfaces_that_slide_by_more_than_an_element_are_warned_of() -> None:
+    """Elements of 0.5 mm."""
+    (text,) = slid(0.8).audit().warnings
+    assert text.startswith("block.top moved 0.8 mm along plate.base: 1.6 sides of an element")
+    assert text.endswith('give this pair sliding = "finite"')
+    assert slid(0.1).audit().warnings == ()
+    assert slid(0.8, "finite").audit().warnings == ()
+
+
+@pytest.mark.parametrize("slave", ["ball", "space"])
+def test_curved_surfaces_are_warned_of_where_small_sliding_changes_the_pressure(
+    slave: str,
+) -> None:
+    """Deep in the half-space by 4 %, where they move by 1 % of the contact length."""
+    (text,) = press(slave, 1.0, sliding="small").audit().warnings
+    assert "of the length of contact" in text
+    assert press(slave, 1.0).audit().warnings == ()
+    assert press(slave, 0.25, sliding="small").audit().warnings == ()
