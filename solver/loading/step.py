@@ -67,6 +67,7 @@ def newton_step(
             offset=motion,
             friction=candidates.friction,
             limit=candidates.limit,
+            cohesion=candidates.cohesion,
             A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
             balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
         ),

@@ -114,6 +114,10 @@ class ContactParameters(MaterialParameters):
         0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
     )
 
+    cohesion: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
+        0.0, "contact shear beyond friction * pressure; no more than the pressure itself"
+    )
+
     @property
     def frictionless(self) -> bool:
         """Whether the contact is solved without friction."""
@@ -131,6 +135,7 @@ class ContactParameters(MaterialParameters):
             master=master,
             friction=self.friction,
             shear_limit=self.shear_limit or math.inf,
+            cohesion=self.cohesion,
             sliding=sliding,
         )
 

@@ -95,9 +95,9 @@ class RollingParameters(WheelParameters):
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
-        if self.shear_limit and self.load == "hertz":
-            allowed = "must be 0: load = hertz prescribes the shear"
-            raise ModelError("shear_limit", self.shear_limit, allowed)
+        for name in ("shear_limit", "cohesion") if self.load == "hertz" else ():
+            if value := getattr(self, name):
+                raise ModelError(name, value, "must be 0: load = hertz prescribes the shear")
         if self.element_size > self.half_width / 2:
             raise ModelError(
                 "element_size", self.element_size,
@@ -116,6 +116,7 @@ class RollingParameters(WheelParameters):
         """Raise `ModelError` for what a track without ends cannot have."""
         for name, usual in (
             ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
+            ("cohesion", 0.0),
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")
