@@ -31,14 +31,13 @@ def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float
     ModelError
         no cell lies inside, none outside, or one lies across a side
     """
-    low, high = np.array([x, y], dtype=float).T[:, :, None]
+    (low, high), corners = np.array([x, y], dtype=float).T[:, :, None], mesh.p[:, mesh.t]
     slack = _SAME * float(np.ptp(mesh.p, axis=1).max())
-    corners = mesh.p[:, mesh.t]
-    inside = ((corners > low[:, None] - slack) & (corners < high[:, None] + slack)).all(axis=(0, 1))
-    middle = corners.mean(axis=1)
-    covered = ((middle > low) & (middle < high)).all(axis=0)
+    least, most = corners.min(axis=1), corners.max(axis=1)
+    inside = ((least > low - slack) & (most < high + slack)).all(axis=0)
+    touched = ((least < high - slack) & (most > low + slack)).all(axis=0)
     rectangle = f"x {x[0]:g} to {x[1]:g}, y {y[0]:g} to {y[1]:g}"
-    if (covered & ~inside).any():
+    if (touched & ~inside).any():
         raise ModelError(name, rectangle, "must have its sides along lines of the mesh")
     if inside.all() or not inside.any():
         raise ModelError(name, rectangle, "must hold some cells of the mesh, and leave some")

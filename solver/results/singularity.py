@@ -30,12 +30,12 @@ SINGULAR_INTENSITY = declare(
     "contact pressure / mean pressure of the singular term alone, one half-width from the corner",
 )
 APPARENT_POWER = declare(
-    "apparent_power", "power that contact pressure seems to have, 0.01 to 0.1 from the corner"
+    "apparent_power",
+    "power that contact pressure seems to have, 0.01 to 0.1 half-widths from the corner",
 )
 
-_NEXT = 1.0
-"""Exponent of the next term of the series above the first one."""
-_OTHER_NEXT = (0.5, 1.5)
+_OTHERS = (0.5, 1.5)
+"""Exponents of the next term that are tried too / that given."""
 _FEWEST = 5
 """Points for three unknowns."""
 
@@ -52,53 +52,47 @@ class Singularity:
 NOWHERE = Singularity(power=np.nan, error=np.nan, intensity=np.nan)
 
 
-def fit_singularity(r: Array, stress: Array, low: float, high: float) -> Singularity:
+def fit_singularity(
+    r: Array, stress: Array, low: float, high: float, above: float = 1.0
+) -> Singularity:
     """Return the singular term of stress sampled near a corner.
 
     1. Points at ``low <= r <= high`` count. ``low`` is to be ten elements or more, as elements
        at the corner do not resolve the stress; ``high`` is to be small beside the distance of
        whatever else shapes the field: an edge, a groove, the end of a zone of slip.
-    2. ``ln stress = ln C + (p - 1) ln r + b r^q`` with q = 1 is fitted by least squares, all points
-       alike: points at even steps of ln r weigh all scales alike.
-    3. The error is the largest change of p when q is 0.5 or 1.5, or when the inner or the outer
-       third of the range, in ln r, is left out; or the standard error of the fit, where larger.
+    2. ``ln stress = ln C + (p - 1) ln r + b r^q`` with q = ``above`` is fitted by least squares.
+       A point weighs as much as the part of the axis of ln r that it stands for.
+    3. The error is the largest change of p when q is half as large or 1.5 times as large, or when
+       the inner or the outer third of the range, in ln r, is left out; or the standard error of
+       the fit, where larger. An error that elements make all over the range is not in it.
 
     Parameters
     ----------
     r : (n,) distances from the corner
     stress : (n,) of one sign; the unit is that of ``Singularity.intensity``
     low, high : range of r of the fit
+    above : exponent of the next term of the series above the first, as far as it is known
 
     Returns
     -------
     Singularity : all NaN where the range holds fewer than five points, or stress of both signs
     """
-    within = (r >= low) & (r <= high)
-    r, stress = r[within], stress[within]
-    if len(r) < _FEWEST or stress.min() <= 0.0 <= stress.max():
+    points = _logarithms(r, stress, low, high)
+    if points is None:
         return NOWHERE
-    x, y = np.log(r), np.log(np.abs(stress))
-    scale = np.log(high)
-    best, deviation = _fit(x, y, _NEXT, scale)
-    others = [_fit(x, y, exponent, scale)[0] for exponent in _OTHER_NEXT]
-    third = (np.log(high) - np.log(low)) / 3
+    x = points[0]
+    best, deviation = _fit(points, high, above)
+    others = [_fit(points, high, share * above)[0] for share in _OTHERS]
+    third = np.log(high / low) / 3
     for part in (x <= np.log(high) - third, x >= np.log(low) + third):
         if part.sum() >= _FEWEST:
-            others.append(_fit(x[part], y[part], _NEXT, scale)[0])
+            others.append(_fit(points[:, part], high, above)[0])
     change = max(abs(other[1] - best[1]) for other in others)
     return Singularity(
         power=float(1 + best[1]),
         error=float(max(change, deviation)),
-        intensity=float(np.exp(best[0]) * np.sign(stress[0])),
+        intensity=float(np.exp(best[0]) * np.sign(stress[np.argmin(np.abs(r - high))])),
     )
-
-
-def _fit(x: Array, y: Array, exponent: float, scale: float) -> tuple[Array, float]:
-    """Return ln C, p - 1 and b of points (ln r, ln stress), and the standard error of p."""
-    A = np.stack([np.ones_like(x), x, np.exp(exponent * (x - scale))], axis=1)
-    found, *_ = np.linalg.lstsq(A, y)
-    spread = ((A @ found - y) ** 2).sum() / max(len(x) - A.shape[1], 1)
-    return found, float(np.sqrt(spread * np.linalg.inv(A.T @ A)[1, 1]))
 
 
 def apparent_power(r: Array, stress: Array, low: float, high: float) -> float:
@@ -107,8 +101,27 @@ def apparent_power(r: Array, stress: Array, low: float, high: float) -> float:
     It is what one measures who sees the stress between ``low`` and ``high`` only. NaN where that
     range holds fewer than five points, or stress of both signs.
     """
+    points = _logarithms(r, stress, low, high)
+    return float("nan") if points is None else float(1 + _fit(points, high)[0][1])
+
+
+def _logarithms(r: Array, stress: Array, low: float, high: float) -> Array | None:
+    """Return ln r, ln |stress| and weights (3, n) of the points in a range, where they will do."""
     within = (r >= low) & (r <= high)
-    r, stress = r[within], stress[within]
+    order = np.argsort(r[within])
+    r, stress = r[within][order], stress[within][order]
     if len(r) < _FEWEST or stress.min() <= 0.0 <= stress.max():
-        return float("nan")
-    return 1.0 + float(np.polyfit(np.log(r), np.log(np.abs(stress)), 1)[0])
+        return None
+    x = np.log(r)
+    return np.stack([x, np.log(np.abs(stress)), np.gradient(x)])
+
+
+def _fit(points: Array, high: float, *exponents: float) -> tuple[Array, float]:
+    """Return ln C, p - 1 and b for each exponent q, and the standard error of p."""
+    x, y, weight = points
+    terms = [np.exp(exponent * (x - np.log(high))) for exponent in exponents]
+    root = np.sqrt(weight / weight.mean())
+    A, b = root[:, None] * np.stack([np.ones_like(x), x, *terms], axis=1), root * y
+    found, *_ = np.linalg.lstsq(A, b)
+    spread = ((A @ found - b) ** 2).sum() / max(len(x) - A.shape[1], 1)
+    return found, float(np.sqrt(spread * np.linalg.inv(A.T @ A)[1, 1]))

@@ -14,7 +14,8 @@ The load grows in proportion, the bodies are linear and touch without a gap, so 
 proportion too: one increment is exact, friction included.
 
 P. Marek, PhD thesis, Warsaw University of Technology (1995), section 4.4.2. The outer dimensions
-and the shape of the grooves are not given there.
+and the shape of the grooves are not given there. A half-plane of 100 a makes the part that sticks
+less than 0.01 a too wide, one of 40 a by 0.01 a.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ from solver.results.stick import stick
 from solver.results.view import View
 from solver.scenes.effort import Effort
 from solver.scenes.flat_punch import (
+    FACING,
     FlatPunch,
     Groove,
     Growth,
@@ -68,12 +70,14 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "standard": {"smallest_element": 1 / 9000, "growth": 1.3},
     "fine": {"smallest_element": 1 / 30000, "growth": 1.2},
 }
-_LARGEST = 0.02  # of a, under the punch: the end of the part that sticks is known to half of it
+_LARGEST = 0.01  # of a, under the punch: the end of the part that sticks is known to half of it
 _MIDDLE = 0.002  # of a: with friction 0.1 only 0.02 a sticks
 _NEAREST, _FARTHEST = 10.0, 0.03
 """Range of the fit: elements at the corner, and half-widths from it."""
 _SHARE = 0.25
 """Largest range of the fit / distance of a groove, or of the end of slip."""
+_NOTCH = 0.364
+"""Difference of the first two powers at a corner that sticks: a notch of 270 degrees (Williams)."""
 _SEEN = (0.01, 0.1)
 """Range in which the apparent power is taken / a."""
 
@@ -92,7 +96,7 @@ class ElasticPunchParameters(ElasticParameters):
     )
     half_width: Length = described(50.0, "half-width a of the punch")
     punch_height: PunchHeight = described(2.0, "height of the punch / a")
-    half_plane_size: HalfPlaneSize = described(40.0, "width and depth of the half-plane / a")
+    half_plane_size: HalfPlaneSize = described(100.0, "width and depth of the half-plane / a")
     punch_groove: GrooveSize = described(
         0.0, "width and depth D of a groove in the side of the punch / a; 0 leaves it out"
     )
@@ -160,7 +164,7 @@ def model(parameters: ElasticPunchParameters) -> Model:
     )
     pair = ContactPair(
         slave=("punch", "bottom"),
-        master=("half_plane", geometry.facing),
+        master=("half_plane", FACING),
         friction=parameters.friction,
     )
     return Model(bodies=bodies, contacts=(pair,))
@@ -198,7 +202,7 @@ def view(parameters: ElasticPunchParameters) -> View:
         station=np.zeros(1),
         s=a * np.concatenate([1.0 - inside[::-1], [1.0], 1.0 + outside]),
         profile_body="half_plane",
-        surfaces={"punch": "bottom", "half_plane": parameters.geometry.facing},
+        surfaces={"punch": "bottom", "half_plane": FACING},
         symmetric=True,
     )
 
@@ -208,7 +212,8 @@ def corner(look: Look) -> Values:
 
     Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
     a quarter of the way to a groove or to the end of slip, where that is less. NaN where the corner
-    has lifted off.
+    has lifted off. Stress in the half-plane would be a worse measure: a uniform stress along its
+    surface, which has no part in the pressure, is a term only 1 - p above the first.
     """
     parameters, points = look.parameters, _points(look)
     r = 1 - points.x / parameters.half_width
@@ -217,7 +222,8 @@ def corner(look: Look) -> Values:
     if points.closed[-1]:
         low = _NEAREST * parameters.smallest_element
         high = min(_FARTHEST, _SHARE * _next_feature(parameters, points, r))
-        found = fit_singularity(r, pressure, low, high)
+        above = _NOTCH if points.sticking[-1] else 1.0
+        found = fit_singularity(r, pressure, low, high, above)
         apparent = apparent_power(r, pressure, *_SEEN)
     return {
         SINGULAR_POWER: found.power,

@@ -37,7 +37,10 @@ Growth = Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")]
 _PUNCH_LARGEST = 0.25  # of a, up the punch
 _GROOVE_ELEMENT = 0.02  # of the groove
 _LIGAMENT_ELEMENT = 0.2  # of what a groove leaves between itself and the contact
+_BEYOND = 0.1  # of a, beyond the corner
 _MOST_ELEMENTS = 60_000
+FACING = "contact"
+"""Boundary of the half-plane that may touch the punch."""
 
 
 class Groove(NamedTuple):
@@ -103,9 +106,11 @@ class FlatPunch:
         return _lines(self)
 
     @property
-    def facing(self) -> str:
-        """Boundary of the half-plane that may touch the punch: its top, as far as a groove."""
-        return "contact" if self.half_plane_groove else "top"
+    def reach(self) -> float:
+        """How far from the middle the half-plane may touch the punch [mm]: beyond the corner."""
+        beyond = _BEYOND * self.half_width
+        groove = self.half_plane_groove
+        return self.half_width + (min(beyond, groove.distance) if groove else beyond)
 
     def lattices(self, element: str) -> tuple[Lattice, Lattice]:
         """Return what the grids of punch and half-plane have, grooves not counted."""
@@ -129,8 +134,7 @@ class FlatPunch:
     def facing_nodes(self, element: str) -> int:
         """Return the number of nodes of the half-plane that the punch may touch."""
         under, beyond, *_ = self.lines
-        reach = self.half_plane_groove.distance if self.half_plane_groove else self.size
-        columns = len(under) - 1 + _between(beyond, self.half_width, self.half_width + reach)
+        columns = len(under) - 1 + _between(beyond, self.half_width, self.reach)
         return lattice(columns, 1, element).along
 
     def check_elements(self, given: float) -> None:
@@ -151,8 +155,8 @@ class FlatPunch:
         half_plane = grid(np.concatenate([under, beyond[1:]]), down, cells)
         if groove := self.punch_groove:
             punch = without(punch, "groove", (a - groove.side, a), (groove.distance, groove.end))
+        half_plane = with_middle(half_plane, FACING, self.reach)
         if groove := self.half_plane_groove:
-            half_plane = with_middle(half_plane, self.facing, a + groove.distance)
             sides = (a + groove.distance, a + groove.end)
             half_plane = without(half_plane, "groove", sides, (-groove.side, 0.0))
         return punch, half_plane
