@@ -74,6 +74,8 @@ _LARGEST = 0.01  # of a, under the punch: the end of the part that sticks is kno
 _MIDDLE = 0.002  # of a: with friction 0.1 only 0.02 a sticks
 _NEAREST, _FARTHEST = 10.0, 0.03
 """Range of the fit: elements at the corner, and half-widths from it."""
+_GRADED = 0.9
+"""Largest range of the fit / distance within which elements grow."""
 _SHARE = 0.25
 """Largest range of the fit / distance of a groove, or of the end of slip."""
 _NOTCH = 0.364
@@ -211,8 +213,10 @@ def corner(look: Look) -> Values:
     """Return the power of the singularity with its error, its intensity, and the apparent power.
 
     Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
-    a quarter of the way to a groove or to the end of slip, where that is less. NaN where the corner
-    has lifted off. Stress in the half-plane would be a worse measure: a uniform stress along its
+    nine tenths of where elements grow, or a quarter of the way to a groove or to the end of slip,
+    where that is less. Where elements grow in proportion to the distance, their error is the same
+    share of the pressure everywhere, and has no part in its power. NaN where the corner has lifted
+    off. Stress in the half-plane would be a worse measure: a uniform stress along its
     surface, which has no part in the pressure, is a term only 1 - p above the first.
     """
     parameters, points = look.parameters, _points(look)
@@ -221,7 +225,8 @@ def corner(look: Look) -> Values:
     found, apparent = NOWHERE, np.nan
     if points.closed[-1]:
         low = _NEAREST * parameters.smallest_element
-        high = min(_FARTHEST, _SHARE * _next_feature(parameters, points, r))
+        graded = _GRADED * parameters.geometry.graded / parameters.half_width
+        high = min(_FARTHEST, graded, _SHARE * _next_feature(parameters, points, r))
         above = _NOTCH if points.sticking[-1] else 1.0
         found = fit_singularity(r, pressure, low, high, above)
         apparent = apparent_power(r, pressure, *_SEEN)

@@ -106,6 +106,11 @@ class FlatPunch:
         return _lines(self)
 
     @property
+    def graded(self) -> float:
+        """Distance from the corner within which elements grow in proportion to it [mm]."""
+        return self.largest / (self.growth - 1)
+
+    @property
     def reach(self) -> float:
         """How far from the middle the half-plane may touch the punch [mm]: beyond the corner."""
         beyond = _BEYOND * self.half_width

@@ -180,14 +180,13 @@ class RollingParameters(WheelParameters):
     def usual(self) -> Mapping[str, float]:
         """Return the elements and increments of an accuracy, in lengths of two digits.
 
-        Errors: docs/accuracy.md. The wheel's Poisson ratio is another that may be left out.
+        Errors: docs/accuracy.md.
         """
         endless, of_length = _ELEMENTS[self.accuracy]
         side = self.mesh_width / endless if self.endless else self.half_width / of_length
         h = self.element_size or float(f"{min(side, _LARGEST):.2g}")
         advance = h / 2 if self.endless else min(h / 2, self.length / 2)
-        sides = {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
-        return {**WheelParameters.usual(self), **sides}
+        return {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
 
     @property
     def endless(self) -> bool:

@@ -25,6 +25,7 @@ CASES: list[tuple[str, dict[str, Any]]] = [
     ("punch", COARSE | {"elastic_punch": True}),
     ("punch", {"smallest_element": 0.003, "growth": 1.6}),
     ("elastic_punch", PLAIN),
+    ("rigid_punch", {"accuracy": "draft"}),
     ("elastic_punch", PLAIN | {"element": "quad9", "punch_groove": 0.3, "friction": 0.1}),
     ("elastic_punch", PLAIN | {"element": "tri3", "half_plane_groove": 0.5, "xi": 0.4}),
     ("rolling", ROUGH),
