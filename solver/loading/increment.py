@@ -33,7 +33,7 @@ from solver.loading.control import Tolerances
 from solver.loading.flow import Flow, adrift, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
-from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts
+from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -123,8 +123,8 @@ class Increment:
             hopeless |= error > _DIVERGED * best
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
-            balanced = error < tolerances.residual and violation < tolerances.contact
-            if balanced and candidates.beyond >= 0:
+            exact = error < tolerances.residual or 0 < error * scale <= rounding(self.system, u)
+            if exact and violation < tolerances.contact and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             first = len(_BLENDS) - 1 if elastic_first else int(self._softened)

@@ -96,6 +96,12 @@ def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
     return float(np.sqrt(sum(float(v @ v) for v in vectors)))
 
 
+def rounding(system: System, u: Vectors) -> float:
+    """Return how large out-of-balance forces can be that are rounding [N]."""
+    each = zip(system.parts, u, strict=True)
+    return float(np.hypot.reduce([part.rounding(ui) for part, ui in each]))
+
+
 def apart(system: System, candidates: Candidates) -> str:
     """Return a message on bodies that contact alone holds but that do not touch; else empty."""
     floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
