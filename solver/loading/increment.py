@@ -12,9 +12,8 @@ From the last converged state, at the current displacements:
 5. line search on the plastic residual, contact forces interpolated
 6. converged when the residual, contact forces included, and the contact conditions vanish
 
-Without a prediction (a line through the last two states, or an earlier increment carried along with
-a load that moves) the first iteration uses the elastic operator: after a reversal of load a plastic
-tangent of the step before would diverge.
+Without a prediction the first iteration uses the elastic operator: after a reversal of load a
+plastic tangent of the step before would diverge.
 """
 
 from __future__ import annotations
@@ -51,6 +50,7 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
+_ROUNDED = 1e-6
 _MOVING = 0.01
 """Last step / displacements of the increment, above which the bodies are still moving."""
 _LATE = 1
@@ -123,8 +123,10 @@ class Increment:
             hopeless |= error > _DIVERGED * best
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
-            exact = error < tolerances.residual or 0 < error * scale <= rounding(self.system, u)
-            if exact and violation < tolerances.contact and candidates.beyond >= 0:
+            # a body that flows far moves far: not all that is out of balance may be rounding
+            balanced = error < tolerances.residual
+            balanced |= error < _ROUNDED and 0 < error * scale <= rounding(self.system, u)
+            if balanced and violation < tolerances.contact and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             first = len(_BLENDS) - 1 if elastic_first else int(self._softened)

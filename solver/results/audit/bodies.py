@@ -62,6 +62,11 @@ class AuditedBody:
         return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
 
     @property
+    def force_level(self) -> float:
+        """The largest force level met so far [N]."""
+        return self._converged.state.force_scale
+
+    @property
     def rounding(self) -> float:
         """How large nodal forces can be that are rounding [N]."""
         u = self._system.displacement(self.name, self._converged.state)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_ROUNDED = 1e-5
+"""Largest rounding of nodal forces that is left out / force level."""
 _LITTLE = 1e-4
 """Contact force / force level, below which errors are compared with this level instead."""
 
@@ -50,8 +52,12 @@ def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converge
 
 
 def _beyond_rounding(body: AuditedBody, force: Array) -> float:
-    """Return the size of the forces (n_nodes, 2) on free unknowns, less what is rounding [N]."""
-    return max(float(np.linalg.norm(force[body.free])) - body.rounding, 0.0)
+    """Return the size of the forces (n_nodes, 2) on free unknowns, less what is rounding [N].
+
+    Rounding counts up to a share of the force level: a body that has flowed far moves far.
+    """
+    rounding = min(body.rounding, _ROUNDED * body.force_level)
+    return max(float(np.linalg.norm(force[body.free])) - rounding, 0.0)
 
 
 def left_on(bodies: Sequence[AuditedBody]) -> float:
