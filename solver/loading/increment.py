@@ -50,7 +50,6 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
-_ROUNDED = 1e-6
 _MOVING = 0.01
 """Last step / displacements of the increment, above which the bodies are still moving."""
 _LATE = 1
@@ -125,7 +124,8 @@ class Increment:
                 break
             # a body that flows far moves far: not all that is out of balance may be rounding
             balanced = error < tolerances.residual
-            balanced |= error < _ROUNDED and 0 < error * scale <= rounding(self.system, u)
+            little = 0 < error < _UNBALANCED * tolerances.residual
+            balanced |= little and error * scale <= rounding(self.system, u)
             if balanced and violation < tolerances.contact and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
