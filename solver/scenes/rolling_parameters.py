@@ -29,7 +29,9 @@ _ELEMENTS: Mapping[Accuracy, tuple[int, int]] = {
 _GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.15**0.5}
 _LARGEST = 100.0  # element side [mm]
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
-_SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
+_SINKS = (
+    0.65  # touches beyond the track / (Hertz half-width * load ratio), where the wheel sinks in
+)
 _PERIOD = 6.0  # least length of a track that repeats itself / Hertz half-width
 _LONGEST_REACH = 0.8  # of half the rim
 _MOST_INCREMENTS = 100_000
@@ -201,7 +203,12 @@ class RollingParameters(WheelParameters):
     @property
     def margin(self) -> float:
         """Length beyond the end of the track that may come into contact [mm]."""
-        return max(_MARGIN, _SINKS * self.load_ratio) * self.half_width
+        return max(_MARGIN * self.half_width, self.spread)
+
+    @property
+    def spread(self) -> float:
+        """How far beyond the end of the track a wheel that sinks in may touch [mm]."""
+        return _SINKS * self.load_ratio * self.half_width
 
     @property
     def reach(self) -> float:
