@@ -51,3 +51,9 @@ def deviator(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
 def von_mises(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the von Mises stress (...) of Mandel components (n_components, ...) [MPa]."""
     return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))
+
+
+def stress_difference(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sigma1 - sigma2 (...) of the xy plane, of Mandel components (4, ...) [MPa]."""
+    xx, yy, _, xy = mandel
+    return np.hypot(xx - yy, SQRT2 * xy)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.problem import OPEN
+from solver.contact.problem import OPEN, bound_lines, least
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,6 +41,7 @@ class Candidates:
     friction : (n,) coefficient; zero at a vertex that had no contact before and whose approach
         is not known: it starts without tangential force
     limit : (n,) largest tangential force at any normal force [N]
+    cohesion : (n,) tangential force that needs no normal force [N], zero like ``friction``
     motion : (n or 2n,) gap, and slip when there is friction [mm]
     apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
@@ -54,6 +55,7 @@ class Candidates:
     vertices: tuple[NDArray[np.int64], ...]
     friction: NDArray[np.float64]
     limit: NDArray[np.float64]
+    cohesion: NDArray[np.float64]
     motion: NDArray[np.float64]
     apart: NDArray[np.float64]
     forces: NDArray[np.float64]
@@ -110,7 +112,7 @@ class Candidates:
         N = F[:n]
         worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
         if len(F) > n:
-            bound = np.minimum(self.friction * np.maximum(N, 0), self.limit)
+            bound = least(bound_lines(self.friction, self.cohesion, self.limit), N)
             wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
             worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
         return worst
@@ -182,7 +184,7 @@ def no_candidates(system: System) -> Candidates:
     covered = tuple(empty for _ in system.interfaces)
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     status = empty.astype(int)
-    return Candidates(none, empty, empty, empty, empty, empty, status, rows, covered, gaps, np.inf)
+    return Candidates(none, *(empty,) * 6, status, rows, covered, gaps, np.inf)
 
 
 def find_candidates(
@@ -204,10 +206,10 @@ def find_candidates(
         for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)
     ]
     n = sum(len(v) for v in vertices)
-    frictional = any(interface.friction > 0 for interface in system.interfaces)
+    frictional = any(interface.rough for interface in system.interfaces)
     m = 2 * n if frictional else n
     motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
-    limit = np.zeros(n)
+    limit, cohesion = np.zeros((2, n))
     pieces: list[list[Rows]] = [[] for _ in system.parts]
     first = 0
     for interface, pairing, at, before in zip(
@@ -223,7 +225,9 @@ def find_candidates(
             # only the first point to touch can hold a floating body: it gets friction at once
             first_point = normal.start + before.gap[at].argmin()
             apart[first_point] = np.nan_to_num(apart[first_point])
-        friction[normal] = np.where(np.isnan(apart[normal]), 0.0, interface.friction)
+        known = ~np.isnan(apart[normal])
+        friction[normal] = np.where(known, interface.friction, 0.0)
+        cohesion[normal] = np.where(known, interface.cohesion * pairing.area[at], 0.0)
         apart[normal] = np.nan_to_num(apart[normal])
         limit[normal] = interface.shear_strength * pairing.area[at]
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -247,6 +251,7 @@ def find_candidates(
         vertices=tuple(vertices),
         friction=friction,
         limit=limit,
+        cohesion=cohesion,
         motion=motion,
         apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,

@@ -22,6 +22,8 @@ from solver.model.model import LEAST_FRICTION
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.contact.problem import Lines
+
 _MAX_SETS = 40
 _MAX_PASSES = 20
 _TOLERANCE = LEAST_FRICTION
@@ -42,8 +44,7 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
         empty = np.zeros(0)
         solvable = not problem.balance.size
         return ContactSolution(empty, empty, start, False) if solvable else None
-    capped = np.zeros(problem.n, dtype=bool)
-    return _active_sets(problem, start, capped) or _lag_bound(problem)
+    return _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
 
 
 def change_of(
@@ -53,36 +54,38 @@ def change_of(
 
     Tangential forces at their limit stay there.
     """
-    nothing = np.zeros(problem.n)
-    capped = problem.friction * solution.forces[: problem.n] > problem.limits
-    changed = replace(problem, offset=offset, balance=0 * problem.balance, limit=nothing)
+    slope, force = problem.lines
+    piece = (slope * solution.forces[: problem.n] + force).argmin(axis=0)
+    changed = replace(problem, offset=offset, balance=0 * problem.balance)
     nothing_moves = np.zeros_like(offset), np.zeros_like(solution.rigid)
-    return _forces(changed, solution.status, capped) or nothing_moves
+    return _forces(changed, solution.status, piece, (slope, 0 * force)) or nothing_moves
 
 
 def _forces(
-    problem: ContactProblem, status: NDArray[np.int64], capped: NDArray[np.bool_]
+    problem: ContactProblem, status: NDArray[np.int64], piece: NDArray[np.int64], bound: Lines
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return forces and rigid motions of given statuses, or None for a singular system."""
-    n, k = problem.n, len(problem.balance)
+    """Return forces and rigid motions of given statuses, or None for a singular system.
+
+    Where a point slips, ``piece`` says which line of the ``bound`` its tangential force is on.
+    """
+    n, k, rough = problem.n, len(problem.balance), problem.rough
     closed = np.flatnonzero(status != OPEN)
     stick = np.flatnonzero(status == STICK) if problem.frictional else closed[:0]
     if problem.frictional:
-        stick = stick[problem.friction[stick] > 0]
+        stick = stick[rough[stick]]
     if not len(closed) and not k:
         return np.zeros(len(problem.offset)), np.zeros(0)
-    # columns of F: each normal force carries the friction force of a slipping point, unless
-    # that is at its limit and known
+    # columns of F: each normal force carries the friction force of a slipping point, but for what
+    # does not depend on it and is known
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
     known = np.zeros(len(problem.offset))
     P[closed, np.arange(len(closed))] = 1.0
     if problem.frictional:
         sign = np.where(status[closed] == FORWARD, -1.0, 0.0)
         sign[status[closed] == BACKWARD] = 1.0
-        P[n + closed, np.arange(len(closed))] = sign * problem.friction[closed]
-        full, limit = np.flatnonzero(capped[closed]), problem.limits
-        P[n + closed[full], full] = 0.0
-        known[n + closed[full]] = sign[full] * limit[closed[full]]
+        slope, given = (of[piece[closed], closed] for of in bound)
+        P[n + closed, np.arange(len(closed))] = sign * slope
+        known[n + closed[sign != 0]] = (sign * given)[sign != 0]
         P[n + stick, len(closed) + np.arange(len(stick))] = 1.0
     rows = np.concatenate([closed, n + stick])
     size = len(rows)
@@ -125,13 +128,13 @@ def _solves(
 
 
 def _active_sets(
-    problem: ContactProblem, start: NDArray[np.int64], capped: NDArray[np.bool_]
+    problem: ContactProblem, start: NDArray[np.int64], piece: NDArray[np.int64]
 ) -> ContactSolution | None:
     """Return the solution that is reached from a status, or None where the sets cycle.
 
-    ``capped`` (n,) belongs to the status: which sliding points are at their limit.
+    ``piece`` (n,) belongs to the status: the line of the bound that a sliding point is on.
     """
-    n, mu = problem.n, problem.friction
+    n, mu, rough = problem.n, problem.friction, problem.rough
     force, length = problem.scales
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
     # under little friction: a small part of the force it carries, but not less than rounding
@@ -139,14 +142,14 @@ def _active_sets(
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
         status[np.argmin(problem.offset[:n])] = STICK
-    limit = problem.limits
+    lines, points = problem.lines, np.arange(n)
     seen = set()
     for _ in range(_MAX_SETS):
-        key = status.tobytes() + capped.tobytes()
+        key = status.tobytes() + piece.tobytes()
         if key in seen:
             return None
         seen.add(key)
-        found = _forces(problem, status, capped)
+        found = _forces(problem, status, piece, lines)
         if found is None:
             return None
         F, q = found
@@ -158,17 +161,19 @@ def _active_sets(
         if problem.frictional:
             T, slip = F[n:], motion[n:]
             bound = problem.bound(N) + tiny_shear
-            keep = closed & (new != OPEN) & (mu > 0)
+            keep = closed & (new != OPEN) & rough
             new[keep & (status == STICK) & (T > bound)] = BACKWARD
             new[keep & (status == STICK) & (T < -bound)] = FORWARD
             new[keep & (status == FORWARD) & (slip < -tiny_length)] = STICK
             new[keep & (status == BACKWARD) & (slip > tiny_length)] = STICK
-        # a point at its limit stays there within the tolerance: rounding must not make a cycle
-        reached = mu * N - limit > np.where(capped, -tiny_force, tiny_force)
-        reached &= (mu > 0) & (new > STICK)
-        if np.array_equal(new, status) and np.array_equal(reached, capped):
+        # a point stays on its line within the tolerance: rounding must not make a cycle
+        bounds = lines[0] * N + lines[1]
+        least = bounds.argmin(axis=0)
+        stays = bounds[piece, points] <= bounds[least, points] + tiny_force
+        onto = np.where(rough & (new > STICK), np.where(stays, piece, least), 0)
+        if np.array_equal(new, status) and np.array_equal(onto, piece):
             return ContactSolution(F, q, status, False)
-        status, capped = new, reached
+        status, piece = new, onto
     return None
 
 
@@ -178,7 +183,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     After every pass the active sets start again from its status, so that the solution is exact
     and the passes themselves need not converge.
     """
-    n, mu = problem.n, problem.friction
+    n = problem.n
     force, _ = problem.scales
     # start with a large bound: in every pass friction must suffice to hold a floating body
     bound = problem.bound(np.full(n, force if len(problem.balance) else 0.0))
@@ -190,11 +195,13 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         N = np.maximum(F[:n], 0.0)
         status = np.where(N > 1e-9 * force, STICK, OPEN)
         if problem.frictional:
-            sliding = (status != OPEN) & (mu > 0)
+            sliding = (status != OPEN) & problem.rough
             reached = np.abs(F[n:]) >= bound * (1 - 1e-9)
             status[sliding & reached & (F[n:] < 0)] = FORWARD
             status[sliding & reached & (F[n:] > 0)] = BACKWARD
-        found = _active_sets(problem, status, (status > STICK) & (mu * N > problem.limits))
+        slope, given = problem.lines
+        on = np.where(status > STICK, (slope * N + given).argmin(axis=0), 0)
+        found = _active_sets(problem, status, on)
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
         before, bound = bound, problem.bound(N)
@@ -215,7 +222,7 @@ def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float6
     N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
     off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
     if problem.frictional:
-        bound = np.where(problem.friction > 0, problem.bound(np.maximum(N, 0.0)) / force, 0.0)
+        bound = problem.bound(N) / force
         T, slip = F[n:] / force, motion[n:] / length
         off = np.concatenate([off, np.clip(T - slip, -bound, bound) - T])
     return bool((np.abs(off) <= _KNOWN).all())

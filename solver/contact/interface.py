@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 class Interface:
     """A contact pair, as it was declared, on its two parts.
 
-    ``shear_strength`` is the largest shear it carries at any pressure [MPa]; ``reference`` is the
-    pairing before loading, which small sliding keeps.
+    ``shear_strength`` is the largest shear it carries at any pressure, ``cohesion`` what it carries
+    without pressure [MPa]; ``reference`` is the pairing before loading, which small sliding keeps.
     """
 
     declared: ContactPair
@@ -42,6 +42,16 @@ class Interface:
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
+
+    @property
+    def cohesion(self) -> float:
+        """Shear that it carries without pressure [MPa]."""
+        return self.declared.cohesion
+
+    @property
+    def rough(self) -> bool:
+        """Whether it carries shear."""
+        return self.friction > 0 or self.cohesion > 0
 
     @property
     def sides(self) -> tuple[tuple[int, Part, Surface], tuple[int, Part, Surface]]:

@@ -90,7 +90,7 @@ class System:
         rows = []
         for interface in self.interfaces:
             pairing = interface.pairing(tuple(part.start() for part in self.parts))
-            kinds = (pairing.normal, pairing.tangent)[: 2 if interface.friction else 1]
+            kinds = (pairing.normal, pairing.tangent)[: 2 if interface.rough else 1]
             for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
                 A = np.zeros((len(pairing.area), ends[-1]))
                 for (number, part, chain), block in zip(interface.sides, kind, strict=True):
@@ -155,10 +155,11 @@ class System:
         """Whether an elastic state depends on the load alone, and not on its history.
 
         True without friction, and where all facing vertices touch before loading: every status
-        then stays the same while the load grows. A limit of shear makes it false, since it does
-        not grow with the load.
+        then stays the same while the load grows. Cohesion and a limit of shear make it false, since
+        they do not grow with the load.
         """
-        if self.overlapping or not all(np.isinf(i.shear_strength) for i in self.interfaces):
+        bounded = any(np.isfinite(i.shear_strength) or i.cohesion for i in self.interfaces)
+        if self.overlapping or bounded:
             return False
         gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
         conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from solver.model.rigid import RigidBody
 
 
+_ROUNDING = float(np.finfo(float).eps)
 _SAME = 1e-6
 """Distance / size of a body, below which two places are the same."""
 
@@ -133,6 +135,19 @@ class Part(ABC):
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
         return self.loads.grows(before, after)
+
+    @cached_property
+    def _diagonal(self) -> NDArray[np.float64]:
+        """The diagonal (n,) of the elastic stiffness [N/mm]."""
+        return np.asarray(self.elastic_matrix().diagonal())
+
+    def rounding(self, u: NDArray[np.float64]) -> float:
+        """Return how large out-of-balance forces can be that are rounding [N].
+
+        Internal forces are differences of stiffness times displacement. Both may be large where
+        forces are small: in long thin elements, in a stiff body that a soft one carries.
+        """
+        return _ROUNDING * float(np.linalg.norm(self._diagonal * u))
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the unknowns with prescribed motions at their values for a time."""

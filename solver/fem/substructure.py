@@ -56,7 +56,7 @@ class _Condensed:
             some = slice(first, first + _BLOCK)
             follow = self._inside(self._couple[:, some].toarray())
             self.stiffness[:, some] -= self._couple.T @ follow
-        self.stiffness = 0.5 * (self.stiffness + self.stiffness.T)
+        self.stiffness = _without_motions(self.stiffness, part.rigid[kept])
 
     def _inside(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return inner displacements for inner forces, the kept unknowns held."""
@@ -70,6 +70,18 @@ class _Condensed:
         full[self.kept] = u
         full[self.inner] = self._inside(self._load @ factors - self._couple @ u)
         return full
+
+
+def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a symmetric stiffness that resists no rigid motion (n, n_rigid) at all.
+
+    Rounding of the elimination leaves a little resistance, that of the largest entries of the whole
+    stiffness. Contact forces alone balance a rigid motion: nothing would balance this rest.
+    """
+    S = 0.5 * (S + S.T)
+    Q = np.linalg.qr(rigid)[0]
+    S = S - Q @ (Q.T @ S)
+    return np.asarray(S - (S @ Q) @ Q.T)
 
 
 class Substructure(Part):

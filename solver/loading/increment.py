@@ -12,9 +12,8 @@ From the last converged state, at the current displacements:
 5. line search on the plastic residual, contact forces interpolated
 6. converged when the residual, contact forces included, and the contact conditions vanish
 
-Without a prediction (a line through the last two states, or an earlier increment carried along with
-a load that moves) the first iteration uses the elastic operator: after a reversal of load a plastic
-tangent of the step before would diverge.
+Without a prediction the first iteration uses the elastic operator: after a reversal of load a
+plastic tangent of the step before would diverge.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from solver.loading.control import Tolerances
 from solver.loading.flow import Flow, adrift, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
-from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts
+from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -123,8 +122,11 @@ class Increment:
             hopeless |= error > _DIVERGED * best
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
-            balanced = error < tolerances.residual and violation < tolerances.contact
-            if balanced and candidates.beyond >= 0:
+            # a body that flows far moves far: not all that is out of balance may be rounding
+            balanced = error < tolerances.residual
+            little = 0 < error < _UNBALANCED * tolerances.residual
+            balanced |= little and error * scale <= rounding(self.system, u)
+            if balanced and violation < tolerances.contact and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             first = len(_BLENDS) - 1 if elastic_first else int(self._softened)

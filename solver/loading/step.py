@@ -67,6 +67,7 @@ def newton_step(
             offset=motion,
             friction=candidates.friction,
             limit=candidates.limit,
+            cohesion=candidates.cohesion,
             A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
             balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
         ),
@@ -93,6 +94,12 @@ def largest(vectors: Vectors, origin: Vectors | None = None) -> float:
 def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
     """Return the Euclidean norm of all vectors together."""
     return float(np.sqrt(sum(float(v @ v) for v in vectors)))
+
+
+def rounding(system: System, u: Vectors) -> float:
+    """Return how large out-of-balance forces can be that are rounding [N]."""
+    each = zip(system.parts, u, strict=True)
+    return float(np.hypot.reduce([part.rounding(ui) for part, ui in each]))
 
 
 def apart(system: System, candidates: Candidates) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from solver.mesh.grids import graded, grid, mapped, merged, with_middle
+from solver.mesh.grids import graded, grid, mapped, merged, refined, with_middle
+from solver.mesh.notches import without
 
-__all__ = ["graded", "grid", "mapped", "merged", "with_middle"]
+__all__ = ["graded", "grid", "mapped", "merged", "refined", "with_middle", "without"]

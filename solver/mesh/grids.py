@@ -6,6 +6,8 @@ A body takes any scikit-fem mesh with named boundaries, also one read with ``skf
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from solver.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
     from skfem import Mesh, MeshQuad2
@@ -42,6 +44,45 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> NDAr
         size *= ratio
     nodes = np.concatenate([[0.0], np.cumsum(sizes)])
     return np.asarray(nodes * (length / nodes[-1]))
+
+
+def refined(
+    points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
+) -> NDArray[np.float64]:
+    """Return node positions through ``points``, elements growing away from each by ``ratio``.
+
+    Between two points the elements grow from both, and meet where they are equally large.
+
+    Parameters
+    ----------
+    points : (n,) increasing positions, each a node [mm]
+    sizes : (n,) largest element beside each of them; inf leaves it to the others [mm]
+    ratio : of neighbouring element sides, above 1
+    largest : (n - 1,) largest element between neighbours [mm]
+    """
+    if not ratio > 1:
+        raise ModelError("ratio", ratio, "must be above 1")
+    pieces = [np.array([points[0]], dtype=float)]
+    spans = zip(pairwise(points), pairwise(sizes), largest, strict=True)
+    for (start, end), (first, last), most in spans:
+        length = end - start
+        ahead = _meeting(length, first, last, ratio)
+        if ahead > 0:
+            pieces.append(start + graded(ahead, min(first, most, ahead), ratio, most)[1:])
+        if ahead < length:
+            back = length - ahead
+            pieces.append(end - graded(back, min(last, most, back), ratio, most)[-2::-1])
+    return np.concatenate(pieces)
+
+
+def _meeting(length: float, first: float, last: float, ratio: float) -> float:
+    """Return how far from the first end elements that grow from both ends are equally large.
+
+    Where a side grows by the ratio, it grows by ``ratio - 1`` for each unit of length.
+    """
+    if math.isinf(last):
+        return length if math.isfinite(first) else 0.0
+    return min(max((length + (last - first) / (ratio - 1)) / 2, 0.0), length)
 
 
 def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") -> Mesh:

@@ -38,6 +38,8 @@ class ContactPair:
         where none of this tells, either will do
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns
+    cohesion : shear that contact carries beyond friction [MPa]: the shear is at most ``friction *
+        pressure + cohesion``; where the pressure is below the cohesion it stands in its place
     shear_limit : largest contact shear / initial shear yield stress of the weaker body, at any
         pressure; inf (default) sets no limit. Where friction could carry more than the material,
         the surface layer flows instead of slipping, and its strain grows as the mesh is refined
@@ -60,6 +62,7 @@ class ContactPair:
     friction: float = 0.0
     shear_limit: float = math.inf
     sliding: Literal["auto", "small", "finite"] = "auto"
+    cohesion: float = 0.0
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
@@ -67,6 +70,8 @@ class ContactPair:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ModelError("friction", self.friction, "must be finite and at least 0")
+        if not (np.isfinite(self.cohesion) and self.cohesion >= 0):
+            raise ModelError("cohesion", self.cohesion, "must be finite and at least 0 [MPa]")
         if not self.shear_limit > 0:
             raise ModelError("shear_limit", self.shear_limit, "must be positive")
         if self.sliding not in ("auto", "small", "finite"):

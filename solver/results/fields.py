@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.quantities import declare
-from solver.tensors import to_tensor, von_mises
+from solver.tensors import stress_difference, to_tensor, von_mises
 
 if TYPE_CHECKING:
     from solver.results.look import Look, Values
@@ -20,6 +20,10 @@ RESIDUAL_MISES = declare(
 )
 PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain", dims=_MAP)
 MISES_LOADED = declare("mises_loaded", "von Mises stress under load", "MPa", dims=_MAP)
+STRESS_DIFFERENCE = declare(
+    "stress_difference",
+    "difference of the principal stresses in the plane under load", "MPa", dims=_MAP,
+)  # fmt: skip
 RESIDUAL_PROFILE = declare(
     "residual_profile", "residual stress along depth", "MPa",
     dims=("station", "component", "depth"),
@@ -49,6 +53,13 @@ def maps(look: Look) -> Values:
         PLASTIC_STRAIN: strain,
         MISES_LOADED: von_mises(under_load),
     }
+
+
+def isochromatics(look: Look) -> Values:
+    """Return the map whose contours are isochromatics: twice the largest shear in the plane."""
+    samples = look.samples
+    stress = samples.on_map(lambda body: samples.stress(body, look.loaded))
+    return {STRESS_DIFFERENCE: stress_difference(stress)}
 
 
 def profiles(look: Look) -> Values:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
+from solver.contact.problem import STICK
 from solver.fem.wheel import Wheel
 
 if TYPE_CHECKING:
@@ -40,6 +42,24 @@ class Touch(Protocol):
         """Return where the load is along x [mm]."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactPoints:
+    """What acts at the contact points of a surface, in the order of x; arrays (n,).
+
+    Attributes
+    ----------
+    x : position before loading [mm]
+    pressure : [MPa]
+    closed : whether the bodies touch there
+    sticking : whether they touch without slip; nowhere without friction
+    """
+
+    x: Array
+    pressure: Array
+    closed: NDArray[np.bool_]
+    sticking: NDArray[np.bool_]
+
+
 class Contact:
     """The first interface of a system.
 
@@ -53,6 +73,19 @@ class Contact:
         self._interface = system.interfaces[0]
         chain = self._interface.slave_surface
         self._x = chain.X[0, chain.vertices]
+
+    def points(self, converged: Converged) -> ContactPoints:
+        """Return what acts at the vertices of the slave."""
+        contact, order = converged.state.contacts[0], np.argsort(self._x)
+        pressure, _ = contact_pressure(self._system, converged.state, 0)
+        closed = contact.normal > 0
+        stuck = closed & (contact.status == STICK) & (self._interface.friction > 0)
+        return ContactPoints(
+            x=self._x[order],
+            pressure=pressure[order],
+            closed=closed[order],
+            sticking=stuck[order],
+        )
 
     def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
         """See `Touch`."""
@@ -150,3 +183,8 @@ def touch_of(system: System, *, symmetric: bool) -> Touch:
         if body.travelling is not None:
             return Prescribed(body.travelling, system.full(body.name).period)
     return Nothing()
+
+
+def contact_points(touch: Touch, converged: Any) -> ContactPoints | None:
+    """Return what acts at the points of a contact; None where pressure does not come of contact."""
+    return touch.points(converged) if isinstance(touch, Contact) else None

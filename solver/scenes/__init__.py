@@ -6,11 +6,16 @@ scene's ``branch`` parameter share the increments they have in common.
 
 from __future__ import annotations
 
+from solver.scenes.ball import BALL
 from solver.scenes.effort import Effort
+from solver.scenes.elastic_punch import ELASTIC_PUNCH
 from solver.scenes.punch import PUNCH
+from solver.scenes.rigid_punch import RIGID_PUNCH
 from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
 
-SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING)}
+SCENES: dict[str, Scene] = {
+    scene.name: scene for scene in (PUNCH, ELASTIC_PUNCH, RIGID_PUNCH, BALL, ROLLING)
+}
 
 __all__ = ["SCENES", "Effort", "Monitor", "Scene"]

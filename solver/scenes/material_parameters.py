@@ -1,4 +1,4 @@
-"""The material that every scene asks for, and the law that its parameters stand for."""
+"""The materials that scenes ask for, and the laws that their parameters stand for."""
 
 from __future__ import annotations
 
@@ -44,12 +44,33 @@ _ISOTROPIC = ("none", "isotropic", "voce", "table")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MaterialParameters:
-    """The material every scene asks for, and how accurate the answer is to be."""
+class ElasticParameters:
+    """The elastic material every scene asks for, and how accurate the answer is to be."""
 
     accuracy: Accuracy = described(
         "standard", "sets mesh and increments together, where they are not given"
     )
+    youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
+    poisson_ratio: Poisson = described(0.3, "Poisson ratio")
+
+    def __post_init__(self) -> None:
+        check(self)
+        for name, value in self.usual().items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+
+    def usual(self) -> Mapping[str, float]:
+        """Return the values of the parameters that ``accuracy`` sets."""
+        return {}
+
+    def elastic_material(self) -> Material:
+        """Return a material that never yields."""
+        return Material(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaterialParameters(ElasticParameters):
+    """An elastic-plastic material."""
 
     yield_condition: YieldCondition = described("mises", "condition of first yield, and of flow")
     hardening: HardeningRule = described("none", "hardening rule of the yielding bodies")
@@ -71,19 +92,11 @@ class MaterialParameters:
         (), "[modulus C in MPa, recall gamma] of each, with chaboche hardening"
     )
     yield_stress: Stress = described(350.0, "uniaxial yield stress Re")
-    youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
-    poisson_ratio: Poisson = described(0.3, "Poisson ratio")
 
     def __post_init__(self) -> None:
-        check(self)
-        for name, value in self.usual().items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
+        # zero-argument super() does not see the class that dataclass(slots=True) makes
+        ElasticParameters.__post_init__(self)
         self.material()  # refuses what does not go together
-
-    def usual(self) -> Mapping[str, float]:
-        """Return the values of the parameters that ``accuracy`` sets."""
-        return {}
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:
         """Return the law of the material, with ``stiffness`` times Young's modulus."""
@@ -107,11 +120,15 @@ class MaterialParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactParameters(MaterialParameters):
-    """Material and friction, which every scene of two bodies asks for."""
+    """Elastic-plastic material and friction."""
 
     friction: Friction = described(0.0, "Coulomb friction coefficient")
     shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
         0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
+    )
+
+    cohesion: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
+        0.0, "contact shear beyond friction * pressure; no more than the pressure itself"
     )
 
     @property
@@ -131,6 +148,7 @@ class ContactParameters(MaterialParameters):
             master=master,
             friction=self.friction,
             shear_limit=self.shear_limit or math.inf,
+            cohesion=self.cohesion,
             sliding=sliding,
         )
 

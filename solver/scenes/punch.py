@@ -21,10 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from annotated_types import Interval, Unit
 
-from solver.errors import ModelError
 from solver.loading.program import Program, load_and_release, walked
-from solver.mesh import graded, grid
-from solver.model.body import Body
 from solver.model.model import Model
 from solver.results.contact import contact
 from solver.results.fields import maps, profiles, surfaces
@@ -33,7 +30,8 @@ from solver.results.look import Look, Values
 from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.view import View
-from solver.scenes.effort import Effort, lattice
+from solver.scenes.effort import Effort
+from solver.scenes.flat_punch import FlatPunch, Growth, HalfPlaneSize, PunchHeight, SmallestElement
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.parameters import (
     Accuracy,
@@ -47,8 +45,6 @@ from solver.scenes.scene import Scene
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
 _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "draft": {"smallest_element": 5e-3, "growth": 1.6, "load_step": 0.1},
     "standard": {"smallest_element": 5e-4, "growth": 1.4, "load_step": 0.05},
@@ -56,8 +52,6 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
 }
 """What an accuracy sets; errors: docs/accuracy.md."""
 _LARGEST = 0.08  # of a, under the punch
-_PUNCH_LARGEST = 0.25
-_MOST_ELEMENTS = 60_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,22 +63,14 @@ class PunchParameters(ContactParameters):
         "plane_stress", "two-dimensional state; axisymmetric is a flat-ended cylinder"
     )
     half_width: Length = described(50.0, "half-width a of the punch")
-    punch_height: Annotated[float, Interval(ge=0.5, le=20.0), Unit("1")] = described(
-        2.0, "height of the punch / a"
-    )
-    half_plane_size: Annotated[float, Interval(ge=2.0, le=1000.0), Unit("1")] = described(
-        40.0, "width and depth of the half-plane / a"
-    )
+    punch_height: PunchHeight = described(2.0, "height of the punch / a")
+    half_plane_size: HalfPlaneSize = described(40.0, "width and depth of the half-plane / a")
     punch_stiffness: Annotated[float, Interval(ge=1e-4, le=1e4), Unit("1")] = described(
         1.0, "Young's modulus of the punch / that of the half-plane"
     )
     elastic_punch: bool = described(False, "whether the punch never yields")
-    smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = by_accuracy(
-        "smallest element side, at the corner / a"
-    )
-    growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = by_accuracy(
-        "ratio of neighbouring element sides away from the corner"
-    )
+    smallest_element: SmallestElement = by_accuracy("smallest element side, at the corner / a")
+    growth: Growth = by_accuracy("ratio of neighbouring element sides away from the corner")
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
         "quad8", "element of both bodies"
     )
@@ -96,67 +82,37 @@ class PunchParameters(ContactParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ContactParameters.__post_init__(self)
-        under, beyond, up, down = (len(nodes) for nodes in _nodes(self))
-        elements = under * up + (under + beyond) * down
-        if elements > _MOST_ELEMENTS:
-            raise ModelError(
-                "smallest_element", self.smallest_element,
-                f"makes {elements} elements with growth {self.growth:g}; at most "
-                f"{_MOST_ELEMENTS} are allowed: raise growth or smallest_element",
-            )  # fmt: skip
+        self.geometry.check_elements(self.smallest_element)
+
+    @property
+    def geometry(self) -> FlatPunch:
+        """Dimensions and elements of punch and half-plane [mm]."""
+        a = self.half_width
+        return FlatPunch(
+            half_width=a,
+            height=self.punch_height * a,
+            size=self.half_plane_size * a,
+            smallest=self.smallest_element * a,
+            growth=self.growth,
+            largest=_LARGEST * a,
+        )
 
     def usual(self) -> Mapping[str, float]:
         """Return the mesh and the increments of an accuracy."""
         return _USUAL[self.accuracy]
 
 
-def _nodes(parameters: PunchParameters) -> tuple[NDArray[np.float64], ...]:
-    """Return node positions under the punch, beyond it, up the punch and down below [mm]."""
-    return _graded_nodes(
-        parameters.half_width,
-        parameters.smallest_element * parameters.half_width,
-        parameters.growth,
-        parameters.half_plane_size * parameters.half_width,
-        parameters.punch_height * parameters.half_width,
-    )
-
-
-@lru_cache(maxsize=256)
-def _graded_nodes(
-    a: float, h: float, growth: float, size: float, height: float
-) -> tuple[NDArray[np.float64], ...]:
-    under = a - graded(a, h, growth, _LARGEST * a)[::-1]
-    beyond = a + graded(size - a, h, growth, size / 4)
-    up = graded(height, h, growth, _PUNCH_LARGEST * a)
-    down = -graded(size, h, growth, size / 4)[::-1]
-    return under, beyond, up, down
-
-
 def model(parameters: PunchParameters) -> Model:
     """Return the half model: bodies, supports, pressure and contact."""
-    from solver.mesh.elements import element_type  # only who computes needs the solver
-
-    under, beyond, up, down = _nodes(parameters)
-    cells = element_type(parameters.element).cells
-    punch = Body(
-        name="punch",
-        mesh=grid(under, up, cells),
-        material=parameters.material(parameters.punch_stiffness, elastic=parameters.elastic_punch),
+    bodies = parameters.geometry.bodies(
+        punch=parameters.material(parameters.punch_stiffness, elastic=parameters.elastic_punch),
+        half_plane=parameters.material(),
         kinematics=parameters.state,
         element=parameters.element,
-        supports={"left": "x"},
-        pressure={"top": parameters.yield_stress},
-    )
-    half_plane = Body(
-        name="half_plane",
-        mesh=grid(np.concatenate([under, beyond[1:]]), down, cells),
-        material=parameters.material(),
-        kinematics=parameters.state,
-        element=parameters.element,
-        supports={"left": "x", "bottom": "y"},
+        pressure=parameters.yield_stress,
     )
     contact = parameters.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
-    return Model(bodies=(punch, half_plane), contacts=(contact,))
+    return Model(bodies=bodies, contacts=(contact,))
 
 
 def program(parameters: PunchParameters) -> Program:
@@ -167,8 +123,7 @@ def program(parameters: PunchParameters) -> Program:
 def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
     """Return the work of loading up to each load ratio in turn, and of releasing each."""
     element = parameters.element
-    under, beyond, up, down = (len(nodes) - 1 for nodes in _nodes(parameters))
-    punch, plane = lattice(under, up, element), lattice(under + beyond, down, element)
+    punch, plane = parameters.geometry.lattices(element)
     # an elastic punch is reduced to its contact surface; x is held on the line of symmetry
     own = 2 * punch.along - 1 if parameters.elastic_punch else 2 * punch.nodes - punch.up
     increments = _increments(tuple(load_ratios), parameters.load_step, parameters.unload_steps)

@@ -29,7 +29,9 @@ _ELEMENTS: Mapping[Accuracy, tuple[int, int]] = {
 _GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.15**0.5}
 _LARGEST = 100.0  # element side [mm]
 _MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
-_SINKS = 0.65  # the same / (Hertz half-width * load ratio): a wheel that sinks in touches farther
+_SINKS = (
+    0.65  # touches beyond the track / (Hertz half-width * load ratio), where the wheel sinks in
+)
 _PERIOD = 6.0  # least length of a track that repeats itself / Hertz half-width
 _LONGEST_REACH = 0.8  # of half the rim
 _MOST_INCREMENTS = 100_000
@@ -95,9 +97,9 @@ class RollingParameters(WheelParameters):
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
-        if self.shear_limit and self.load == "hertz":
-            allowed = "must be 0: load = hertz prescribes the shear"
-            raise ModelError("shear_limit", self.shear_limit, allowed)
+        for name in ("shear_limit", "cohesion") if self.load == "hertz" else ():
+            if value := getattr(self, name):
+                raise ModelError(name, value, "must be 0: load = hertz prescribes the shear")
         if self.element_size > self.half_width / 2:
             raise ModelError(
                 "element_size", self.element_size,
@@ -116,6 +118,7 @@ class RollingParameters(WheelParameters):
         """Raise `ModelError` for what a track without ends cannot have."""
         for name, usual in (
             ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
+            ("cohesion", 0.0),
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")
@@ -179,14 +182,13 @@ class RollingParameters(WheelParameters):
     def usual(self) -> Mapping[str, float]:
         """Return the elements and increments of an accuracy, in lengths of two digits.
 
-        Errors: docs/accuracy.md. The wheel's Poisson ratio is another that may be left out.
+        Errors: docs/accuracy.md.
         """
         endless, of_length = _ELEMENTS[self.accuracy]
         side = self.mesh_width / endless if self.endless else self.half_width / of_length
         h = self.element_size or float(f"{min(side, _LARGEST):.2g}")
         advance = h / 2 if self.endless else min(h / 2, self.length / 2)
-        sides = {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
-        return {**WheelParameters.usual(self), **sides}
+        return {"element_size": h, "growth": _GROWTH[self.accuracy], "advance_step": advance}
 
     @property
     def endless(self) -> bool:
@@ -201,7 +203,12 @@ class RollingParameters(WheelParameters):
     @property
     def margin(self) -> float:
         """Length beyond the end of the track that may come into contact [mm]."""
-        return max(_MARGIN, _SINKS * self.load_ratio) * self.half_width
+        return max(_MARGIN * self.half_width, self.spread)
+
+    @property
+    def spread(self) -> float:
+        """How far beyond the end of the track a wheel that sinks in may touch [mm]."""
+        return _SINKS * self.load_ratio * self.half_width
 
     @property
     def reach(self) -> float:

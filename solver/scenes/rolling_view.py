@@ -24,7 +24,7 @@ def view(parameters: RollingParameters) -> View:
         return _around_the_load(parameters.widest.half_width)
     half, a = parameters.length / 2, parameters.half_width
     depth = 5 * a
-    edge = math.ceil(half + 2 * a)
+    edge = math.ceil(half + max(2 * a, parameters.spread))
     places = round(edge / recorded_step(a))
     return View(
         x=np.linspace(-edge, edge, places + 1),

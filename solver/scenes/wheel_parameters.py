@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -42,8 +41,8 @@ class WheelParameters(ContactParameters):
     wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
         1.0, "Young's modulus of the wheel / that of the half-space"
     )
-    wheel_poisson_ratio: Poisson = described(
-        None, "Poisson ratio of the wheel; left out, that of the half-space"
+    wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
+        "same", "Poisson ratio of the wheel, or that of the half-space"
     )
     wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
         0.0, "angle by which the wheel is turned before it is set down"
@@ -60,17 +59,13 @@ class WheelParameters(ContactParameters):
         if self.given_creepage and not prescribed:
             raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
 
-    def usual(self) -> Mapping[str, float]:
-        """Return the values of parameters that may be left out."""
-        return {"wheel_poisson_ratio": self.poisson_ratio}
-
     @property
     def wheel_material(self) -> Material:
         """The elastic material of the wheel."""
-        left_out = self.wheel_poisson_ratio is None
+        given = self.wheel_poisson_ratio
         return Material(
             youngs_modulus=self.youngs_modulus * self.wheel_stiffness,
-            poisson_ratio=self.poisson_ratio if left_out else self.wheel_poisson_ratio,
+            poisson_ratio=self.poisson_ratio if given == "same" else float(given),
         )
 
     @property

@@ -52,6 +52,8 @@ def natural_residual(problem, solution):
     worst = [np.abs(N - np.maximum(0.0, N - stiffness[:n] * motion[:n])).max()]
     if problem.frictional:
         bound = problem.friction * np.maximum(N, 0.0)
+        if problem.cohesion is not None:
+            bound += np.minimum(problem.cohesion, np.maximum(N, 0.0))
         if problem.limit is not None:
             bound = np.minimum(bound, problem.limit)
         wanted = np.clip(F[n:] - stiffness[n:] * motion[n:], -bound, bound)
@@ -106,6 +108,28 @@ def test_frictional_solutions_keep_to_their_limits(friction, rigid):
         mixed += full.any() and below.any()
     assert at_limit > 25
     assert mixed > 15
+
+
+@pytest.mark.parametrize("rigid", [0, 1, 2])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("limited", [False, True])
+def test_frictional_solutions_keep_to_their_cohesion(friction, rigid, limited):
+    seen, at_limit = set(), 0
+    for seed in range(60):
+        problem = instance(seed, friction, rigid=rigid)
+        spread = np.random.default_rng(seed + 2000)
+        problem = replace(problem, cohesion=spread.uniform(0.01, 0.1, problem.n))
+        if limited:
+            problem = replace(problem, limit=spread.uniform(0.02, 0.12, problem.n))
+        solution = solve_contact(problem, np.full(problem.n, OPEN))
+        assert solution is not None
+        assert natural_residual(problem, solution) < 1e-8
+        N, T = solution.forces[: problem.n], solution.forces[problem.n :]
+        assert not T[N <= 0].any()
+        at_limit += limited and np.isclose(np.abs(T), problem.limit).any()
+        seen |= set(solution.status.tolist())
+    assert seen == {OPEN, STICK, FORWARD, BACKWARD}
+    assert at_limit > 15 or not limited
 
 
 def test_a_limit_that_is_not_reached_changes_no_number():

@@ -94,6 +94,31 @@ def test_the_same_displacement_needs_the_same_force(material: Material) -> None:
         assert found.audit().passed, found.audit().violations
 
 
+@pytest.mark.parametrize(
+    ("friction", "cohesion", "limit"), [(0.3, 0.0, np.inf), (0.0, 15.0, np.inf), (0.3, 15.0, 0.1)]
+)
+def test_a_block_pushed_sideways_slides_at_its_friction_and_cohesion(
+    friction: float, cohesion: float, limit: float
+) -> None:
+    pressure = 100.0
+    block = Body(name="block", mesh=grid(np.linspace(-1, 1, 9), np.linspace(0, 0.2, 3)),
+                 material=SOFT, supports={"top": "x"}, pressure={"top": pressure},
+                 loads=())  # fmt: skip
+    plate = RigidBody(name="plate", surfaces={"top": line((3.0, 0.0), (-3.0, 0.0))},
+                      x=Moved(value=0.02))  # fmt: skip
+    pair = ContactPair(slave=("block", "bottom"), master=("plate", "top"), friction=friction,
+                       cohesion=cohesion, shear_limit=limit)  # fmt: skip
+    found = solve(Model(bodies=(block,), rigid=(plate,), contacts=(pair,)),
+                  control=PathControl(load_step=0.1))  # fmt: skip
+    normal, shear = found.loaded.state.contacts[0].normal, found.loaded.state.contacts[0].tangential
+    assert normal.sum() == pytest.approx(2.0 * pressure)
+    bound = min(friction * pressure + cohesion, limit * SOFT.shear_yield_stress)
+    slides = found.reaction("plate", "loaded")[0]
+    assert np.abs(shear).sum() == pytest.approx(abs(slides))
+    assert slides == pytest.approx(2.0 * bound, rel=1e-6 if np.isinf(limit) else 0.1)
+    assert found.audit().passed, found.audit().violations
+
+
 @pytest.mark.parametrize("rigid_is_slave", [False, True])
 def test_a_rigid_ball_on_a_half_space_is_the_contact_of_hertz(rigid_is_slave: bool) -> None:
     radius, force = 100.0, 2500.0

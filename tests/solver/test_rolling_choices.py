@@ -25,9 +25,9 @@ def rolled(**own: Any) -> Any:
 
 
 def test_a_wheel_has_the_poisson_ratio_of_the_half_space_unless_it_is_given() -> None:
-    assert RollingParameters(poisson_ratio=0.25).wheel_poisson_ratio == 0.25
+    assert RollingParameters(poisson_ratio=0.25).wheel_material.poisson_ratio == 0.25
     like = RollingParameters(poisson_ratio=0.25, wheel_poisson_ratio=0.25)
-    assert like == RollingParameters(poisson_ratio=0.25)
+    assert like.half_width == RollingParameters(poisson_ratio=0.25).half_width
     other = RollingParameters(wheel_poisson_ratio=0.0, wheel_stiffness=2.0)
     one, two = (1 - 0.3**2) / 2e5, 1 / 4e5
     assert other.contact_modulus == pytest.approx(1 / (one + two), rel=1e-12)

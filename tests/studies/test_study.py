@@ -107,8 +107,8 @@ def test_bad_input_names_field_value_and_what_is_allowed(
         ),
         (
             "punch",
-            {"sweep": {"friction": [0.1, 2], "hardening": ["none", "mixed"]}},
-            "sweep.friction[1] = 2.0: must be a finite number >= 0 and <= 1",
+            {"sweep": {"friction": [0.1, 11], "hardening": ["none", "mixed"]}},
+            "sweep.friction[1] = 11.0: must be a finite number >= 0 and <= 10",
         ),
         (
             "punch",

@@ -112,7 +112,8 @@ def glue(patch: Patch) -> None:
         if found is None:
             return None
         status = np.where((found.status != OPEN) | (start != OPEN), STICK, OPEN)
-        forces = complementarity._forces(problem, status, np.zeros(problem.n, dtype=bool))
+        first = np.zeros(problem.n, dtype=int)
+        forces = complementarity._forces(problem, status, first, problem.lines)
         return None if forces is None else ContactSolution(*forces, status, False)
 
     patch.setattr(solver.loading.step, "solve_contact", glued)

@@ -61,6 +61,17 @@ class AuditedBody:
             return self._response.stress
         return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
 
+    @property
+    def force_level(self) -> float:
+        """The largest force level met so far [N]."""
+        return self._converged.state.force_scale
+
+    @property
+    def rounding(self) -> float:
+        """How large nodal forces can be that are rounding [N]."""
+        u = self._system.displacement(self.name, self._converged.state)
+        return self.plain.part.rounding(u)
+
     @cached_property
     def balancing(self) -> Array:
         """Nodal forces (n_nodes, 2) that are in balance with the stress of the body [N]."""

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_ROUNDED = 1e-5
+"""Largest rounding of nodal forces that is left out / force level."""
 _LITTLE = 1e-4
 """Contact force / force level, below which errors are compared with this level instead."""
 
@@ -40,21 +42,30 @@ def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
 
 
 def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converged) -> float:
-    """Return external, internal and contact forces out of balance over the force level."""
+    """Return forces out of balance, less what is rounding, over the force level.
+
+    They are external, internal and contact forces.
+    """
     contact = _on_bodies(system, converged)
-    square = 0.0
-    for body in bodies:
-        left = contact[body.name] - body.lacking
-        square += float((left[body.free] ** 2).sum())
-    return float(np.sqrt(square)) / (converged.state.force_scale or 1.0)
+    left = [_beyond_rounding(body, contact[body.name] - body.lacking) for body in bodies]
+    return float(np.linalg.norm(left)) / (converged.state.force_scale or 1.0)
+
+
+def _beyond_rounding(body: AuditedBody, force: Array) -> float:
+    """Return the size of the forces (n_nodes, 2) on free unknowns, less what is rounding [N].
+
+    Rounding counts up to a share of the force level: a body that has flowed far moves far.
+    """
+    rounding = min(body.rounding, _ROUNDED * body.force_level)
+    return max(float(np.linalg.norm(force[body.free])) - rounding, 0.0)
 
 
 def left_on(bodies: Sequence[AuditedBody]) -> float:
-    """Return the force other than reactions that the stress of the bodies needs for balance [N].
+    """Return the force, no reaction or rounding, that the stress of bodies needs for balance [N].
 
     On unloaded bodies taken apart no such force acts, whatever shape they have kept.
     """
-    return float(np.sqrt(sum((body.balancing[body.free] ** 2).sum() for body in bodies)))
+    return float(np.linalg.norm([_beyond_rounding(body, body.balancing) for body in bodies]))
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:

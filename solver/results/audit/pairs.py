@@ -116,7 +116,10 @@ class AuditedPair:
         limit = np.full(len(self.normal), np.inf)
         if np.isfinite(self._pair.shear_limit):
             limit = self._pair.shear_limit * strength * self.touching.area
-        return np.minimum(mu * np.maximum(self.normal, 0.0), limit)
+        normal = np.maximum(self.normal, 0.0)
+        # cohesion acts in full where the pressure is larger than it
+        cohesion = np.minimum(self._pair.cohesion * self.touching.area, normal)
+        return np.minimum(mu * normal + cohesion, limit)
 
     @cached_property
     def figures(self) -> dict[str, float]:

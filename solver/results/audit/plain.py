@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.fem.surface import edges_of
 from solver.mesh.elements import element_type
+from solver.mesh.shapes import shape_functions
 from solver.model.loads import Pressure, Traction
 from solver.tensors import SQRT2, to_tensor
 
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     from solver.model.body import Body
 
     Array = NDArray[np.float64]
+
+
+_CHORDS = 64
+"""Chords of a curved edge."""
 
 
 @dataclass(frozen=True)
@@ -108,22 +113,23 @@ class PlainBody:
     def applied(self, time: float) -> Array:
         """Return the resultant (2,) of pressures and tractions at a time [N].
 
-        A pressure p on an edge from A to B pushes with p times the depth and the length of AB,
-        against its normal; a traction with the depth and the length.
+        A pressure p on a chord from A to B pushes with p times the depth and the length of AB,
+        against its normal; a traction with the depth and the length. Curved edges have many chords.
         """
         total = np.zeros(2)
         for load in self.body.every_load:
             if not isinstance(load, Pressure | Traction):
                 continue
-            edges = edges_of(self.part, load.boundary)
-            start, end = self.part.X[:, edges[:, 0]], self.part.X[:, edges[:, 1]]
-            along = end - start
-            depth = np.broadcast_to(self._depth((start + end) / 2), along.shape[1:])
+            edges = self.part.X[:, edges_of(self.part, load.boundary)]
+            places = np.linspace(-1.0, 1.0, 1 + (_CHORDS if edges.shape[-1] > 2 else 1))
+            points = edges @ shape_functions(places, edges.shape[-1]).T
+            along = np.diff(points, axis=-1)
+            depth = self._depth((points[..., 1:] + points[..., :-1]) / 2)
             if isinstance(load, Pressure):
                 force = load.value * np.array([-along[1], along[0]])
             else:
-                force = np.array([[load.x], [load.y]]) * np.linalg.norm(along, axis=0)
-            total += load.factor(time) * (depth * force).sum(axis=1)
+                force = np.multiply.outer([load.x, load.y], np.linalg.norm(along, axis=0))
+            total += load.factor(time) * (depth * force).sum(axis=(1, 2))
         return total
 
     def elastic_energy(self, stress: Array) -> float:

@@ -1,0 +1,127 @@
+"""Power of a singular stress, fitted to values near a corner.
+
+Near a corner stress is a series of powers of the distance r from it, and the first, of power p
+below 1, is unbounded: stress ~ r^(p-1). A straight line through logarithms of values at finite
+distances has another slope, as the next term of the series is not small yet. It is therefore fitted
+too, with an exponent about 1 above the first: between 0.8 and 1.1 at the square corner of equal
+materials, without friction and with friction up to 0.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.quantities import declare
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+SINGULAR_POWER = declare(
+    "singular_power", "power p of the stress at the corner, which goes as r^(p-1)"
+)
+SINGULAR_POWER_ERROR = declare("singular_power_error", "uncertainty of the singular power")
+SINGULAR_INTENSITY = declare(
+    "singular_intensity",
+    "contact pressure / mean pressure of the singular term alone, one half-width from the corner",
+)
+APPARENT_POWER = declare(
+    "apparent_power",
+    "power that contact pressure seems to have, 0.01 to 0.1 half-widths from the corner",
+)
+
+_OTHERS = (0.5, 1.5)
+"""Exponents of the next term that are tried too / that given."""
+_FEWEST = 5
+"""Points for three unknowns."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Singularity:
+    """Stress ~ ``intensity * r^(power - 1)`` where r tends to 0, and the error of ``power``."""
+
+    power: float
+    error: float
+    intensity: float
+
+
+NOWHERE = Singularity(power=np.nan, error=np.nan, intensity=np.nan)
+
+
+def fit_singularity(
+    r: Array, stress: Array, low: float, high: float, above: float = 1.0
+) -> Singularity:
+    """Return the singular term of stress sampled near a corner.
+
+    1. Points at ``low <= r <= high`` count. ``low`` is to be ten elements or more, as elements
+       at the corner do not resolve the stress; ``high`` is to be small beside the distance of
+       whatever else shapes the field: an edge, a groove, the end of a zone of slip.
+    2. ``ln stress = ln C + (p - 1) ln r + b r^q`` with q = ``above`` is fitted by least squares.
+       A point weighs as much as the part of the axis of ln r that it stands for.
+    3. The error is the largest change of p when q is half as large or 1.5 times as large, or when
+       the inner or the outer third of the range, in ln r, is left out; or the standard error of
+       the fit, where larger. An error that elements make all over the range is not in it.
+
+    Parameters
+    ----------
+    r : (n,) distances from the corner
+    stress : (n,) of one sign; the unit is that of ``Singularity.intensity``
+    low, high : range of r of the fit
+    above : exponent of the next term of the series above the first, as far as it is known
+
+    Returns
+    -------
+    Singularity : all NaN where the range holds fewer than five points, or stress of both signs
+    """
+    points = _logarithms(r, stress, low, high)
+    if points is None:
+        return NOWHERE
+    x = points[0]
+    best, deviation = _fit(points, high, above)
+    others = [_fit(points, high, share * above)[0] for share in _OTHERS]
+    third = np.log(high / low) / 3
+    for part in (x <= np.log(high) - third, x >= np.log(low) + third):
+        if part.sum() >= _FEWEST:
+            others.append(_fit(points[:, part], high, above)[0])
+    change = max(abs(other[1] - best[1]) for other in others)
+    return Singularity(
+        power=float(1 + best[1]),
+        error=float(max(change, deviation)),
+        intensity=float(np.exp(best[0]) * np.sign(stress[np.argmin(np.abs(r - high))])),
+    )
+
+
+def apparent_power(r: Array, stress: Array, low: float, high: float) -> float:
+    """Return the power that a straight line through logarithms gives, without a next term.
+
+    It is what one measures who sees the stress between ``low`` and ``high`` only. NaN where that
+    range holds fewer than five points, or stress of both signs.
+    """
+    points = _logarithms(r, stress, low, high)
+    return float("nan") if points is None else float(1 + _fit(points, high)[0][1])
+
+
+def _logarithms(r: Array, stress: Array, low: float, high: float) -> Array | None:
+    """Return ln r, ln |stress| and weights (3, n) of the points in a range, where they will do."""
+    within = (r >= low) & (r <= high)
+    order = np.argsort(r[within])
+    r, stress = r[within][order], stress[within][order]
+    if len(r) < _FEWEST or stress.min() <= 0.0 <= stress.max():
+        return None
+    x = np.log(r)
+    return np.stack([x, np.log(np.abs(stress)), np.gradient(x)])
+
+
+def _fit(points: Array, high: float, *exponents: float) -> tuple[Array, float]:
+    """Return ln C, p - 1 and b for each exponent q, and the standard error of p."""
+    x, y, weight = points
+    terms = [np.exp(exponent * (x - np.log(high))) for exponent in exponents]
+    root = np.sqrt(weight / weight.mean())
+    A, b = root[:, None] * np.stack([np.ones_like(x), x, *terms], axis=1), root * y
+    found, *_ = np.linalg.lstsq(A, b)
+    spread = ((A @ found - b) ** 2).sum() / max(len(x) - A.shape[1], 1)
+    return found, float(np.sqrt(spread * np.linalg.inv(A.T @ A)[1, 1]))

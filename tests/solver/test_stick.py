@@ -1,0 +1,44 @@
+"""How much of a contact sticks, by what its points do."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from solver.results.stick import STICK_FRACTION, STICK_HALF_WIDTH, stick, stick_half_width
+from solver.results.touch import ContactPoints, Nothing
+
+
+def points(x, closed, sticking):
+    return ContactPoints(
+        x=np.array(x, dtype=float),
+        pressure=np.array(closed, dtype=float),
+        closed=np.array(closed, dtype=bool),
+        sticking=np.array(sticking, dtype=bool),
+    )
+
+
+@pytest.mark.parametrize(
+    ("closed", "sticking", "half", "whole"),
+    [
+        ("1111", "1100", 1.5, 0.75),  # slip beyond: half-way
+        ("1110", "1110", 2.0, 1.0),  # open beyond: the contact ends there
+        ("1111", "1111", 3.0, 1.5),
+        ("1111", "0110", 2.5, 1.0),
+        ("1111", "0000", 0.0, 0.0),
+        ("0000", "0000", 0.0, 0.0),
+    ],
+)
+def test_the_end_of_the_part_that_sticks(closed, sticking, half, whole):
+    """``half`` of bodies symmetric about x = 0, ``whole`` where all of the contact is computed."""
+    row = points(range(4), [c == "1" for c in closed], [c == "1" for c in sticking])
+    assert stick_half_width(row, symmetric=True) == half
+    assert stick_half_width(row, symmetric=False) == whole
+
+
+def test_without_contact_nothing_is_known() -> None:
+    look = SimpleNamespace(touch=Nothing(), loaded=None)
+    found = stick(look)
+    assert np.isnan([found[STICK_HALF_WIDTH], found[STICK_FRACTION]]).all()
