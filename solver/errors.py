@@ -48,4 +48,4 @@ class WindowTooSmall(NotConverged):
 
 
 class LimitLoad(NotConverged):
-    """The load cannot grow beyond ``reached``: the structure flows plastically at constant load."""
+    """The load cannot grow beyond ``reached``: a body flows plastically, or slides off."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.problem import OPEN, bound_lines, least
+from solver.contact.rows import Rows, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,14 +25,6 @@ _MARGIN = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
-    """Derivatives of all gaps (and slips) with respect to the unknowns ``dofs`` of one part."""
-
-    dofs: NDArray[np.int64]
-    block: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
 class Candidates:
     """Vertices near contact; gaps first, then slips since the last converged state.
 
@@ -39,7 +32,7 @@ class Candidates:
     ----------
     vertices : for each interface, the slave vertices that are candidates
     friction : (n,) coefficient; zero at a vertex that had no contact before and whose approach
-        is not known: it starts without tangential force
+        is not known, so that it starts without tangential force, unless all vertices grip
     limit : (n,) largest tangential force at any normal force [N]
     cohesion : (n,) tangential force that needs no normal force [N], zero like ``friction``
     motion : (n or 2n,) gap, and slip when there is friction [mm]
@@ -69,6 +62,16 @@ class Candidates:
     def n(self) -> int:
         """Number of candidate vertices."""
         return len(self.friction)
+
+    @property
+    def slippery(self) -> bool:
+        """Whether a candidate has no friction where there are slips."""
+        return len(self.motion) > self.n and not (self.friction + self.cohesion).all()
+
+    def smooth(self) -> Candidates:
+        """Return the same candidates without friction."""
+        nothing = np.zeros(self.n)
+        return replace(self, friction=nothing, cohesion=nothing)
 
     def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
         """Return the nodal forces (size,) that contact forces exert on a part [N]."""
@@ -193,11 +196,14 @@ def find_candidates(
     u: tuple[NDArray[np.float64], ...],
     contacts: tuple[ContactState, ...],
     span: float = 0.0,
+    *,
+    grip: bool = False,
 ) -> Candidates:
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if the rates of its approach are known from the last increment.
+    it touched, if the rates of its approach are known from the last increment. Where they are not
+    and the vertices ``grip``, slips count from ``start``, else these have no friction yet.
     """
     time = start.time + span
     pairings = [interface.pairing(u, time) for interface in system.interfaces]
@@ -221,11 +227,7 @@ def find_candidates(
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
-        if interface.floating and len(at) and not before.touching.any():
-            # only the first point to touch can hold a floating body: it gets friction at once
-            first_point = normal.start + before.gap[at].argmin()
-            apart[first_point] = np.nan_to_num(apart[first_point])
-        known = ~np.isnan(apart[normal])
+        known = ~np.isnan(apart[normal]) | grip
         friction[normal] = np.where(known, interface.friction, 0.0)
         cohesion[normal] = np.where(known, interface.cohesion * pairing.area[at], 0.0)
         apart[normal] = np.nan_to_num(apart[normal])
@@ -256,7 +258,7 @@ def find_candidates(
         apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
-        rows=tuple(_join(p) for p in pieces),
+        rows=tuple(joined(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
         beyond=float(beyond),
@@ -283,13 +285,3 @@ def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np
         margin = margin + max(pairing.gap.min(initial=np.inf, where=pairing.area > 0), 0.0)
     near = (pairing.gap < margin) | (contact.normal > 0)
     return np.flatnonzero(near & (pairing.area > 0))
-
-
-def _join(pieces: list[Rows]) -> Rows | None:
-    """Return the rows of all surfaces of a part; unknowns that surfaces share occur once."""
-    if not pieces:
-        return None
-    dofs, place = np.unique(np.concatenate([p.dofs for p in pieces]), return_inverse=True)
-    block = np.zeros((len(pieces[0].block), len(dofs)))
-    np.add.at(block, (slice(None), place), np.hstack([p.block for p in pieces]))  # type: ignore[arg-type]
-    return Rows(dofs, block)

@@ -32,6 +32,7 @@ from solver.loading.control import Tolerances
 from solver.loading.flow import Flow, adrift, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
+from solver.loading.slide import slide
 from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ class Increment:
     ----------
     guess : state to iterate from, ``start`` when absent; prescribed motions are those at ``time``
     contact : False takes the bodies apart
+    friction : False leaves it out
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
     patient : if no body can flow without hardening, so that an equilibrium exists, use all
@@ -77,6 +79,7 @@ class Increment:
         *,
         guess: State | None = None,
         contact: bool = True,
+        friction: bool = True,
         elastic_first: bool = True,
         elastic_only: bool = False,
         patient: bool = False,
@@ -87,6 +90,7 @@ class Increment:
         self.time = time
         self.guess = guess
         self.contact = contact
+        self.friction = friction
         self.elastic_first = elastic_first
         self.elastic_only = elastic_only
         materials = [part.body.material for part in system.parts]
@@ -97,6 +101,8 @@ class Increment:
         # in a corner of the yield surface no tangent is left: a little elastic stiffness stays
         self._softened = any(part.body.law.cornered for part in system.parts)
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
+        # vertices touch without friction, for their slip is not known, unless nothing else holds
+        self._grip = False
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -133,8 +139,12 @@ class Increment:
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
+                if candidates.slippery and not self._grip:
+                    self._grip = True
+                    continue
                 if error > _UNBALANCED * tolerances.residual:
-                    failure.flow = softest
+                    failure.why = softest
+                failure.why = slide(self.system, residuals, candidates) or failure.why
                 raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
@@ -159,23 +169,20 @@ class Increment:
     # -- 1, 2: where we are ------------------------------------------------------------------
 
     def _respond(self, u: Vectors) -> tuple[Response, ...]:
-        return tuple(
-            part.respond(ui, plastic, self.time)
-            for part, ui, plastic in zip(self.system.parts, u, self.start.plastic, strict=True)
-        )
+        each = zip(self.system.parts, u, self.start.plastic, strict=True)
+        return tuple(part.respond(ui, plastic, self.time) for part, ui, plastic in each)
 
     def _residuals(self, u: Vectors, responses: Sequence[Response]) -> Vectors:
         """Return external minus internal forces of each part, contact forces left out."""
-        return tuple(
-            part.residual(self.time, ui, response)
-            for part, ui, response in zip(self.system.parts, u, responses, strict=True)
-        )
+        each = zip(self.system.parts, u, responses, strict=True)
+        return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
 
     def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
         if not self.contact:
             return no_candidates(self.system)
         span = self.time - self.start.time
-        return find_candidates(self.system, self.start, u, contacts, span)
+        found = find_candidates(self.system, self.start, u, contacts, span, grip=self._grip)
+        return found if self.friction else found.smooth()
 
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
         """Return the force level [N], the relative residual and relative contact violation."""
@@ -241,12 +248,12 @@ class Increment:
         # where vertices change status, contact forces before the step may make its slope negative;
         # with those after the step the slope is the quadratic form of the tangent
         before = candidates.forces
-        if self._slope(step, residuals, candidates, before) <= 0:
+        if step.slope(self.system, residuals, candidates, before) <= 0:
             before = step.forces
 
         def along(share: float, residual: Vectors) -> float:
             forces = (1 - share) * before + share * step.forces
-            return self._slope(step, residual, candidates, forces)
+            return step.slope(self.system, residual, candidates, forces)
 
         def slope(share: float) -> float:
             nonlocal trial
@@ -256,13 +263,6 @@ class Increment:
 
         share = search(slope, along(0.0, residuals))
         return share, *trial
-
-    def _slope(
-        self, step: Step, residual: Vectors, candidates: Candidates, forces: NDArray[np.float64]
-    ) -> float:
-        """Return minus the derivative of the energy along a step under given contact forces."""
-        terms = zip(step.u, residual, on_parts(self.system, candidates, forces), strict=True)
-        return sum(float(du @ (r + c)) for du, r, c in terms)
 
     # -- 6: the end ----------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.errors import NotConverged, SolverError
 from solver.loading.flow import Flow
+from solver.loading.slide import Slide
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,11 +22,11 @@ class Yielded(SolverError):
 
 
 class IncrementFailed(SolverError):
-    """The increment did not converge; ``flow`` is the softest of its late steps."""
+    """The increment did not converge; ``why`` is the softest of its late steps, or a slide."""
 
-    def __init__(self, message: str, flow: Flow | None = None) -> None:
+    def __init__(self, message: str, why: Flow | Slide | None = None) -> None:
         super().__init__(message)
-        self.flow = flow or Flow()
+        self.why = why or Flow()
 
 
 @dataclass(frozen=True, slots=True)

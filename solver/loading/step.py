@@ -31,6 +31,17 @@ class Step:
     status: NDArray[np.int64]
     pivoted: bool
 
+    def slope(
+        self,
+        system: System,
+        residual: Vectors,
+        candidates: Candidates,
+        forces: NDArray[np.float64],
+    ) -> float:
+        """Return minus the derivative of the energy along the step under given contact forces."""
+        terms = zip(self.u, residual, on_parts(system, candidates, forces), strict=True)
+        return sum(float(du @ (r + c)) for du, r, c in terms)
+
 
 def on_parts(system: System, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
     """Return the nodal forces that contact forces exert on each part [N]."""

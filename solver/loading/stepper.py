@@ -77,9 +77,7 @@ class Stepper:
         if not self.system.overlaps(point.now.state):
             return point
         try:
-            pushed = Increment(
-                self.system, point.now.state, time, tolerances=self.control.tolerances
-            ).solve()
+            pushed = self._pushed_apart(point.now.state, time)
         except IncrementFailed as failure:
             error = NotConverged(
                 "the overlap of the bodies before loading could not be pushed apart: "
@@ -88,6 +86,18 @@ class Stepper:
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
         pushed = self._worked(point.now, pushed)
         return self._after(point, pushed, ())
+
+    def _pushed_apart(self, state: State, time: float) -> Converged:
+        """Return the increment that undoes an overlap: without friction, for nothing was slid.
+
+        With friction where the load at the beginning finds no equilibrium without it.
+        """
+        try:
+            return Increment(
+                self.system, state, time, friction=False, tolerances=self.control.tolerances
+            ).solve()
+        except IncrementFailed:
+            return Increment(self.system, state, time, tolerances=self.control.tolerances).solve()
 
     def _balanced(self, state: State) -> State:
         """Return the state in which the initial stress of each body is in equilibrium."""
@@ -200,8 +210,8 @@ class Stepper:
     def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
         way = f"between {self.place(reached)} and {self.place(attempted)}"
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
-        if failure.flow.limit and growing:
-            return LimitLoad(f"no equilibrium {way}: {failure.flow}", reached, attempted)
+        if failure.why.limit and growing:
+            return LimitLoad(f"no equilibrium {way}: {failure.why}", reached, attempted)
         return NotConverged(f"the increment {way} failed: {failure}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:

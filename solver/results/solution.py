@@ -1,10 +1,10 @@
-"""Solve a model of your own: load it, release it, and read both states."""
+"""Solve a model of your own, and read its states."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from solver.contact.system import System
 from solver.errors import ModelError
 from solver.loading.control import PathControl
 from solver.loading.outcome import Tally
+from solver.loading.program import Lap, Program
 from solver.loading.walker import Walker
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
@@ -20,61 +21,69 @@ from solver.results.samples import Nodal
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
     from solver.fem.rigid import RigidMotion
+    from solver.loading.program import Stage
     from solver.model.model import Model
-
-StageName = Literal["loaded", "unloaded"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solution:
-    """A model loaded to ``load`` and released.
+    """A model after each stage of its loading: ``loaded`` and ``unloaded`` if none are given.
 
     Attributes
     ----------
     system : the model's parts and interfaces
-    load : the load factor reached
-    loaded, unloaded : the converged states
+    stages : the converged states at the ends of the stages, by name
     tally : its cost
     history : every increment in a few numbers, the state before the first one too
     """
 
     system: System
-    load: float
-    loaded: Converged
-    unloaded: Converged
+    stages: Mapping[str, Converged]
     tally: Tally
     history: tuple[Observed, ...] = ()
 
-    def _at(self, stage: StageName) -> Converged:
-        if stage not in ("loaded", "unloaded"):
-            raise ModelError("stage", stage, "must be loaded or unloaded")
-        return self.loaded if stage == "loaded" else self.unloaded
+    @property
+    def loaded(self) -> Converged:
+        """The state under load."""
+        return self._at("loaded")
+
+    @property
+    def unloaded(self) -> Converged:
+        """The state after unloading, bodies taken apart."""
+        return self._at("unloaded")
+
+    def _at(self, stage: str) -> Converged:
+        if stage not in self.stages:
+            raise ModelError("stage", stage, f"must be one of {', '.join(self.stages)}")
+        return self.stages[stage]
 
     def nodes(self, body: str) -> NDArray[np.float64]:
         """Return node positions (2, n_nodes) of a body [mm]."""
         return self.system.full(body).X
 
-    def displacement(self, body: str, stage: StageName = "unloaded") -> NDArray[np.float64]:
+    def displacement(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return nodal displacements (2, n_nodes) [mm]."""
         return self.system.displacement(body, self._at(stage).state).reshape(-1, 2).T
 
-    def stress(self, body: str, stage: StageName = "unloaded") -> NDArray[np.float64]:
+    def stress(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
 
         Unloaded, this is the residual stress.
         """
         return to_tensor(Nodal(self.system).stress(body, self._at(stage)))
 
-    def plastic_strain(self, body: str) -> NDArray[np.float64]:
+    def plastic_strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
-        return Nodal(self.system).plastic_strain(body, self.unloaded)
+        return Nodal(self.system).plastic_strain(body, self._at(stage))
 
     def contact(
-        self, pair: int = 0, stage: StageName = "loaded"
+        self, pair: int = 0, stage: str = "loaded"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave.
 
@@ -86,38 +95,45 @@ class Solution:
         pressure, shear = contact_pressure(self.system, state, pair, deformed=True)
         return chain.X[:, chain.vertices], pressure, shear
 
-    def motion(self, body: str, stage: StageName = "loaded") -> RigidMotion:
+    def motion(self, body: str, stage: str = "loaded") -> RigidMotion:
         """Return the motion of a rigid body: x, y [mm] and rotation [rad]."""
         return self._observed(body, stage).motions[body]
 
-    def reaction(self, body: str, stage: StageName = "loaded") -> tuple[float, float, float]:
+    def reaction(self, body: str, stage: str = "loaded") -> tuple[float, float, float]:
         """Return what acts on a rigid body besides contact: forces [N] and moment [N mm]."""
         return self._observed(body, stage).reactions[body]
 
-    def _observed(self, body: str, stage: StageName) -> Observed:
+    def _observed(self, body: str, stage: str) -> Observed:
         known = [rigid.name for rigid in self.system.model.rigid]
         if body not in known:
             allowed = "must be a rigid body: " + (", ".join(known) or "the model has none")
             raise ModelError("body", body, allowed)
         return observe(self.system, self._at(stage))
 
-    def audit(self) -> Audit:
-        """Return the audit: figures of this solution, violated conditions and warnings."""
-        return audit(self.system, self.loaded, self.unloaded, self.tally.dissipation)
+    def audit(self, stage: str = "loaded") -> Audit:
+        """Return the audit: figures of a state, violated conditions and warnings.
+
+        With the state under load goes the one after unloading.
+        """
+        after = self.stages.get("unloaded") if stage == "loaded" else None
+        return audit(self.system, self._at(stage), after, self.tally.dissipation)
 
 
 def solve(
     model: Model,
     *,
     load: float = 1.0,
+    stages: Sequence[Stage] = (),
     control: PathControl | None = None,
     linear_solver: str = "auto",
 ) -> Solution:
-    """Load a model to a multiple of its pressures, take the bodies apart, and return both states.
+    """Load a model to a multiple of its loads, take the bodies apart, and return both states.
 
     Parameters
     ----------
-    load : load factor: multiple of the pressures of the model's bodies
+    load : load factor: multiple of all loads of the model
+    stages : ends of loading and increments in its place, for loads with amplitudes, which are
+        functions of time; the solution then has these states
     control : increments and tolerances; twenty increments of loading when absent
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
 
@@ -129,21 +145,23 @@ def solve(
     """
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
-    for body in model.bodies:
+    names = [stage.name for stage in stages]
+    if len(set(names)) < len(names):
+        raise ModelError("stages", names, "must have names of their own")
+    control = control or PathControl(load_step=load / 20)
+    program = Program(laps=(Lap(tuple(stages)),)) if stages else control.program(load)
+    for body in () if stages else model.bodies:
         if any(load.amplitude is not None and load.varies for load in body.every_load):
-            allowed = "must be absent: solve raises a load factor; walk a Program by a Walker"
+            allowed = "must be absent where no stages are given: solve raises a load factor"
             raise ModelError("amplitude", body.name, allowed)
     system = System(model, linear_solver)
-    control = control or PathControl(load_step=load / 20)
     walker = Walker(system, control, watch=partial(observe, system))
-    (outcome,) = walker.walk([control.program(load)])
+    (outcome,) = walker.walk([program])
     if outcome.error is not None:
         raise outcome.error
     return Solution(
         system=system,
-        load=load,
-        loaded=outcome.points["loaded"],
-        unloaded=outcome.points["unloaded"],
+        stages=outcome.points,
         tally=outcome.tally,
         history=outcome.history,
     )

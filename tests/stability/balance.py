@@ -49,7 +49,7 @@ def judge(solution: Solution, applied: Mapping[int, float]) -> dict[str, Figure]
     """Return the figures; ``applied`` is the vertical force above a pair, where known [N]."""
     system, loaded = solution.system, solution.loaded
     model = system.model
-    level = max(_norm(system.full(b.name).external(solution.load)) for b in model.bodies)
+    level = max(_norm(system.full(b.name).external(loaded.state.time)) for b in model.bodies)
     level = max([level, *(abs(f) for f in applied.values())])
     travel = max(float(np.abs(solution.displacement(b.name, "loaded")).max()) for b in model.bodies)
     found = dict.fromkeys(LIMITS, 0.0)

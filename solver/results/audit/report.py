@@ -59,10 +59,10 @@ def _largest(*values: float) -> float:
 
 
 def audit(
-    system: System, loaded: Converged, unloaded: Converged, least_dissipation: float
+    system: System, loaded: Converged, unloaded: Converged | None, least_dissipation: float
 ) -> Audit:
-    """Check one run: its state under load and after unloading."""
-    states = (loaded, unloaded)
+    """Check one run: its state under load and, where there is one, after unloading."""
+    states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
     bodies, released = (
         [AuditedBody(system, body, converged) for body in plain] for converged in states
@@ -73,7 +73,7 @@ def audit(
              "audit_slip")  # fmt: skip
     figures = {
         "audit_residual": _largest(
-            imbalance(system, bodies, loaded), imbalance(system, released, unloaded)
+            imbalance(system, bodies, loaded), imbalance(system, released, states[1])
         ),
         "audit_reactions": reactions(bodies, pairs, loaded),
         "audit_action_reaction": action_reaction(system, bodies, pairs, loaded),
@@ -83,10 +83,10 @@ def audit(
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_energy": _energy_error(bodies, loaded),
         "audit_dissipation": least_dissipation,
-        "audit_contact_after_unloading": left_on(released),
+        "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
     }  # fmt: skip
     figures |= _strength(system, loaded) | _discretisation(system, states)
-    largest = max(float(p.accumulated.max(initial=0.0)) for p in unloaded.state.plastic)
+    largest = max(float(p.accumulated.max(initial=0.0)) for p in states[1].state.plastic)
     violations = _violations(system, figures, loaded, pairs)
     strayed = tuple(text for pair in pairs for text in pair.warnings())
     return Audit(figures, violations, warnings(figures, largest) + strayed)

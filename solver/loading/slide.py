@@ -1,0 +1,75 @@
+"""A body that friction no longer holds: it slides as a whole, which no growing load can mend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from solver.contact.problem import bound_lines, least
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.contact.candidates import Candidates
+    from solver.contact.system import System
+
+_ALONG = 1e-6
+"""Share of normal motion in a motion along the contact: the surfaces are as straight as that."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slide:
+    """The rigid motion of ``body`` along its contacts on which its load does more than friction.
+
+    ``ratio`` is the power of the load over the largest that friction can take.
+    """
+
+    body: str
+    ratio: float
+
+    @property
+    def limit(self) -> bool:
+        """Whether no equilibrium exists: where there is a slide, none does (upper bound)."""
+        return True
+
+    def __str__(self) -> str:
+        return (
+            f"body {self.body!r} slides on all its contacts: its load is {self.ratio:.4g} times "
+            "what friction can bear"
+        )
+
+
+def slide(
+    system: System, residuals: Sequence[NDArray[np.float64]], candidates: Candidates
+) -> Slide | None:
+    """Return how a floating body slides under the normal forces of the candidates, if it does.
+
+    Looked at are motions along all closed contacts, which do not change normal forces at once.
+
+    Parameters
+    ----------
+    residuals : external minus internal forces of each part, contact forces left out [N]
+    """
+    n = candidates.n
+    N = candidates.forces[:n]
+    closed = N > 0
+    if not closed.any():
+        return None
+    bound = least(bound_lines(candidates.friction, candidates.cohesion, candidates.limit), N)
+    for i, part in enumerate(system.parts):
+        motion = candidates.of_part(i, part.rigid)
+        if len(motion) == n or not motion.size:
+            continue
+        along = linalg.null_space(motion[:n][closed], rcond=_ALONG)
+        load = along.T @ (part.rigid.T @ residuals[i])
+        for way in (*np.eye(len(load)), load):
+            power = abs(float(load @ way))
+            most = float(bound @ np.abs(motion[n:] @ along @ way))
+            if power > most > 0:
+                return Slide(body=part.body.name, ratio=power / most)
+    return None

@@ -1,0 +1,99 @@
+"""What friction holds, what it does not hold, and what no friction must hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import (
+    Amplitude,
+    Body,
+    ContactPair,
+    LimitLoad,
+    Material,
+    Model,
+    ModelError,
+    Solution,
+    Stage,
+    Traction,
+    solve,
+)
+from solver.mesh import grid, mapped
+
+ELASTIC = Material(youngs_modulus=2e5, poisson_ratio=0.3)
+AREA = np.pi * (25.0**2 - 10.0**2)
+FIRST, THEN = Amplitude([0, 1], [0, 1]), Amplitude([1, 2], [0, 1])
+STAGES = (Stage(name="fitted", target=1.0, steps=4), Stage(name="pushed", target=2.0, steps=16))
+
+
+def pushed(push: float, stages: Any = STAGES, **own: Any) -> Solution:
+    """Press a hub on a shaft, then push it along [MPa on its end]."""
+    shaft = Body(name="shaft", mesh=grid(np.linspace(0, 10, 5), np.linspace(-5, 25, 13)),
+                 material=ELASTIC, kinematics="axisymmetric",
+                 supports={"left": "x", "bottom": "y"})  # fmt: skip
+    hub = Body(name="hub", mesh=grid(np.geomspace(10, 25, 7), np.linspace(0, 20, 9)),
+               material=ELASTIC, kinematics="axisymmetric",
+               loads=(Traction(boundary="top", y=-push, amplitude=THEN),))  # fmt: skip
+    pair = ContactPair(slave=("hub", "left"), master=("shaft", "right"), interference=0.01,
+                       amplitude=FIRST, **own)  # fmt: skip
+    return solve(Model(bodies=(shaft, hub), contacts=(pair,)), stages=stages)
+
+
+@pytest.mark.parametrize("own", [{"friction": 0.1}, {"friction": 0.05, "cohesion": 8.0}])
+def test_a_fit_is_pushed_off_by_as_much_as_friction_bears(own: dict[str, float]) -> None:
+    held = pushed(2.0, **own)
+    assert held.stages["pushed"].state.contacts[0].tangential.sum() == pytest.approx(-2.0 * AREA)
+    assert held.audit("pushed").passed, held.audit("pushed").violations
+    normal = held.stages["pushed"].state.contacts[0].normal.sum()
+    borne = own["friction"] * normal + own.get("cohesion", 0.0) * 2 * np.pi * 10.0 * 20.0
+    with pytest.raises(LimitLoad, match="body 'hub' slides on all its contacts") as caught:
+        pushed(20.0, **own)
+    error = caught.value
+    reached, attempted = ((time - 1.0) * 20.0 * AREA for time in (error.reached, error.attempted))
+    # pushed from one end the hub grows thicker, and friction bears a little more
+    assert reached < 1.01 * borne
+    assert attempted > 0.99 * borne
+
+
+def test_stages_have_names_of_their_own() -> None:
+    twice = (Stage(name="on", target=1.0), Stage(name="on", target=2.0))
+    with pytest.raises(ModelError, match=r"stages = .*names of their own"):
+        pushed(2.0, stages=twice)
+    with pytest.raises(ModelError, match="stage = 'loaded': must be one of fitted, pushed"):
+        pushed(2.0, friction=0.3).contact()
+
+
+def wheel(overlap: float, **own: Any) -> Solution:
+    """Lay a piece of a wheel that contact alone holds on a block, push it down and sideways."""
+    angles = np.linspace(-np.pi / 2 - 0.6, -np.pi / 2 + 0.6, 49)
+
+    def to_ring(p: np.ndarray) -> np.ndarray:
+        return np.stack([p[0] * np.cos(p[1]), 10.0 - overlap + p[0] * np.sin(p[1])])
+
+    piece = Body(name="piece", mesh=mapped(grid(np.linspace(6.0, 10.0, 7), angles), to_ring),
+                 material=ELASTIC, **own)  # fmt: skip
+    block = Body(name="block", mesh=grid(np.linspace(-4.0, 4.0, 65), np.linspace(-4.0, 0.0, 17)),
+                 material=ELASTIC, supports={"bottom": "xy"})  # fmt: skip
+    pair = ContactPair(slave=("piece", "right"), master=("block", "top"), friction=0.3)
+    return solve(Model(bodies=(piece, block), contacts=(pair,)))
+
+
+@pytest.mark.parametrize("aside", [0.05, 0.2])
+def test_friction_holds_a_body_from_its_first_contact(aside: float) -> None:
+    """Both loads grow together: friction carries what pushes sideways in every increment."""
+    found = wheel(0.0, loads=(Traction(boundary="left", x=-100.0 * aside, y=-100.0),))
+    contact = found.loaded.state.contacts[0]
+    for observed in found.history[1:-1]:
+        across, up, _ = observed.reactions["block"]
+        assert across == pytest.approx(aside * up, rel=1e-6)
+    assert (np.abs(contact.tangential) <= 0.3 * contact.normal + 1e-6 * up).all()
+
+
+def test_bodies_that_overlap_part_without_friction() -> None:
+    """Nothing slid where they overlap before loading: no shear is left by pushing them apart."""
+    found = wheel(0.02, supports={"left": "xy"})
+    contact = found.loaded.state.contacts[0]
+    assert contact.normal.sum() > 100.0
+    assert np.abs(contact.tangential).max() == 0.0
