@@ -21,7 +21,7 @@ from solver.tensors import identity
 
 
 @dataclass(frozen=True, kw_only=True)
-class Voce(Law):
+class Saturating(Law):
     """Von Mises plasticity with isotropic hardening that saturates.
 
     ``yield_stress`` is Y and ``growth`` is Q [MPa]; ``rate`` is b. It ends at a limit load, and
@@ -83,7 +83,7 @@ class Voce(Law):
 
 
 steel = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
-law = Voce(elasticity=steel, yield_stress=300.0, growth=150.0, rate=40.0)
+law = Saturating(elasticity=steel, yield_stress=300.0, growth=150.0, rate=40.0)
 LENGTH, TENSION = 10.0, 400.0
 
 # A bar is pulled to 400 MPa and let go. Where tension is all there is (in plane stress, and in a

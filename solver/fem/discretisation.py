@@ -227,10 +227,13 @@ class Discretisation(Nodes, Part):
         elastic = (strain * (C @ strain)).sum(axis=0) @ weight
         return float(tangent), float(elastic)
 
-    def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the point (x, y) that a step strains most [mm]."""
-        at = int((self.strain(step) ** 2).sum(axis=0).argmax())
-        x, y = self.points.reshape(2, -1)[:, at]
+    def most_strained(self, step: NDArray[np.float64]) -> int:
+        """Return the point that a step (n,) strains most."""
+        return int((self.strain(step) ** 2).sum(axis=0).argmax())
+
+    def place(self, point: int) -> tuple[float, float]:
+        """Return where (x, y) a point is [mm]."""
+        x, y = self.points.reshape(2, -1)[:, point]
         return float(x), float(y)
 
     def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:

@@ -173,9 +173,14 @@ class Part(ABC):
         """Return for each unknown the one that lies ``way`` [mm] behind it along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
-    def most_strained(self, step: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the point (x, y) that a step (n,) strains most [mm]; NaN without points."""
+    def most_strained(self, step: NDArray[np.float64]) -> int:
+        """Return the point that a step (n,) strains most; 0 without points."""
         del step
+        return 0
+
+    def place(self, point: int) -> tuple[float, float]:
+        """Return where (x, y) a point is [mm]; NaN without points."""
+        del point
         return np.nan, np.nan
 
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,10 +13,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.part import Part
-    from solver.materials import Response
+    from solver.materials import Law, PlasticState, Response
 
 _FLOWING = 0.02
 """Share of the elastic stiffness along a late step, below which the structure flows."""
+_EXHAUSTED = 0.99
+"""Share of the largest stress of a law, beyond which little hardening is left."""
 _MECHANISM = 1e-2
 """The same for bodies without load."""
 _MOVES = 1e-3
@@ -29,7 +31,7 @@ class Flow:
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
     ``place`` (x, y) [mm] say what it strained most, ``proves`` whether its material can have no
-    other reason for it than a limit load: it does not harden, and its stress meets no corner.
+    other reason for it than a limit load: it hardens no more, and its stress meets no corner.
     """
 
     stiffness: float = 1.0
@@ -70,13 +72,20 @@ def softer(
     if not elastic > 0 or tangent / elastic >= than.stiffness:
         return than
     most = int((forms[:, 1] - forms[:, 0]).argmax())
-    law = parts[most].body.law
+    law, at = parts[most].body.law, parts[most].most_strained(step[most])
     return Flow(
         stiffness=max(float(tangent / elastic), 0.0),  # less is rounding
         body=parts[most].body.name,
-        place=parts[most].most_strained(step[most]),
-        proves=not (law.hardens or law.cornered),
+        place=parts[most].place(at),
+        proves=not (law.hardens or law.cornered) and _exhausted(law, responses[most].state, at),
     )
+
+
+def _exhausted(law: Law, state: PlasticState, point: int) -> bool:
+    """Whether a law whose stress has a bound is next to it at a point."""
+    bound = law.ultimate_shear_stress
+    strength = law.shear_strength(state.at(np.array([point])))[0] if np.isfinite(bound) else bound
+    return bool(strength >= _EXHAUSTED * bound)
 
 
 def adrift(

@@ -8,10 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import ModelError
+from solver import (
+    Body,
+    LimitLoad,
+    Model,
+    ModelError,
+    NotConverged,
+    PathControl,
+    Tolerances,
+    solve,
+)
 from solver.materials import BackStress, Chaboche, Elasticity, Layered, PlaneStress, Table, Voce
 from solver.materials.tresca import TrescaMaterial
 from solver.materials.yield_surface import Tresca
+from solver.mesh import grid
 from tests.solver.laws import CURVES, LAYERED, SOFT, STEEL, chaboche, steel
 
 RE, E, G = 350.0, 2e5, STEEL.shear_modulus
@@ -392,3 +402,18 @@ def test_layers_of_a_material_without_lateral_contraction_follow_the_curve():
     law = Layered.of_curve(elasticity, (RE / E, 0.01), (RE, 450.0), slope=100.0)
     stress, _ = uniaxial(law, np.linspace(0.001, 0.01, 10))
     assert stress[-1] == pytest.approx(450.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pull", "iterations", "ends"), [(300.0, 2, NotConverged), (420.0, 40, LimitLoad)]
+)
+def test_only_a_curve_at_its_end_proves_a_limit_load(pull, iterations, ends):
+    """Soft but still hardening, a failed increment has another reason."""
+    law = Chaboche(elasticity=STEEL, curve=Voce(yield_stress=100.0, saturation=300.0, rate=8.0))
+    bar = Body(name="bar", mesh=grid(np.linspace(0.0, 2.0, 3), np.linspace(0.0, 1.0, 3)),
+               material=law, kinematics="plane_stress", supports={"left": "x", "bottom": "y"},
+               pressure={"right": -pull})  # fmt: skip
+    control = PathControl(load_step=0.5, tolerances=Tolerances(iterations=iterations))
+    with pytest.raises(NotConverged) as caught:
+        solve(Model(bodies=(bar,)), control=control)
+    assert type(caught.value) is ends

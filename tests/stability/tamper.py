@@ -62,19 +62,24 @@ def stressed(factor: float = 1.0, out_of_plane: float = 0.0, point: int | None =
     return change
 
 
+def with_state(solution: Solution, stage: str, state: Converged) -> Solution:
+    """Put another state in the place of that of a stage."""
+    return replace(solution, stages={**solution.stages, stage: state})
+
+
 def loaded(tamper: Tamper) -> Callable[[Solution], Solution]:
     """Apply to the loaded state."""
-    return lambda s: replace(s, loaded=tamper(s.loaded))
+    return lambda s: with_state(s, "loaded", tamper(s.loaded))
 
 
 def unloaded(tamper: Tamper) -> Callable[[Solution], Solution]:
     """Apply to the unloaded state."""
-    return lambda s: replace(s, unloaded=tamper(s.unloaded))
+    return lambda s: with_state(s, "unloaded", tamper(s.unloaded))
 
 
 def not_released(solution: Solution) -> Solution:
     """Leave the load on."""
-    return replace(solution, unloaded=solution.loaded)
+    return with_state(solution, "unloaded", solution.loaded)
 
 
 def free_energy(solution: Solution) -> Solution:
@@ -94,7 +99,7 @@ def cycle(which: str, tamper: Tamper) -> Callable[[reopening.Cycles], reopening.
 
 def in_heavy(tamper: Tamper) -> Callable[[tuple], tuple]:
     """Apply to the heavier of two solutions."""
-    return lambda pair: (pair[0], replace(pair[1], loaded=tamper(pair[1].loaded)))
+    return lambda pair: (pair[0], loaded(tamper)(pair[1]))
 
 
 def rolled(tamper: Tamper) -> Callable[[rolling.Rolled], rolling.Rolled]:

@@ -63,8 +63,8 @@ def friction_times(factor: float) -> Fault:
 def motion_offset(gap: float = 0.0, slip: float = 0.0) -> Fault:
     find = candidates.find_candidates
 
-    def shifted(*args: Any) -> Any:
-        found = find(*args)
+    def shifted(*args: Any, **options: Any) -> Any:
+        found = find(*args, **options)
         offset = np.concatenate([np.full(found.n, gap), np.full(len(found.motion) - found.n, slip)])
         return replace(found, motion=found.motion + offset)
 
@@ -132,7 +132,7 @@ def overlooked_contact(patch: Patch) -> None:
     patch.setattr(
         solver.loading.increment,
         "find_candidates",
-        lambda *args: replace(find(*args), beyond=np.inf),
+        lambda *args, **options: replace(find(*args, **options), beyond=np.inf),
     )
 
 
