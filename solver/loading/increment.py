@@ -96,8 +96,7 @@ class Increment:
         materials = [part.body.material for part in system.parts]
         self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
-        self._pivoted = 0
-        self._blended = 0
+        self._pivoted, self._blended = 0, 0
         # in a corner of the yield surface no tangent is left: a little elastic stiffness stays
         self._softened = any(part.body.law.cornered for part in system.parts)
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
@@ -115,17 +114,18 @@ class Increment:
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
         best, since_best, softest, moving = np.inf, 0, Flow(), False
-        series = Series()
+        series, begun = Series(), 0.0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
-            # overlapping bodies can begin with a residual of zero: later ones must not be compared
-            # with that
+            # bodies that overlap or are moved can begin in balance: later residuals are not
+            # compared with that, but with the first violation of contact
             best = max(min(best, error), tolerances.residual)
+            begun = begun if iteration else violation
             hopeless = since_best > _PATIENCE and not self.patient
-            hopeless |= error > _DIVERGED * best
+            hopeless |= error > max(_DIVERGED * best, begun)
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
             # a body that flows far moves far: not all that is out of balance may be rounding

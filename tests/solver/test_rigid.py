@@ -193,3 +193,19 @@ def test_models_with_bad_rigid_bodies_are_refused() -> None:
         Model(bodies=(ring,), rigid=(replace(one, x=Pushed(value=1.0)),))
     with pytest.raises(ModelError, match="'punch' can move freely"):
         pressed(body, replace(one, x=Pushed(value=1.0), y=Pushed(value=-1.0)))
+
+
+@pytest.mark.parametrize("steps", [1, 10])
+def test_a_ball_that_is_moved_comes_and_goes_in_any_number_of_increments(steps: int) -> None:
+    x = graded(20.0, 0.1, 1.3, 5.0)
+    block = Body(name="block", mesh=grid(x, -x[::-1]), kinematics="axisymmetric",
+                 material=Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=400.0),
+                 supports={"left": "x", "bottom": "xy"})  # fmt: skip
+    cap = arc((0.0, 10.0), 10.0, (-np.pi / 2, -np.pi / 2 + 0.3), 40)
+    ball = RigidBody(name="ball", surfaces={"cap": cap}, y=Moved(value=-0.1))
+    pair = ContactPair(slave=("block", "top"), master=("ball", "cap"))
+    found = solve(Model(bodies=(block,), rigid=(ball,), contacts=(pair,)),
+                  control=PathControl(load_step=1 / steps))  # fmt: skip
+    assert found.tally.cuts == 0
+    assert found.plastic_strain("block").max() > 0.05
+    assert found.audit().passed, found.audit().violations

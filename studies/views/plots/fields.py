@@ -11,7 +11,7 @@ from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError
 
 MAP = ("y", "x")
-ALONG = ("s", "depth")
+ALONG = ("s", "depth", "increment")
 """Dimensions that one figure of a run runs over: both of a map, or one of these for lines."""
 
 
@@ -31,7 +31,7 @@ def map_fields(dataset: xr.Dataset) -> list[str]:
 
 
 def line_fields(dataset: xr.Dataset) -> list[str]:
-    """Return the variables that are drawn as lines along the surface or along depth."""
+    """Return the variables that are drawn as lines along one of `ALONG`."""
     return [str(name) for name, each in dataset.data_vars.items() if set(ALONG) & set(each.dims)]
 
 

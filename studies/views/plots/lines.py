@@ -1,4 +1,4 @@
-"""Lines of one run: profiles along depth, and what acts on the contact surface."""
+"""Lines of one run: profiles along depth, what acts on the contact surface, and its course."""
 
 from __future__ import annotations
 
@@ -13,7 +13,14 @@ from matplotlib.figure import Figure
 
 from studies.errors import StudyError
 from studies.views.plots.captions import label, value_text, words, wrapped
-from studies.views.plots.fields import check_field, component_of, focus, line_fields, too_close
+from studies.views.plots.fields import (
+    ALONG,
+    check_field,
+    component_of,
+    focus,
+    line_fields,
+    too_close,
+)
 from studies.views.plots.maps import entitle
 from studies.views.reading import one_run
 
@@ -31,7 +38,9 @@ def line_figure(
     component: str | None = None,
     zoom: float | None = None,
 ) -> Figure:
-    """Return `field` along the surface or along depth: a line for each pass, station, stage, body.
+    """Return `field` along the surface, depth or increments: a line for each of the rest.
+
+    The rest are passes, stations, stages, bodies.
 
     Of more passes than can be told apart the first, the last and some between are drawn, and of
     several stations then the middle one.
@@ -43,7 +52,9 @@ def line_figure(
     run = one_run(run)
     check_field(field, line_fields(run))
     values = component_of(run[field], component)
-    along = "s" if "s" in values.dims else "depth"
+    along = next(name for name in ALONG if name in values.dims)
+    if zoom is not None and along == "increment":
+        raise StudyError("zoom", zoom, f"{field} lies over increments: leave it out")
     for name in values.dims:
         values = values.dropna(name, how="all")
     if not values.size:

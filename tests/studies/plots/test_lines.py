@@ -143,3 +143,13 @@ def test_lines_without_values_are_refused() -> None:
     run["pressure"] = (("s",), np.full(2, np.nan))
     with pytest.raises(StudyError, match="field = 'pressure': has no value in the run"):
         line_figure(run, "pressure")
+
+
+def test_a_course_is_drawn_over_increments_and_has_no_zoom() -> None:
+    run = grid_map(np.arange(1.0, 4.0), np.arange(-3.0, 0.0))
+    run = run.assign_coords(increment=("increment", np.arange(4), {"units": "1"}))
+    run["force"] = ("increment", np.array([0.0, 2.0, 3.0, np.nan]), {"units": "N"})
+    (line,) = lines_of(line_figure(run, "force"))
+    assert np.asarray(line.get_xdata()).tolist() == [0.0, 1.0, 2.0]
+    with pytest.raises(StudyError, match="force lies over increments: leave it out"):
+        line_figure(run, "force", zoom=1.0)
