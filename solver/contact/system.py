@@ -43,7 +43,8 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
     body = whole.body
     if body.axle is not None:
         return Wheel(whole, own, linear_solver)
-    if body.material.elastic and body.condense and own and not whole.driven.cases:
+    constant = not (whole.driven.cases or whole.heat)
+    if body.material.elastic and body.condense and own and constant:
         return Substructure(whole, own, linear_solver)
     return whole
 

@@ -10,6 +10,7 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
+from solver.fem.heat import Heat
 from solver.fem.loads import (
     Superposed,
     eigenstrains,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from solver.fem.surface import Surface
     from solver.linear.solvers import LinearSolver
-    from solver.materials import PlasticState, Response
+    from solver.materials import Law, PlasticState, Response
     from solver.model.body import Body
 
 
@@ -75,7 +76,7 @@ class Discretisation(Nodes, Part):
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.moves = body.travelling is not None
         self.loads = nodal_forces(self)
-        self._eigenstrains = eigenstrains(self)
+        self._eigenstrains, self.heat = eigenstrains(self), Heat.of(self)
         self.driven, self._prescribed = prescribed(self)
         self._hold()
 
@@ -155,6 +156,10 @@ class Discretisation(Nodes, Part):
         flat = np.matmul(self._flat_B, u[self.dofs][:, :, None])
         return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
 
+    def law(self, time: float) -> Law:
+        """Return the law of its points at a time: heat may change it."""
+        return self.heat.law(self.body.law, time) if self.heat else self.body.law
+
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
         """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""
         return self._eigenstrains.at(time).reshape(4, -1)
@@ -164,7 +169,7 @@ class Discretisation(Nodes, Part):
         strain = self.strain(u)
         if self._eigenstrains.cases:
             strain -= self.eigenstrain(time)
-        response = self.body.law.respond(strain, state)
+        response = self.law(time).respond(strain, state)
         if self.body.law.symmetric:
             return response
         tangent = response.tangent
@@ -236,11 +241,13 @@ class Discretisation(Nodes, Part):
         x, y = self.points.reshape(2, -1)[:, point]
         return float(x), float(y)
 
-    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+    def plastic_work(
+        self, before: PlasticState, response: Response, time: float
+    ) -> tuple[float, float]:
         """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
         flow = response.state.plastic_strain - before.plastic_strain
         work = (response.stress * flow).sum(axis=0) @ self.weights.ravel()
-        return float(work), float(self.body.law.dissipation(before, response).min())
+        return float(work), float(self.law(time).dissipation(before, response).min())
 
     # -- stiffness ---------------------------------------------------------------------------
 

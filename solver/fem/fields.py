@@ -130,6 +130,6 @@ def _reference(
     return np.asarray(local[:, :, 0])
 
 
-def elastic_energy(part: Part, stress: NDArray[np.float64]) -> float:
+def elastic_energy(part: Part, stress: NDArray[np.float64], time: float) -> float:
     """Return the elastic energy of Mandel stress (n_components, n_points) in a part [N mm]."""
-    return float(part.body.law.elasticity.energy_density(stress) @ part.volumes)
+    return float(part.law(time).energy_density(stress) @ part.volumes)

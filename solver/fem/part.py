@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from solver.fem.loads import Superposed
     from solver.fem.operators import PartOperators
     from solver.fem.surface import Surface
+    from solver.materials.law import Law
     from solver.materials.state import PlasticState, Response
     from solver.model.body import Body
     from solver.model.rigid import RigidBody
@@ -92,7 +93,9 @@ class Part(ABC):
         """Return the tangent and the elastic quadratic form of a step [N mm]."""
 
     @abstractmethod
-    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+    def plastic_work(
+        self, before: PlasticState, response: Response, time: float
+    ) -> tuple[float, float]:
         """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
 
     # -- what a meshed body at rest does -------------------------------------------------------
@@ -126,6 +129,11 @@ class Part(ABC):
     def force_level(self, time: float) -> float:
         """Return the size of the forces that load the part at a time [N]."""
         return float(np.linalg.norm(self.external(time)))
+
+    def law(self, time: float) -> Law:
+        """Return the law of its points at a time: heat may change it."""
+        del time
+        return self.body.law
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
         """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""

@@ -176,7 +176,9 @@ class RigidPart(Part):
         del step, response
         return 0.0, 0.0
 
-    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+    def plastic_work(
+        self, before: PlasticState, response: Response, time: float
+    ) -> tuple[float, float]:
         """Return zero."""
         del before, response
         return 0.0, 0.0

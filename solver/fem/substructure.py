@@ -148,7 +148,9 @@ class Substructure(Part):
         energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
         return energy, energy
 
-    def plastic_work(self, before: PlasticState, response: Response) -> tuple[float, float]:
+    def plastic_work(
+        self, before: PlasticState, response: Response, time: float
+    ) -> tuple[float, float]:
         """Return zero plastic work and zero least dissipation."""
         del before, response
         return 0.0, 0.0

@@ -40,13 +40,24 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
 
 
 def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
-    """Return the work of stress on the change of eigenstrain [N mm]."""
+    """Return the work of stress on the change of eigenstrain and of the elastic constants [N mm].
+
+    With the elastic strains e0, e1 and stresses s0, s1 of both ends, energy grows by exactly
+    (s0 + s1) (e1 - e0) / 2 + (s1 e0 - s0 e1) / 2. The second term is zero where the constants stay.
+    """
     times = before.state.time, now.state.time
     work = 0.0
     for part, old, new in zip(parts, before.responses, now.responses, strict=True):
         grown = part.eigenstrain(times[1]) - part.eigenstrain(times[0])
         if grown.any():
             work += float(((old.stress + new.stress) * grown).sum(axis=0) @ part.volumes) / 2
+        laws = [part.law(time) for time in times]
+        if laws[0] is not laws[1]:
+            both, *each = (
+                laws[1].energy_density(stress) - laws[0].energy_density(stress)
+                for stress in (old.stress + new.stress, old.stress, new.stress)
+            )
+            work += float((both - each[0] - each[1]) @ part.volumes) / 2
     return work
 
 

@@ -277,7 +277,7 @@ class Increment:
     ) -> Converged:
         contacts = candidates.kept(self.start.contacts, self.time - self.start.time)
         spent = [
-            part.plastic_work(before, response)
+            part.plastic_work(before, response, self.time)
             for part, before, response in zip(
                 self.system.parts, self.start.plastic, responses, strict=True
             )

@@ -61,8 +61,8 @@ class Stepper:
         """Return a state without contact forces as the first point of a lap."""
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         stresses = zip(self.system.parts, at_rest.responses, strict=True)
-        energy = Energy(stored=sum(elastic_energy(part, r.stress) for part, r in stresses))
-        now = replace(at_rest, state=state, energy=energy)
+        stored = sum(elastic_energy(part, r.stress, state.time) for part, r in stresses)
+        now = replace(at_rest, state=state, energy=Energy(stored=stored))
         return Point(now, (), tally or Tally(), self._watched((), now))
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:

@@ -3,13 +3,14 @@
 `Law` is the contract. `Material` is the law of the scenes: von Mises, linear hardening. `Chaboche`
 hardens along a `Voce` or `Table` curve and by back stresses that fade, `Layered` by layers that
 yield one after the other, `TrescaMaterial` yields by the largest shear stress. `PlaneStress` makes
-any law one for plane stress.
+any law one for plane stress, `Heated` lowers the stiffness and strength of any law.
 """
 
 from solver.materials.chaboche import BackStress, Chaboche
 from solver.materials.curves import Curve, Table, Voce
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening import LinearHardening
+from solver.materials.heated import Heated
 from solver.materials.law import Law
 from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
@@ -24,6 +25,7 @@ __all__ = [
     "Curve",
     "Elasticity",
     "Hardening",
+    "Heated",
     "Law",
     "Layered",
     "LinearHardening",

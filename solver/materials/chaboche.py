@@ -45,6 +45,10 @@ class ChabocheState(PlasticState):
 
     back: Array
 
+    def stretched(self, factor: Array) -> ChabocheState:
+        """Return the internal variables with all strains multiplied by factors (n_points,)."""
+        return ChabocheState(self.plastic_strain * factor, self.accumulated * factor, self.back)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chaboche(Law):

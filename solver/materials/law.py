@@ -89,6 +89,15 @@ class Law(ABC):
         """Return a special form of this law for plane stress; None means `PlaneStress`."""
         return None
 
+    def energy_density(self, stress: Array) -> Array:
+        """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
+        return self.elasticity.energy_density(stress)
+
+    def at(self, points: NDArray[np.int64]) -> Law:
+        """Return the law of some points: the same, where it is one for all."""
+        del points
+        return self
+
     # -- its strength --------------------------------------------------------------------------
 
     @attribute

@@ -39,6 +39,10 @@ class PlasticState:
         """Return the internal variables of some points."""
         return replace(self, **{f.name: getattr(self, f.name)[..., points] for f in fields(self)})
 
+    def stretched(self, factor: NDArray[np.float64]) -> Self:
+        """Return the internal variables with all strains multiplied by factors (n_points,)."""
+        return replace(self, **{f.name: getattr(self, f.name) * factor for f in fields(self)})
+
 
 class Response(NamedTuple):
     """The response of a law to a strain.

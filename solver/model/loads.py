@@ -128,22 +128,32 @@ class Displacement(_OnBoundary):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Temperature(Load):
-    """A rise of temperature, which lets the body expand.
+    """A rise of temperature, which lets the body expand, and may soften it.
 
     Attributes
     ----------
     rise : a number, or a function (positions (2, n) [mm]) -> (n,) [K]
     expansion : coefficient of linear thermal expansion [1/K]
+    modulus_drop, yield_drop : shares of Young's modulus and of the yield stress that are lost for
+        each kelvin [1/K]. Every slope of the tension curve falls with Young's modulus
     """
 
     rise: float | Field
     expansion: float
+    modulus_drop: float = 0.0
+    yield_drop: float = 0.0
 
     def check(self) -> None:
         """Raise `ModelError` for a number that is not finite."""
-        _finite("temperature.expansion", self.expansion, "1/K")
+        for name in ("expansion", "modulus_drop", "yield_drop"):
+            _finite(f"temperature.{name}", getattr(self, name), "1/K")
         if not callable(self.rise):
             _finite("temperature.rise", self.rise, "K")
+
+    @property
+    def softens(self) -> bool:
+        """Whether it changes the elastic constants or the yield stress."""
+        return bool(self.modulus_drop or self.yield_drop)
 
     def at(self, x: Array) -> Array:
         """Return the rise of temperature (n,) at positions (2, n) [K]."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged, State
     from solver.contact.system import System
+    from solver.materials.law import Law
     from solver.results.audit.plain import PlainBody
 
     Array = NDArray[np.float64]
@@ -49,6 +50,10 @@ class AuditedBody:
         """Return Mandel strain (4, n_points) from the displacements, without the eigenstrain."""
         strain = self.plain.strain(self._system.displacement(self.name, state))
         return strain.reshape(len(strain), -1) - self.plain.part.eigenstrain(state.time)
+
+    @cached_property
+    def _law(self) -> Law:
+        return self.plain.part.law(self._converged.state.time)
 
     @cached_property
     def _reached(self) -> Array:
@@ -117,7 +122,7 @@ class AuditedBody:
     def stored(self) -> float:
         """Return the elastic energy [N mm]; of a condensed body that of its kept unknowns."""
         if self.meshed:
-            return self.plain.elastic_energy(self.stress)
+            return self.plain.elastic_energy(self.stress, self._converged.state.time)
         return self.part.stiffness_along(self._u, self._response)[1] / 2
 
     @property
@@ -130,14 +135,14 @@ class AuditedBody:
         """Return how far the increment is from its law, and its stress beyond yield [MPa]."""
         if not self.meshed:
             return 0.0, 0.0
-        law, after = self.plain.body.law, self._response.state
+        law, after = self._law, self._response.state
         broken = law.misfit(self._reached, self.stress, self._before, after)
         beyond = law.yield_value(self.stress, after)
         return float(broken.max(initial=0.0)), float(beyond.max(initial=0.0))
 
     def increment_error(self) -> float:
         """Return the change of stress by smaller steps / yield stress, where the body flows."""
-        law, after = self.plain.body.law, self._response.state
+        law, after = self._law, self._response.state
         if not self.meshed or law.elastic:
             return 0.0
         flowing = np.flatnonzero(after.accumulated > self._before.accumulated)
@@ -145,4 +150,4 @@ class AuditedBody:
             return 0.0
         some = flowing[:: max(1, len(flowing) // _SAMPLE)]
         strains = self._strain(self._converged.start)[:, some], self._reached[:, some]
-        return increment_error(law, strains, self.stress[:, some], self._before.at(some))
+        return increment_error(law.at(some), strains, self.stress[:, some], self._before.at(some))

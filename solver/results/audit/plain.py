@@ -132,7 +132,7 @@ class PlainBody:
             total += load.factor(time) * (depth * force).sum(axis=(1, 2))
         return total
 
-    def elastic_energy(self, stress: Array) -> float:
-        """Return the energy of a Mandel stress (4, n_points) [N mm]."""
-        density = self.body.law.elasticity.energy_density(stress)
+    def elastic_energy(self, stress: Array, time: float) -> float:
+        """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""
+        density = self.part.law(time).energy_density(stress)
         return float((density * self.volume.ravel()).sum())

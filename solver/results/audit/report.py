@@ -120,7 +120,7 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
     for k, interface in enumerate(system.interfaces):
         pressure, tangential = contact_pressure(system, loaded.state, k)
         for number, _, _ in interface.sides:
-            law = system.parts[number].body.law
+            law = system.parts[number].law(loaded.state.time)
             if law.elastic:
                 continue
             strength = float(law.shear_strength(loaded.responses[number].state).max())

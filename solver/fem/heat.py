@@ -1,0 +1,51 @@
+"""What heat does to the law of a body: less stiffness, less strength."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from solver.errors import ModelError
+from solver.fem.loads import Superposed
+from solver.materials.heated import Heated
+from solver.model.loads import Temperature
+
+if TYPE_CHECKING:
+    from solver.fem.nodes import Nodes
+    from solver.materials import Law
+
+_LEAST = 0.05
+"""Least share of Young's modulus and of the yield stress that heat may leave."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heat:
+    """Losses (n_points,) of Young's modulus and of the yield stress, as shares of both."""
+
+    modulus: Superposed
+    strength: Superposed
+
+    @classmethod
+    def of(cls, part: Nodes) -> Heat | None:
+        """Return what the temperatures of a body do; None where they only make it expand."""
+        loads = [load for load in part.body.every_load
+                 if isinstance(load, Temperature) and load.softens]  # fmt: skip
+        if not loads:
+            return None
+        x = part.points.reshape(2, -1)
+        rises = [load.at(x) for load in loads]
+        both = list(zip(loads, rises, strict=True))
+        return cls(
+            Superposed.of(x.shape[1], ((load, load.modulus_drop * rise) for load, rise in both)),
+            Superposed.of(x.shape[1], ((load, load.yield_drop * rise) for load, rise in both)),
+        )
+
+    def law(self, cold: Law, time: float) -> Law:
+        """Return the law at a time; the cold one as long as nothing has changed."""
+        stiff, strong = 1 - self.modulus.at(time), 1 - self.strength.at(time)
+        for name, share in (("modulus_drop", stiff), ("yield_drop", strong)):
+            if not share.min() >= _LEAST:
+                allowed = f"must be at least {_LEAST:g} at every temperature (time {time:.6g})"
+                raise ModelError(f"1 - {name} * rise", round(float(share.min()), 6), allowed)
+        unchanged = (stiff == 1).all() and (strong == 1).all()
+        return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)

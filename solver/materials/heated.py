@@ -1,0 +1,138 @@
+"""Any law at points where heat has lowered Young's modulus and the yield stress.
+
+With Young's modulus e E and the yield stress r Re the response follows from that of the law::
+
+    stress(strain) = r stress0(strain e / r),   tangent = e tangent0
+
+Every slope of the curve falls with Young's modulus then, and its stresses with the yield stress.
+Plastic strain stays what it is while the temperature changes. The back stresses of `Chaboche` fall
+with the yield stress.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from solver.materials.law import Law
+from solver.materials.state import Response
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.materials.elasticity import Elasticity
+    from solver.materials.state import PlasticState
+    from solver.materials.yield_surface import YieldSurface
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heated(Law):
+    """A law with less stiffness and strength at each point.
+
+    Attributes
+    ----------
+    law : the law at the temperature that its constants hold for; these are what the properties of
+        this one are
+    stiff, strong : (n_points,) factors of Young's modulus and of the yield stress
+    """
+
+    law: Law
+    stiff: Array
+    strong: Array
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """The elastic constants of the law."""
+        return self.law.elasticity
+
+    @property
+    def surface(self) -> YieldSurface:
+        """The yield surface of the law."""
+        return self.law.surface
+
+    @property
+    def yield_stress(self) -> float:
+        """The yield stress of the law [MPa]."""
+        return self.law.yield_stress
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent of the law is."""
+        return self.law.symmetric
+
+    @property
+    def hardens(self) -> bool:
+        """Whether the law hardens without bound."""
+        return self.law.hardens
+
+    @property
+    def cornered(self) -> bool:
+        """Whether the yield surface of the law has corners."""
+        return self.law.cornered
+
+    def initial(self, n_points: int, n_components: int) -> PlasticState:
+        """Return the initial state of the law."""
+        return self.law.initial(n_points, n_components)
+
+    @property
+    def _stretch(self) -> Array:
+        return self.stiff / self.strong
+
+    def at(self, points: NDArray[np.int64]) -> Heated:
+        """Return the law of some points."""
+        return Heated(law=self.law, stiff=self.stiff[points], strong=self.strong[points])
+
+    def flow_stress(self, state: PlasticState) -> Array:
+        """Return the size of the yield surface (n_points,) [MPa]."""
+        return self.strong * self.law.flow_stress(state.stretched(self._stretch))
+
+    def back_stress(self, state: PlasticState) -> Array:
+        """Return the centre of the yield surface (n_components, n_points), Mandel [MPa]."""
+        return self.strong * self.law.back_stress(state.stretched(self._stretch))
+
+    def strength(self, state: PlasticState) -> Array:
+        """Return the stress of the tension curve (n_points,) [MPa]."""
+        return self.strong * self.law.strength(state.stretched(self._stretch))
+
+    def shear_strength(self, state: PlasticState) -> Array:
+        """Return the stress of the curve in shear (n_points,) [MPa]."""
+        return self.strong * self.law.shear_strength(state.stretched(self._stretch))
+
+    def yield_value(self, stress: Array, state: PlasticState) -> Array:
+        """Return the yield function (n_points,) [MPa]."""
+        own = self.law.yield_value(stress / self.strong, state.stretched(self._stretch))
+        return self.strong * own
+
+    def energy_density(self, stress: Array) -> Array:
+        """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
+        return self.law.energy_density(stress) / self.stiff
+
+    def dissipation(self, before: PlasticState, response: Response) -> Array:
+        """Return the work (n_points,) that an increment turns into heat [N mm/mm3]."""
+        k = self._stretch
+        own = response._replace(
+            stress=response.stress / self.strong, state=response.state.stretched(k)
+        )
+        return self.law.dissipation(before.stretched(k), own) * self.strong / k
+
+    def misfit(
+        self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
+    ) -> Array:
+        """Return the error of an increment with respect to this law (n_points,) [MPa]."""
+        k = self._stretch
+        own = strain * k, stress / self.strong, before.stretched(k), after.stretched(k)
+        return self.strong * self.law.misfit(*own)
+
+    def respond(self, strain: Array, state: PlasticState) -> Response:
+        """Return stress, tangent and new state; no softened tangent is the elastic stiffness."""
+        k = self._stretch
+        own = self.law.respond(strain * k, state.stretched(k))
+        return Response(
+            stress=self.strong * own.stress,
+            tangent=self.stiff * own.tangent,
+            state=own.state.stretched(1 / k),
+            yielding=own.yielding | (self.stiff != 1.0),
+        )
