@@ -3,8 +3,8 @@
 Slave edges are cut where the master's vertices project on them, so every integrand is smooth
 on its segment and a uniform pressure passes across non-matching meshes exactly (up to the
 curvature of the edges). Points are projected along the slave's continuous normal field in the
-current configuration. Gap and slip are means over the reference area: weights that changed with
-the strain would need derivatives of their own.
+current configuration, which breaks at corners. Gap and slip are means over the reference area:
+weights that changed with the strain would need derivatives of their own.
 
 M.A. Puso, T.A. Laursen, Comput. Methods Appl. Mech. Engng 193 (2004) 601-629; A. Popp et al.,
 Int. J. Numer. Meth. Engng 79 (2009) 1354-1391.
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.normals import end_normals
 from solver.mesh.shapes import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
@@ -29,10 +30,10 @@ _NEWTON_STEPS = 6
 _LAST_STEP = 1e-9
 """Step of Newton's method after which the next one would be rounding."""
 _BEYOND = 1.5
+_OPPOSED = 0.25
+"""Least cosine of the angle between a surface that faces another and its opposite."""
 _EDGE_TOLERANCE = 1e-8
 _MIN_COVERED = 1e-3
-_STRAIGHT = 1e-6
-"""Turn of the normal [rad] that rounding may make; the sagitta of an element is 1e-7 of it then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,29 +59,6 @@ class Pairing:
     gap: NDArray[np.float64]
     normal: tuple[NDArray[np.float64], NDArray[np.float64]]
     tangent: tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
-def _edge_normal(x: NDArray[np.float64], surface: Surface, xi: float) -> NDArray[np.float64]:
-    """Return outward unit normals (2, n_edges) at ``xi`` of every edge."""
-    count = surface.edges.shape[1]
-    d = shape_derivatives(np.array(xi), count)
-    t = x[:, surface.edges] @ d
-    n = np.stack([t[1], -t[0]])
-    return np.asarray(n / np.linalg.norm(n, axis=0))
-
-
-def vertex_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
-    """Return unit normals (2, n_vertices), one-sided at the ends of the chain."""
-    start, end = _edge_normal(x, surface, -1.0), _edge_normal(x, surface, 1.0)
-    n = np.concatenate([start, end[:, -1:]], axis=1)
-    n[:, 1:-1] += end[:, :-1]
-    return np.asarray(n / np.linalg.norm(n, axis=0))
-
-
-def is_curved(surface: Surface) -> bool:
-    """Whether the normals of a surface turn along it, before any load."""
-    n = np.hstack([_edge_normal(surface.X, surface, xi) for xi in (-1.0, 1.0)])
-    return bool(np.ptp(n, axis=1).max() > _STRAIGHT)
 
 
 def _combine(x: NDArray[np.float64], N: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,10 +87,10 @@ def _project_on_slave(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return edges, and xi on them, where the slave's normal passes through a point."""
     count = slave.edges.shape[1]
-    passing = _cross(normals[:, :, None], x[:, slave.vertices, None] - points[:, None])
-    edge, point = _near(passing[:-1], passing[1:])
+    ends = x[:, slave.edges[:, :2].T]
+    edge, point = _near(*_cross(normals[..., None], ends[..., None] - points[:, None, None]))
     xe, points = x[:, slave.edges[edge]], points[:, point]
-    n0, n1 = normals[:, edge], normals[:, edge + 1]
+    n0, n1 = normals[:, 0, edge], normals[:, 1, edge]
     xi = np.zeros(len(edge))
     for _ in range(_NEWTON_STEPS):
         offset = _combine(xe, shape_functions(xi, count)) - points
@@ -157,13 +135,13 @@ def _nearest(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Return the master edge that faces each point and is nearest, and whether there is one.
 
-    A surface faces another where their normals are opposed, however far ahead, and up to ``reach``
-    behind, where the bodies overlap.
+    A surface faces another where their normals are opposed, within 75 degrees, however far ahead,
+    and up to ``reach`` behind, where the bodies overlap.
     """
     passing = _cross(normals[:, :, None], x[:, None, master.vertices] - points[:, :, None])
     point, edge = _near(passing[:, :-1], passing[:, 1:])
     chord = x[:, master.edges[edge, 1]] - x[:, master.edges[edge, 0]]
-    opposed = _cross(chord, normals[:, point]) > 0
+    opposed = _cross(chord, normals[:, point]) > _OPPOSED * np.linalg.norm(chord, axis=0)
     point, edge = point[opposed], edge[opposed]
     eta, along = _project_on_master(x, master.edges[edge], points[:, point], normals[:, point])
     distance = np.full((points.shape[1], len(master.edges)), np.inf)
@@ -198,7 +176,7 @@ def pair(
     A master farther than ``reach`` [mm] behind the slave does not face it.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
-    normals = vertex_normals(xs, slave)
+    normals = end_normals(xs, slave)
     cut, xi = _project_on_slave(xs, normals, slave, xm[:, master.vertices])
     edge, start, end = _segments(cut, xi, len(slave.edges))
 
@@ -206,7 +184,7 @@ def pair(
         e: NDArray[np.int64], at: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         position = (xs[:, slave.edges[e]] * shape_functions(at, slave.edges.shape[1])).sum(axis=-1)
-        n = (1 - at) / 2 * normals[:, e] + (1 + at) / 2 * normals[:, e + 1]
+        n = (1 - at) / 2 * normals[:, 0, e] + (1 + at) / 2 * normals[:, 1, e]
         return position, n / np.linalg.norm(n, axis=0)
 
     middle, n = on_slave(edge, (start + end) / 2)

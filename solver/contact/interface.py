@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.geometry import Pairing, is_curved, pair
+from solver.contact.geometry import Pairing, pair
+from solver.contact.normals import is_curved
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
 from solver.model.model import effective_friction

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.geometry import is_curved
+from solver.contact.normals import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
@@ -32,6 +32,8 @@ _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 5
 _BLOCK = 1000
 """Points treated at once, each with every edge."""
+_CORNER = float(np.radians(40.0))  # turn between edges that meet in a corner
+_OPPOSED = 0.25  # least cosine of the angle between surfaces that face each other
 _BESIDE = 1e-9
 """Distance / length of an edge, by which a line may miss the edge and still count as meeting it."""
 
@@ -207,19 +209,27 @@ def _edge_lengths(surface: Surface) -> Array:
 
 
 def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) -> Array:
-    """Return unit normals (2, n), interpolated between vertices; one-sided at the chain's ends."""
-    tangents = [
-        (x[:, surface.edges] * shape_derivatives(np.array(end), surface.edges.shape[1])).sum(
-            axis=-1
-        )
-        for end in (-1.0, 1.0)
-    ]
-    first, last = (np.stack([t[1], -t[0]]) / np.linalg.norm(t, axis=0) for t in tangents)
-    at = np.hstack([first, last[:, -1:]])
-    at[:, 1:-1] += last[:, :-1]
-    at /= np.linalg.norm(at, axis=0)
-    n = (1 - xi) / 2 * at[:, edges] + (1 + xi) / 2 * at[:, edges + 1]
+    """Return unit normals (2, n), interpolated between the ends of the edges.
+
+    Edges that meet have their mean in common, but at corners of the surface as it was made.
+    """
+    first, last = _at_ends(x, surface)
+    into, out_of = _at_ends(surface.X, surface)
+    turn = np.arccos(np.clip((out_of[:, :-1] * into[:, 1:]).sum(axis=0), -1.0, 1.0))
+    mean = last[:, :-1] + first[:, 1:]
+    shared = np.where(turn < _CORNER, mean / np.linalg.norm(mean, axis=0), np.nan)
+    first[:, 1:] = np.where(np.isnan(shared), first[:, 1:], shared)
+    last[:, :-1] = np.where(np.isnan(shared), last[:, :-1], shared)
+    n = (1 - xi) / 2 * first[:, edges] + (1 + xi) / 2 * last[:, edges]
     return np.asarray(n / np.linalg.norm(n, axis=0))
+
+
+def _at_ends(x: Array, surface: Surface) -> tuple[Array, Array]:
+    """Return the normals (2, n_edges) of each edge at its start and at its end."""
+    count = surface.edges.shape[1]
+    tangents = [x[:, surface.edges] @ shape_derivatives(np.array(xi), count) for xi in (-1.0, 1.0)]
+    first, last = (np.stack([t[1], -t[0]]) / np.linalg.norm(t, axis=0) for t in tangents)
+    return first, last
 
 
 class _Partner:
@@ -268,7 +278,7 @@ def _met(
     first, last = side[:, :-1], side[:, 1:]
     met = np.minimum(first, last) <= beside
     met &= np.maximum(first, last) >= -beside
-    met &= _cross(chord[:, None, :], way[:, :, None]) > 0
+    met &= _cross(chord[:, None, :], way[:, :, None]) > _OPPOSED * np.linalg.norm(chord, axis=0)
     share = first / np.where(first == last, 1.0, first - last)
     where = corners[:, None, :-1] + share * chord[:, None, :] - points[:, :, None]
     ahead = (where * way[:, :, None]).sum(axis=0)

@@ -1,0 +1,51 @@
+"""Normals of a contact surface, where it is smooth and where it has corners."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.mesh.shapes import shape_derivatives
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.surface import Surface
+
+_CORNER = float(np.cos(np.radians(40.0)))
+"""Cosine of the turn between two edges, beyond which they meet in a corner."""
+_STRAIGHT = 1e-6
+"""Turn of the normal [rad] that rounding may make; the sagitta of an element is 1e-7 of it then."""
+
+
+def _edge_normal(x: NDArray[np.float64], surface: Surface, xi: float) -> NDArray[np.float64]:
+    """Return outward unit normals (2, n_edges) at ``xi`` of every edge."""
+    count = surface.edges.shape[1]
+    d = shape_derivatives(np.array(xi), count)
+    t = x[:, surface.edges] @ d
+    n = np.stack([t[1], -t[0]])
+    return np.asarray(n / np.linalg.norm(n, axis=0))
+
+
+def end_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
+    """Return unit normals (2, 2, n_edges) at the starts and the ends of the edges.
+
+    Edges that meet share the mean of both, but at a corner of the body before loading: there, and
+    at the ends of the chain, each has its own.
+    """
+    start, end = _edge_normal(x, surface, -1.0), _edge_normal(x, surface, 1.0)
+    before = _edge_normal(surface.X, surface, 1.0)[:, :-1]
+    after = _edge_normal(surface.X, surface, -1.0)[:, 1:]
+    smooth = (before * after).sum(axis=0) > _CORNER
+    mean = end[:, :-1] + start[:, 1:]
+    mean /= np.linalg.norm(mean, axis=0)
+    start[:, 1:] = np.where(smooth, mean, start[:, 1:])
+    end[:, :-1] = np.where(smooth, mean, end[:, :-1])
+    return np.stack([start, end], axis=1)
+
+
+def is_curved(surface: Surface) -> bool:
+    """Whether the normals of a surface turn along it, before any load."""
+    n = np.hstack([_edge_normal(surface.X, surface, xi) for xi in (-1.0, 1.0)])
+    return bool(np.ptp(n, axis=1).max() > _STRAIGHT)
