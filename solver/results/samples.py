@@ -92,9 +92,9 @@ class Samples(Nodal):
         super().__init__(system)
         self.view = view
         X, Y = np.meshgrid(view.x, view.y)
-        S, D = np.meshgrid(view.station, -view.depth, indexing="ij")
-        grid, lines = np.stack([X.ravel(), Y.ravel()]), np.stack([S.ravel(), D.ravel()])
-        surface = np.stack([view.s, np.zeros_like(view.s)])
+        S, D = np.meshgrid(view.station, view.depth, indexing="ij")
+        grid, lines = view.axis.place(X.ravel(), -Y.ravel()), view.axis.place(S.ravel(), D.ravel())
+        surface = view.axis.place(view.s, np.zeros_like(view.s))
         wholes = {name: system.full(name) for name in view.surfaces}
         self._map = {name: Sampler(whole, grid) for name, whole in wholes.items()}
         self._lines = Sampler(system.full(view.profile_body), lines)
@@ -145,9 +145,10 @@ class Samples(Nodal):
         name = self.view.profile_body
         body = self.system.full(name)
         nodes = body.boundary_nodes(self.view.surfaces[name])
-        nodes = nodes[np.argsort(body.X[0, nodes])]
+        nodes = nodes[np.argsort(self.view.axis.reached(body.X[:, nodes]))]
         points = von_mises(self.system.response(name, converged).stress)
         stress = np.clip(self.of_points(name, points)[nodes], 0.0, points.max())
-        x, beyond = body.X[0, nodes] - centre, {"left": np.nan, "right": np.nan}
+        x = self.view.axis.reached(body.X[:, nodes]) - centre
+        beyond = {"left": np.nan, "right": np.nan}
         way = {"period": body.period} if body.period else beyond
         return np.asarray(np.interp(self.view.s, x, stress, **way))

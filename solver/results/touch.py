@@ -10,6 +10,7 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.contact.problem import STICK
 from solver.fem.wheel import Wheel
+from solver.results.view import ALONG_X, Axis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,7 +49,7 @@ class ContactPoints:
 
     Attributes
     ----------
-    x : position before loading [mm]
+    x : position along the surface before loading [mm]
     pressure : [MPa]
     closed : whether the bodies touch there
     sticking : whether they touch without slip; nowhere without friction
@@ -63,16 +64,16 @@ class ContactPoints:
 class Contact:
     """The first interface of a system.
 
-    In every scene +x of the lower body is opposite to the tangent of the slave. ``symmetric``
-    means that the other half of the contact is not computed.
+    In every scene s grows against the tangent of the slave, along ``axis``. ``symmetric`` means
+    that the other half of the contact is not computed.
     """
 
-    def __init__(self, system: System, *, symmetric: bool) -> None:
+    def __init__(self, system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> None:
         self._system = system
         self._symmetric = symmetric
         self._interface = system.interfaces[0]
         chain = self._interface.slave_surface
-        self._x = chain.X[0, chain.vertices]
+        self._x = axis.reached(chain.X[:, chain.vertices])
 
     def points(self, converged: Converged) -> ContactPoints:
         """Return what acts at the vertices of the slave."""
@@ -175,10 +176,10 @@ class Nothing:
         return 0.0
 
 
-def touch_of(system: System, *, symmetric: bool) -> Touch:
+def touch_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Touch:
     """Return what acts between the bodies of a system, or on one of them."""
     if system.interfaces:
-        return Contact(system, symmetric=symmetric)
+        return Contact(system, symmetric=symmetric, axis=axis)
     for body in system.model.bodies:
         if body.travelling is not None:
             return Prescribed(body.travelling, system.full(body.name).period)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -35,21 +35,47 @@ STAGE = declare("stage", "stage of loading", "", dims=("stage",))
 BODY = declare("body", "body", "", dims=("body",))
 
 
+class Axis(NamedTuple):
+    """The straight line along a contact surface before loading.
+
+    ``origin`` (2,) is its middle [mm], ``along`` the unit vector in which s grows, with the lower
+    body on its right.
+    """
+
+    origin: tuple[float, float] = (0.0, 0.0)
+    along: tuple[float, float] = (1.0, 0.0)
+
+    def place(self, s: Array, depth: Array) -> Array:
+        """Return positions (2, n) at ``s`` along the surface and a depth below it [mm]."""
+        x, y = self.along
+        ways = np.multiply.outer(np.array([x, y]), s) + np.multiply.outer(np.array([y, -x]), depth)
+        return np.asarray(ways + np.array(self.origin)[:, None])
+
+    def reached(self, X: Array) -> Array:
+        """Return how far along the surface positions (2, n) are (n,) [mm]."""
+        return np.asarray(np.array(self.along) @ (X - np.array(self.origin)[:, None]))
+
+
+ALONG_X = Axis()
+"""The axis of a horizontal surface at y = 0, the lower body below it."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
     """Where the results of a scene are taken; independent of its mesh, so that runs compare.
 
     Attributes
     ----------
-    x, y : map grid [mm]
-    depth, station : profiles go down to ``depth`` below the surface at x = ``station`` [mm]
+    x, y : map grid, along the contact surface from its middle and above it [mm]
+    depth, station : profiles go down to ``depth`` below the surface at s = ``station`` [mm]
     s : positions along the contact surface from its centre [mm]
+    axis : the line that s and x run along
     profile_body : the body whose profiles are taken
     surfaces : body -> boundary that is its contact surface, in the order of the dimension
     stages : states whose contact is recorded, by the names of the program's stages
     loaded, unloaded : those of them that are taken as the states under load and after release
     following : those of them in which ``s`` is zero where the load is, not at x = 0
-    symmetric : whether the bodies are one half of a model symmetric about x = 0
+    symmetric : whether the bodies are one half of a model symmetric about s = 0
     """
 
     x: Array
@@ -64,6 +90,7 @@ class View:
     unloaded: str = "unloaded"
     following: tuple[str, ...] = ()
     symmetric: bool = False
+    axis: Axis = ALONG_X
 
     @property
     def coordinates(self) -> dict[str, Any]:

@@ -13,9 +13,10 @@ from solver.scenes.punch import PUNCH
 from solver.scenes.rigid_punch import RIGID_PUNCH
 from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
+from solver.scenes.shaft_hub import SHAFT_HUB
 
 SCENES: dict[str, Scene] = {
-    scene.name: scene for scene in (PUNCH, ELASTIC_PUNCH, RIGID_PUNCH, BALL, ROLLING)
+    scene.name: scene for scene in (PUNCH, ELASTIC_PUNCH, RIGID_PUNCH, SHAFT_HUB, BALL, ROLLING)
 }
 
 __all__ = ["SCENES", "Effort", "Monitor", "Scene"]

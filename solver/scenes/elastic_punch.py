@@ -5,10 +5,11 @@ stress ~ r^(p-1). The outputs are the power p, the part of the contact that stic
 pressure, and a map of the difference of principal stresses, whose contours are isochromatics.
 
 A relief groove may be cut into the punch, at the height ``eta`` times its size above the contact,
-and into the half-plane, at the distance ``xi`` times its size from the corner. Both are square
-notches, as wide as deep. A groove has no part in the power of the corner itself, which depends on
-its angles and friction alone, unless the corner lifts off. It takes intensity from the corner, and
-raises the power that seems to be there at some distance (``apparent_power``).
+and into the half-plane, its middle at the distance ``xi`` times its size from the corner. Both are
+square notches, as wide as deep. With xi = 0.5 the groove begins at the corner: two quarter-planes
+meet there, without a singularity. Elsewhere a groove has no part in the power of the corner itself,
+which depends on its angles and friction alone, unless the corner lifts off. It takes intensity from
+the corner, and raises the power that seems to be there at some distance (``apparent_power``).
 
 The load grows in proportion, the bodies are linear and touch without a gap, so all fields grow in
 proportion too: one increment is exact, friction included.
@@ -22,10 +23,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.loading.program import Program, load_and_release
@@ -33,24 +33,18 @@ from solver.model.model import ContactPair, Model
 from solver.results.contact import contact
 from solver.results.fields import isochromatics
 from solver.results.figures import cost
-from solver.results.look import Look, Values
 from solver.results.record import Status
-from solver.results.singularity import (
-    APPARENT_POWER,
-    NOWHERE,
-    SINGULAR_INTENSITY,
-    SINGULAR_POWER,
-    SINGULAR_POWER_ERROR,
-    apparent_power,
-    fit_singularity,
-)
 from solver.results.stick import stick
 from solver.results.view import View
+from solver.scenes.corner import corner, lifted
 from solver.scenes.effort import Effort
 from solver.scenes.flat_punch import (
     FACING,
     FlatPunch,
     Groove,
+    GrooveDistance,
+    GrooveHeight,
+    GrooveSize,
     Growth,
     HalfPlaneSize,
     PunchHeight,
@@ -63,8 +57,6 @@ from solver.scenes.scene import Scene
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from solver.results.touch import ContactPoints
-
 _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "draft": {"smallest_element": 1 / 3000, "growth": 1.4},
     "standard": {"smallest_element": 1 / 9000, "growth": 1.3},
@@ -72,19 +64,6 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
 }
 _LARGEST = 0.01  # of a, under the punch: the end of the part that sticks is known to half of it
 _MIDDLE = 0.002  # of a: with friction 0.1 only 0.02 a sticks
-_NEAREST, _FARTHEST = 10.0, 0.03
-"""Range of the fit: elements at the corner, and half-widths from it."""
-_GRADED = 0.9
-"""Largest range of the fit / distance within which elements grow."""
-_SHARE = 0.25
-"""Largest range of the fit / distance of a groove, or of the end of slip."""
-_NOTCH = 0.364
-"""Difference of the first two powers at a corner that sticks: a notch of 270 degrees (Williams)."""
-_SEEN = (0.01, 0.1)
-"""Range in which the apparent power is taken / a."""
-
-GrooveSize = Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")]
-GrooveDistance = Annotated[float, Interval(gt=0.0, le=100.0), Unit("1")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,11 +81,13 @@ class ElasticPunchParameters(ElasticParameters):
     punch_groove: GrooveSize = described(
         0.0, "width and depth D of a groove in the side of the punch / a; 0 leaves it out"
     )
-    eta: GrooveDistance = described(1.0, "height of the groove in the punch above the contact / D")
+    eta: GrooveHeight = described(1.0, "height of the groove in the punch above the contact / D")
     half_plane_groove: GrooveSize = described(
         0.0, "width and depth D of a groove in the half-plane / a; 0 leaves it out"
     )
-    xi: GrooveDistance = described(1.0, "distance of the groove in the half-plane from corner / D")
+    xi: GrooveDistance = described(
+        1.0, "distance of the middle of the groove in the half-plane from the corner / D"
+    )
     smallest_element: SmallestElement = by_accuracy("smallest element side, at the corner / a")
     growth: Growth = by_accuracy("ratio of neighbouring element sides away from the corner")
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
@@ -120,11 +101,14 @@ class ElasticPunchParameters(ElasticParameters):
             raise ModelError("punch_groove", self.punch_groove, "must be less than 1")
         for name, size, end, limit in (
             ("eta", self.punch_groove, self.eta + 1, self.punch_height),
-            ("xi", self.half_plane_groove, self.xi + 1, self.half_plane_size - 1),
+            ("xi", self.half_plane_groove, self.xi + 0.5, self.half_plane_size - 1),
         ):
+            own = getattr(self, name)
             if size * end >= limit:
-                allowed = f"must be less than {limit / size - 1:g}, for a groove inside the body"
-                raise ModelError(name, getattr(self, name), allowed)
+                most = limit / size - (end - own)
+                raise ModelError(
+                    name, own, f"must be less than {most:g}, for a groove inside the body"
+                )
         self.geometry.check_elements(self.smallest_element)
 
     def usual(self) -> Mapping[str, float]:
@@ -138,7 +122,7 @@ class ElasticPunchParameters(ElasticParameters):
         above, beside = (
             Groove(distance * size * a, size * a) if size else None
             for distance, size in (
-                (self.eta, self.punch_groove), (self.xi, self.half_plane_groove)
+                (self.eta, self.punch_groove), (self.xi - 0.5, self.half_plane_groove)
             )
         )  # fmt: skip
         return FlatPunch(
@@ -209,64 +193,6 @@ def view(parameters: ElasticPunchParameters) -> View:
     )
 
 
-def corner(look: Look) -> Values:
-    """Return the power of the singularity with its error, its intensity, and the apparent power.
-
-    Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
-    nine tenths of where elements grow, or a quarter of the way to a groove or to the end of slip,
-    where that is less. Where elements grow in proportion to the distance, their error is the same
-    share of the pressure everywhere, and has no part in its power. NaN where the corner has lifted
-    off. Stress in the half-plane would be a worse measure: a uniform stress along its
-    surface, which has no part in the pressure, is a term only 1 - p above the first.
-    """
-    parameters, points = look.parameters, _points(look)
-    r = 1 - points.x / parameters.half_width
-    pressure = points.pressure / parameters.mean_pressure
-    found, apparent = NOWHERE, np.nan
-    if points.closed[-1]:
-        low = _NEAREST * parameters.smallest_element
-        graded = _GRADED * parameters.geometry.graded / parameters.half_width
-        high = min(_FARTHEST, graded, _SHARE * _next_feature(parameters, points, r))
-        above = _NOTCH if points.sticking[-1] else 1.0
-        found = fit_singularity(r, pressure, low, high, above)
-        apparent = apparent_power(r, pressure, *_SEEN)
-    return {
-        SINGULAR_POWER: found.power,
-        SINGULAR_POWER_ERROR: found.error,
-        SINGULAR_INTENSITY: found.intensity,
-        APPARENT_POWER: apparent,
-    }
-
-
-def _points(look: Look) -> ContactPoints:
-    """Return the contact points under load."""
-    from solver.results.touch import contact_points  # only who computes needs the solver
-
-    points = contact_points(look.touch, look.loaded)
-    assert points is not None, "the model has a contact pair"
-    return points
-
-
-def _next_feature(
-    parameters: ElasticPunchParameters, points: ContactPoints, r: np.ndarray
-) -> float:
-    """Return the distance / a from the corner of what else shapes the field."""
-    geometry, near = parameters.geometry, [1.0]
-    for groove in (geometry.punch_groove, geometry.half_plane_groove):
-        if groove:
-            near.append(groove.distance / parameters.half_width)
-    other = points.sticking != points.sticking[-1]
-    return float(min([*near, *r[other]]))
-
-
-def warnings(look: Look) -> tuple[str, ...]:
-    """Return a warning where the corner has lifted off."""
-    width, _ = look.touch.extent(look.loaded)
-    if width >= look.parameters.half_width * (1 - 1e-9):
-        return ()
-    return (f"the corner has lifted off: contact ends at {width:.4g} mm, without a singularity",)
-
-
 ELASTIC_PUNCH = Scene(
     name="elastic_punch",
     summary="elastic punch pressed on an elastic half-plane with friction, relief grooves or none",
@@ -279,6 +205,6 @@ ELASTIC_PUNCH = Scene(
     outputs=(isochromatics, contact, stick, corner),
     costs=(cost,),
     effort=effort,
-    warnings=warnings,
+    warnings=lifted,
     advice={Status.NOT_CONVERGED: "refine the mesh by smallest_element or growth"},
 )

@@ -34,6 +34,10 @@ HalfPlaneSize = Annotated[float, Interval(ge=2.0, le=1000.0), Unit("1")]
 SmallestElement = Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")]
 Growth = Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")]
 
+GrooveSize = Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")]
+GrooveHeight = Annotated[float, Interval(gt=0.0, le=100.0), Unit("1")]
+GrooveDistance = Annotated[float, Interval(ge=0.5, le=100.0), Unit("1")]
+
 _PUNCH_LARGEST = 0.25  # of a, up the punch
 _GROOVE_ELEMENT = 0.02  # of the groove
 _LIGAMENT_ELEMENT = 0.2  # of what a groove leaves between itself and the contact
@@ -44,7 +48,10 @@ FACING = "contact"
 
 
 class Groove(NamedTuple):
-    """A square notch: its distance from the contact or the corner, and its side [mm]."""
+    """A square notch: its distance from the contact or the corner, and its side [mm].
+
+    One in the half-plane may begin at the corner itself.
+    """
 
     distance: float
     side: float
@@ -82,11 +89,12 @@ class FlatPunch:
     ----------
     half_width : a
     height : of the punch
-    size : width and depth of the half-plane
+    size : width of the half-plane from the middle, and its depth, unless that is given
     smallest : element side at the corner
     growth : ratio of neighbouring element sides
     largest : element under the punch
     middle : element at the middle of the contact; inf leaves it to the growth from the corner
+    depth : of the half-plane, where it is not its width
     punch_groove, half_plane_groove : relief grooves
     """
 
@@ -99,6 +107,7 @@ class FlatPunch:
     middle: float = math.inf
     punch_groove: Groove | None = None
     half_plane_groove: Groove | None = None
+    depth: float | None = None
 
     @property
     def lines(self) -> Lines:
@@ -206,20 +215,22 @@ def _between(lines: Array, low: float, high: float) -> int:
 @lru_cache(maxsize=256)
 def _lines(punch: FlatPunch) -> Lines:
     a, h, ratio = punch.half_width, punch.smallest, punch.growth
+    deep = punch.size if punch.depth is None else punch.depth
     across, aside = [(0.0, punch.middle)], []
     up, down = [(0.0, h)], [(0.0, h)]
     if groove := punch.punch_groove:
         across += [(a - groove.side, groove.element)]
         up += [(groove.distance, groove.near_element), (groove.end, groove.element)]
     if groove := punch.half_plane_groove:
-        aside = [(a + groove.distance, groove.near_element), (a + groove.end, groove.element)]
+        near = [(a + groove.distance, groove.near_element)] if groove.distance else []
+        aside = [*near, (a + groove.end, groove.element)]
         down += [(groove.side, groove.element)]
     across += [(a, h)]
     return Lines(
         under=_refined(across, ratio, punch.largest),
         beyond=_refined([(a, h), *aside, (punch.size, math.inf)], ratio, punch.size / 4),
         up=_refined([*up, (punch.height, math.inf)], ratio, _PUNCH_LARGEST * a),
-        down=-_refined([*down, (punch.size, math.inf)], ratio, punch.size / 4)[::-1],
+        down=-_refined([*down, (deep, math.inf)], ratio, deep / 4)[::-1],
     )
 
 

@@ -34,8 +34,8 @@ from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.stick import stick
 from solver.results.view import View
+from solver.scenes.corner import corner
 from solver.scenes.effort import Effort
-from solver.scenes.elastic_punch import corner
 from solver.scenes.flat_punch import FlatPunch, Growth, HalfPlaneSize, SmallestElement
 from solver.scenes.material_parameters import ElasticParameters
 from solver.scenes.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described

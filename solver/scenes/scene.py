@@ -157,7 +157,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     last = runs[-1]
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
-    touch = touch_of(system, symmetric=samples.view.symmetric)
+    touch = touch_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
     programs = [scene.program(run) for run in runs]
     walker = Walker(
         system,

@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     one = add("plot", commands.plot)
     one.add_argument("path", type=Path, metavar="RUN|DIR")
     one.add_argument(
-        "--select", nargs="+", default=[], metavar="NAME=VALUE",
+        "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
     )  # fmt: skip
     one.add_argument("--field", default="residual_stress")
@@ -102,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     one = add("compare", commands.compare)
     one.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="data set, study or DIR")
     one.add_argument("--reference", type=Path, metavar="CSV", help="published numbers of your own")
-    one.add_argument("--select", nargs="+", default=[], metavar="NAME=VALUE")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument("--out", type=Path, metavar="PNG", help="draw profiles and published numbers")
     one.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
 

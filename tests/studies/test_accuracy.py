@@ -22,6 +22,7 @@ BY_ACCURACY = [
     ("punch", {}, {"smallest_element", "growth", "load_step"}),
     ("elastic_punch", {}, {"smallest_element", "growth"}),
     ("ball", {}, {"element_size", "growth", "load_step"}),
+    ("shaft_hub", {}, {"smallest_element", "growth"}),
     ("rigid_punch", {}, {"smallest_element", "growth", "largest_element"}),
     ("rolling", {}, {"element_size", "growth", "advance_step"}),
     ("rolling", {"track": 50.0}, {"element_size", "growth", "advance_step"}),

@@ -249,7 +249,7 @@ def test_plot_draws_any_field_of_any_run(
 ) -> None:
     study, store = computed
     picture = tmp_path / "a.png"
-    select = ["--select", "friction=0.4", "load_ratio=0.3"]
+    select = ["--select", "friction=0.4", "--select", "load_ratio=0.3"]
     arguments = ["plot", str(store.directory), "--out", str(picture)]
     assert main([*arguments, *select, "--component", "yy", "--zoom", "30"]) == 0
     assert picture.read_bytes().startswith(PNG)

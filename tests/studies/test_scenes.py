@@ -40,6 +40,7 @@ def records() -> list[Record]:
     coarse = {
         "punch": (COARSE, 0.4),
         "elastic_punch": ({"accuracy": "draft", "growth": 2.5}, 50.0),
+        "shaft_hub": ({"accuracy": "draft", "growth": 2.0}, 50.0),
         "ball": ({"accuracy": "draft", "load_ratio": 2.0}, 1),
         "rigid_punch": ({"accuracy": "draft", "largest_element": 0.05}, 50.0),
         "rolling": ({"element_size": 2.0, "advance_step": 2.0, "track": 8.0}, 1),

@@ -122,7 +122,7 @@ def test_tractions_do_not_depend_on_the_elastic_constants() -> None:
 
 def test_a_groove_in_the_half_plane_leaves_the_corner_its_power_and_takes_its_intensity() -> None:
     """What the thesis plots (fig. 4.16) is the power that the pressure seems to have."""
-    distances = (2.0, 0.6, 0.1)
+    distances = (2.5, 1.1, 0.6)
     found = [run(half_plane_groove=0.5, xi=xi, **COARSE).scalars for xi in distances]
     apparent = np.array([each["apparent_power"] for each in found])
     intensity = [each["singular_intensity"] for each in found]
@@ -130,10 +130,18 @@ def test_a_groove_in_the_half_plane_leaves_the_corner_its_power_and_takes_its_in
         error = abs(each["singular_power"] - singular_power())
         assert error < each["singular_power_error"] + MESH
     assert (np.diff(apparent) > 0).all()
-    # nearly constant until 0.6, then steep
+    # nearly constant, then steep
     assert apparent[1] - apparent[0] < 0.03
     assert apparent[2] - apparent[1] > 0.08
     assert intensity[1] < 0.95 * intensity[0]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_a_groove_that_begins_at_the_corner_takes_the_singularity_away(friction: float) -> None:
+    """As published, p rises to 1: two quarter-planes of one material meet in a right angle each."""
+    found = run(half_plane_groove=0.5, xi=0.5, friction=friction, **COARSE).scalars
+    assert found["singular_power"] == pytest.approx(1.0, abs=0.02)
+    assert abs(found["singular_power"] - 1.0) < found["singular_power_error"]
 
 
 def test_a_groove_in_the_punch_takes_intensity_until_the_corner_lifts_off() -> None:

@@ -1,0 +1,101 @@
+"""The sharp corner at the end of a contact: the power of its singularity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from solver.results.singularity import (
+    APPARENT_POWER,
+    NOWHERE,
+    SINGULAR_INTENSITY,
+    SINGULAR_POWER,
+    SINGULAR_POWER_ERROR,
+    apparent_power,
+    fit_singularity,
+)
+
+if TYPE_CHECKING:
+    from solver.results.look import Look, Values
+    from solver.results.touch import ContactPoints
+    from solver.scenes.flat_punch import FlatPunch
+
+_NEAREST, _FARTHEST = 10.0, 0.03
+"""Range of the fit: elements at the corner, and half-widths from it."""
+_GRADED = 0.9
+"""Largest range of the fit / distance within which elements grow."""
+_SHARE = 0.25
+"""Largest range of the fit / distance of a groove, or of the end of slip."""
+_NOTCH = 0.364
+"""Difference of the first two powers at a corner that sticks: a notch of 270 degrees (Williams)."""
+_SEEN = (0.01, 0.1)
+"""Range in which the apparent power is taken / a."""
+
+
+class Cornered(Protocol):
+    """Parameters of a scene whose contact ends at a corner, at the distance a from its middle."""
+
+    mean_pressure: float
+    half_width: float
+    smallest_element: float
+
+    @property
+    def geometry(self) -> FlatPunch:
+        """Dimensions and elements [mm]."""
+
+
+def corner(look: Look) -> Values:
+    """Return the power of the singularity with its error, its intensity, and the apparent power.
+
+    Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
+    nine tenths of where elements grow, or a quarter of the way to a groove or to the end of slip,
+    where that is less. Where elements grow in proportion to the distance, their error is the same
+    share of the pressure everywhere, and has no part in its power. NaN where the corner has lifted
+    off. Stress in the half-plane would be a worse measure: a uniform stress along its
+    surface, which has no part in the pressure, is a term only 1 - p above the first.
+    """
+    parameters, points = look.parameters, _points(look)
+    r = 1 - points.x / parameters.half_width
+    pressure = points.pressure / parameters.mean_pressure
+    found, apparent = NOWHERE, np.nan
+    if points.closed[-1]:
+        low = _NEAREST * parameters.smallest_element
+        graded = _GRADED * parameters.geometry.graded / parameters.half_width
+        high = min(_FARTHEST, graded, _SHARE * _next_feature(parameters, points, r))
+        above = _NOTCH if points.sticking[-1] else 1.0
+        found = fit_singularity(r, pressure, low, high, above)
+        apparent = apparent_power(r, pressure, *_SEEN)
+    return {
+        SINGULAR_POWER: found.power,
+        SINGULAR_POWER_ERROR: found.error,
+        SINGULAR_INTENSITY: found.intensity,
+        APPARENT_POWER: apparent,
+    }
+
+
+def _points(look: Look) -> ContactPoints:
+    """Return the contact points under load."""
+    from solver.results.touch import contact_points  # only who computes needs the solver
+
+    points = contact_points(look.touch, look.loaded)
+    assert points is not None, "the model has a contact pair"
+    return points
+
+
+def _next_feature(parameters: Cornered, points: ContactPoints, r: np.ndarray) -> float:
+    """Return the distance / a from the corner of what else shapes the field."""
+    geometry, near = parameters.geometry, [1.0]
+    for groove in (geometry.punch_groove, geometry.half_plane_groove):
+        if groove:
+            near.append((groove.distance or groove.side) / parameters.half_width)
+    other = points.sticking != points.sticking[-1]
+    return float(min([*near, *r[other]]))
+
+
+def lifted(look: Look) -> tuple[str, ...]:
+    """Return a warning where the corner has lifted off."""
+    width, _ = look.touch.extent(look.loaded)
+    if width >= look.parameters.half_width * (1 - 1e-9):
+        return ()
+    return (f"the corner has lifted off: contact ends at {width:.4g} mm, without a singularity",)
