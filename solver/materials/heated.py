@@ -133,6 +133,7 @@ class Heated(Law):
         return Response(
             stress=self.strong * own.stress,
             tangent=self.stiff * own.tangent,
-            state=own.state.stretched(1 / k),
+            # there and back again, rounding would look like flow
+            state=own.state.stretched(1 / k).where(own.yielding, state),
             yielding=own.yielding | (self.stiff != 1.0),
         )

@@ -39,6 +39,12 @@ class PlasticState:
         """Return the internal variables of some points."""
         return replace(self, **{f.name: getattr(self, f.name)[..., points] for f in fields(self)})
 
+    def where(self, points: NDArray[np.bool_], other: PlasticState) -> Self:
+        """Return these internal variables at some points (n_points,), others at the rest."""
+        names = [f.name for f in fields(self)]
+        mixed = {n: np.where(points, getattr(self, n), getattr(other, n)) for n in names}
+        return replace(self, **mixed)
+
     def stretched(self, factor: NDArray[np.float64]) -> Self:
         """Return the internal variables with all strains multiplied by factors (n_points,)."""
         return replace(self, **{f.name: getattr(self, f.name) * factor for f in fields(self)})

@@ -173,7 +173,9 @@ class ShaftHubParameters(ElasticParameters):
 def _turned(mesh: Mesh, parameters: ShaftHubParameters) -> Mesh:
     """Return a mesh of a punch or half-plane as that of a hub or shaft; boundaries keep names."""
     x, y = mesh.doflocs
-    return replace(mesh, doflocs=np.stack([parameters.radius + y, -x]))
+    radius = parameters.radius + y
+    radius = np.maximum(radius, 0.0)  # rounding must not cross the axis
+    return replace(mesh, doflocs=np.stack([radius, -x]))
 
 
 def model(parameters: ShaftHubParameters) -> Model:
