@@ -73,7 +73,7 @@ class Stepper:
         load. Raises `PathEnded` where overlapping bodies find no equilibrium, and `ModelError`
         where an initial stress finds none.
         """
-        point = self.rest(self.system.set_down(self._balanced(state), time), tally)
+        point = self.rest(self.system.set_down(self.balanced(state), time), tally)
         if not self.system.overlaps(point.now.state):
             return point
         try:
@@ -99,7 +99,7 @@ class Stepper:
         except IncrementFailed:
             return Increment(self.system, state, time, tolerances=self.control.tolerances).solve()
 
-    def _balanced(self, state: State) -> State:
+    def balanced(self, state: State) -> State:
         """Return the state in which the initial stress of each body is in equilibrium."""
         if not self.system.prestressed:
             return state

@@ -176,6 +176,36 @@ class InitialStress(Load):
     stress: Field
     amplitude: Amplitude | None = _ALWAYS
 
+    @classmethod
+    def on_grid(cls, x: Array, y: Array, stress: Array) -> InitialStress:
+        """Return the stress that was measured or computed on a grid, linear between its points.
+
+        Parameters
+        ----------
+        x, y : (n_x,), (n_y,) positions, in order [mm]; the grid must hold the body
+        stress : (4, n_y, n_x) components xx, yy, zz, xy [MPa]
+        """
+        from scipy.interpolate import RegularGridInterpolator
+
+        name, values = "initial_stress.stress", np.asarray(stress, dtype=float)
+        if values.shape != (4, len(y), len(x)):
+            raise ModelError(name, values.shape, f"must have the shape {(4, len(y), len(x))}")
+        try:
+            along = RegularGridInterpolator((y, x), np.moveaxis(values, 0, -1))
+        except ValueError as error:
+            raise ModelError(
+                name, "this grid", f"must have increasing positions: {error}"
+            ) from None
+
+        def between(at: Array) -> Array:
+            try:
+                return np.asarray(along(at[::-1].T).T)
+            except ValueError:
+                held = f"x {x[0]:g} to {x[-1]:g}, y {y[0]:g} to {y[-1]:g} mm"
+                raise ModelError(name, held, "the grid must hold the whole body") from None
+
+        return cls(stress=between)
+
     @property
     def varies(self) -> bool:
         """It is there from the beginning."""

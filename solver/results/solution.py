@@ -11,10 +11,12 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.contact.system import System
 from solver.errors import ModelError
-from solver.loading.control import PathControl
+from solver.loading.control import Control, PathControl
 from solver.loading.outcome import Tally
 from solver.loading.program import Lap, Program
+from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
+from solver.model.loads import InitialStress
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
 from solver.results.samples import Nodal
@@ -77,6 +79,21 @@ class Solution:
         Unloaded, this is the residual stress.
         """
         return to_tensor(Nodal(self.system).stress(body, self._at(stage)))
+
+    def initial_stress(self, body: str) -> tuple[NDArray[np.float64], ...]:
+        """Return positions (2, n) [mm], initial stress as given and in equilibrium (4, n) [MPa].
+
+        They are those of the integration points, components xx, yy, zz, xy. The difference is
+        what the body needed to be in balance before any load.
+        """
+        system = self.system
+        begun = Stepper(system, Control())
+        rest = begun.rest(begun.balanced(system.initial())).now
+        x = system.positions(body)
+        loads = system.model.body(body).every_load
+        fields = [load.at(x) for load in loads if isinstance(load, InitialStress)]
+        given = sum(fields, np.zeros((4, x.shape[1])))
+        return x, given, to_tensor(system.response(body, rest).stress)
 
     def plastic_strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""

@@ -150,6 +150,26 @@ def test_initial_stress_that_is_not_in_equilibrium_moves_the_body() -> None:
     assert found.displacement("bar")[0].min() == pytest.approx(-10.0 * 80.0 / E)
 
 
+def test_what_equilibrium_makes_of_an_initial_stress_is_told() -> None:
+    """A mean stress that no force balances goes; what has no resultants stays."""
+    mesh = grid(np.linspace(0.0, 30.0, 31), np.linspace(0.0, 2.0, 9))
+    y = np.linspace(0.0, 2.0, 41)
+    field = np.zeros((4, 41, 2))
+    field[0] = (balanced(np.stack([y, y]))[0] + 40.0)[:, None]
+    given = InitialStress.on_grid(np.array([0.0, 30.0]), y, field)
+    body = replace(bar(STEEL), mesh=mesh, supports={"left": "x", "bottom": "y"}, pressure={},
+                   loads=(given,))  # fmt: skip
+    x, told, left = solve(Model(bodies=(body,))).initial_stress("bar")
+    far = x[0] < 20.0
+    assert told[0] == pytest.approx(balanced(x)[0] + 40.0, abs=0.5)  # linear between its points
+    assert np.abs(left[0] - balanced(x)[0])[far].max() < 3.5
+    with pytest.raises(ModelError, match="grid must hold the whole body"):
+        solve(Model(bodies=(replace(body, mesh=mesh.translated((1.0, 0.0))),)))
+    for x_, y_, stress in (([0, 1], y, field[:, 1:]), ([1, 1], y, field)):
+        with pytest.raises(ModelError, match=r"initial_stress\.stress = "):
+            InitialStress.on_grid(np.array(x_), y_, stress)
+
+
 def test_initial_stress_above_the_strength_yields_before_any_load() -> None:
     soft = replace(STEEL, hardening="none", hardening_ratio=0.0)
     held = {"left": "x", "right": "x", "bottom": "y"}
