@@ -9,12 +9,12 @@ import numpy as np
 
 from solver.errors import NotConverged, SolverError
 from solver.loading.flow import Flow
-from solver.loading.slide import Slide
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from solver.contact.state import Converged, State
+    from solver.loading.slide import Slide
 
 
 class Yielded(SolverError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,7 @@ from solver.tensors import to_tensor
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import xarray as xr
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
@@ -126,6 +128,21 @@ class Solution:
             allowed = "must be a rigid body: " + (", ".join(known) or "the model has none")
             raise ModelError("body", body, allowed)
         return observe(self.system, self._at(stage))
+
+    def to_vtu(self, folder: str | Path) -> Path:
+        """Write a .vtu for each stage into a folder, with fields at the nodes, for ParaView.
+
+        Returns the .pvd file that holds them together; see `solver.results.export.write_vtu`.
+        """
+        from solver.results.export import write_vtu
+
+        return write_vtu(self, Path(folder))
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return fields at all nodes of all bodies, over the stages."""
+        from solver.results.export import to_xarray
+
+        return to_xarray(self)
 
     def audit(self, stage: str = "loaded") -> Audit:
         """Return the audit: figures of a state, violated conditions and warnings.
