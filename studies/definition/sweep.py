@@ -1,8 +1,8 @@
 """The sweep of a study: axes of one parameter, and linked axes, which move several together.
 
-An axis that is a list holds the values of the parameter it is named after. A linked axis is a
-table with a name of its own: it holds labels, and the parameters that each label sets. For each
-combination of labels, what the labels set is fixed, and the lists are swept.
+An axis that is a list, or a range, holds the values of the parameter it is named after. A linked
+axis is a table with a name of its own: it holds labels, and the parameters that each label sets.
+For each combination of labels, what the labels set is fixed, and the lists are swept.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter, nearest
+from studies.definition.spaced import spaced
 from studies.errors import StudyError
 
 MAXIMUM_RUNS = 100_000
@@ -43,6 +44,10 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     """
     if not isinstance(content, Mapping):
         raise StudyError("sweep", content, "must be a table of axes")
+    content = {
+        name: spaced(name, axis) if name in known and isinstance(axis, Mapping) else axis
+        for name, axis in content.items()
+    }
     tables = {name: axis for name, axis in content.items() if isinstance(axis, Mapping)}
     lists = checked_table(
         "sweep", {name: axis for name, axis in content.items() if name not in tables}, known
@@ -131,7 +136,7 @@ def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
 def _linked_axis(
     name: str, content: Mapping[str, Any], known: Mapping[str, Parameter]
 ) -> LinkedAxis:
-    _check_name(name, content, known)
+    _check_name(name, content)
     given: LinkedAxis = {}
     for label, settings in content.items():
         field = f"sweep.{name}.{checked_text(f'sweep.{name}', label)}"
@@ -151,13 +156,11 @@ def _linked_axis(
     return axis
 
 
-def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:
+def _check_name(name: Any, content: Any) -> None:
     """Refuse the name of a linked axis that is not free to become a dimension of the data set."""
     from studies.definition.vocabulary import LABEL_ATTRIBUTES
 
-    if name in known:
-        allowed = "must be a list of values; a table of labels needs a name that is no parameter"
-    elif name in QUANTITIES or name in LABEL_ATTRIBUTES:
+    if name in QUANTITIES or name in LABEL_ATTRIBUTES:
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):
         allowed = "the name must be 1 to 80 of A-Z a-z 0-9 _, beginning with a letter"

@@ -15,23 +15,39 @@ from studies.errors import StudyError
 from studies.storage.store import ENGINE, Store
 
 
-def open_study(path: Path | str) -> xr.Dataset:
+def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
     """Open the combined data set of a study; arrays are read when they are used.
 
     Parameters
     ----------
-    path : a ``dataset.nc``, the directory of a study, or an output directory with one study
+    path : a ``dataset.nc``, the directory of a study, or an output directory
+    name : of the study, where the directory holds several; of those with this name the last
+        computed is opened
 
     Raises
     ------
     StudyError
-        when there is no data set, or more than one
+        when there is no data set (of this name), or studies of several names
     """
     found = find_datasets(path)
-    if len(found) > 1:
-        names = ", ".join(str(each.parent) for each in found)
-        raise StudyError("path", str(path), f"holds several studies; name one of {names}")
-    return open_netcdf(found[0])
+    names = {each: _name(each) for each in found}
+    known = ", ".join(sorted(set(names.values())))
+    if name is not None:
+        found = [each for each in found if names[each] == name]
+        if not found:
+            raise StudyError("name", name, f"must be one of {known}")
+    elif len(set(names.values())) > 1:
+        raise StudyError("path", str(path), f"holds several studies; give the name of one: {known}")
+    return open_netcdf(max(found, key=lambda each: each.stat().st_mtime))
+
+
+def _name(dataset: Path) -> str:
+    """Return the name of the study that a data set is of; its directory's where it has none."""
+    try:
+        content = json.loads(dataset.with_name("study.json").read_text(encoding="utf-8"))
+        return str(content["name"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return dataset.parent.name
 
 
 def open_netcdf(path: Path | str) -> xr.Dataset:

@@ -1,0 +1,58 @@
+"""Ranges in a sweep: an axis given by its first value, its last value and their number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from studies.errors import StudyError
+
+_KEYS = ("start", "stop", "num")
+_SPACINGS = ("linear", "log")
+_MOST = 100_000
+_DIGITS = 12
+"""Digits that values are rounded to: 0.3 is meant, not 0.30000000000000004."""
+
+
+def spaced(name: str, content: Mapping[str, Any]) -> list[float]:
+    """Return the values of a range ``{start, stop, num}``, of equal steps or of equal ratios.
+
+    Whole numbers are int, so that they serve for parameters that count.
+
+    Raises
+    ------
+    StudyError
+        naming the key, its value and what is allowed
+    """
+    field = f"sweep.{name}"
+    missing = [key for key in _KEYS if key not in content]
+    unknown = [key for key in content if key not in (*_KEYS, "spacing")]
+    if missing or unknown:
+        allowed = (
+            "must be a list of values or a range {start, stop, num}, with spacing = linear or log; "
+            "a table of labels needs a name that is no parameter"
+        )
+        raise StudyError(field, dict(content), allowed)
+    spacing, num = content.get("spacing", "linear"), content["num"]
+    if spacing not in _SPACINGS:
+        raise StudyError(f"{field}.spacing", spacing, "must be one of " + ", ".join(_SPACINGS))
+    if isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= _MOST:
+        raise StudyError(f"{field}.num", num, f"must be an integer >= 2 and <= {_MOST}")
+    start, stop = (_number(f"{field}.{key}", content[key], spacing) for key in ("start", "stop"))
+    shares = [k / (num - 1) for k in range(num)]
+    if spacing == "log":
+        found = [start * (stop / start) ** share for share in shares]
+    else:
+        found = [start + (stop - start) * share for share in shares]
+    rounded = [float(f"{value:.{_DIGITS}g}") for value in (start, *found[1:-1], stop)]
+    return [int(value) if value.is_integer() else value for value in rounded]
+
+
+def _number(field: str, value: Any, spacing: str) -> float:
+    least = "> 0" if spacing == "log" else ""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise StudyError(field, value, f"must be a finite number {least}".strip())
+    if spacing == "log" and not value > 0:
+        raise StudyError(field, value, "must be > 0 where spacing = log")
+    return float(value)
