@@ -50,13 +50,14 @@ class ContactPoints:
     Attributes
     ----------
     x : position along the surface before loading [mm]
-    pressure : [MPa]
+    pressure, shear : [MPa], shear that on the lower body along +s
     closed : whether the bodies touch there
     sticking : whether they touch without slip; nowhere without friction
     """
 
     x: Array
     pressure: Array
+    shear: Array
     closed: NDArray[np.bool_]
     sticking: NDArray[np.bool_]
 
@@ -78,12 +79,13 @@ class Contact:
     def points(self, converged: Converged) -> ContactPoints:
         """Return what acts at the vertices of the slave."""
         contact, order = converged.state.contacts[0], np.argsort(self._x)
-        pressure, _ = contact_pressure(self._system, converged.state, 0)
+        pressure, shear = contact_pressure(self._system, converged.state, 0)
         closed = contact.normal > 0
         stuck = closed & (contact.status == STICK) & (self._interface.friction > 0)
         return ContactPoints(
             x=self._x[order],
             pressure=pressure[order],
+            shear=-shear[order],
             closed=closed[order],
             sticking=stuck[order],
         )

@@ -27,8 +27,9 @@ _GRADED = 0.9
 """Largest range of the fit / distance within which elements grow."""
 _SHARE = 0.25
 """Largest range of the fit / distance of a groove, or of the end of slip."""
-_NOTCH = 0.364
-"""Difference of the first two powers at a corner that sticks: a notch of 270 degrees (Williams)."""
+_NOTCH, _NOTCH_SHEAR = 0.364, 0.543
+"""A corner that sticks is a notch of 270 degrees (Williams): difference of its first two powers,
+and outward shear / pressure of the first. In the second the two may have any sign."""
 _SEEN = (0.01, 0.1)
 """Range in which the apparent power is taken / a."""
 
@@ -52,7 +53,8 @@ def corner(look: Look) -> Values:
     nine tenths of where elements grow, or a quarter of the way to a groove or to the end of slip,
     where that is less. Where elements grow in proportion to the distance, their error is the same
     share of the pressure everywhere, and has no part in its power. NaN where the corner has lifted
-    off. Stress in the half-plane would be a worse measure: a uniform stress along its
+    off, and where it sticks and the first term of the notch is not the largest in that range.
+    Stress in the half-plane would be a worse measure: a uniform stress along its
     surface, which has no part in the pressure, is a term only 1 - p above the first.
     """
     parameters, points = look.parameters, _points(look)
@@ -63,8 +65,9 @@ def corner(look: Look) -> Values:
         low = _NEAREST * parameters.smallest_element
         graded = _GRADED * parameters.geometry.graded / parameters.half_width
         high = min(_FARTHEST, graded, _SHARE * _next_feature(parameters, points, r))
-        above = _NOTCH if points.sticking[-1] else 1.0
-        found = fit_singularity(r, pressure, low, high, above)
+        notch = bool(points.sticking[-1]) and not _flush(parameters)
+        if not notch or _first_term_leads(points, r, low):
+            found = fit_singularity(r, pressure, low, high, _NOTCH if notch else 1.0)
         apparent = apparent_power(r, pressure, *_SEEN)
     return {
         SINGULAR_POWER: found.power,
@@ -81,6 +84,18 @@ def _points(look: Look) -> ContactPoints:
     points = contact_points(look.touch, look.loaded)
     assert points is not None, "the model has a contact pair"
     return points
+
+
+def _flush(parameters: Cornered) -> bool:
+    """Whether a groove begins at the corner: what sticks there is no notch, but a straight side."""
+    groove = parameters.geometry.half_plane_groove
+    return groove is not None and groove.distance == 0
+
+
+def _first_term_leads(points: ContactPoints, r: np.ndarray, low: float) -> bool:
+    """Whether shear where the fit begins is more than half that of the first term of a notch."""
+    near = int(np.argmin(np.abs(r - low)))
+    return bool(points.shear[near] > _NOTCH_SHEAR / 2 * points.pressure[near])
 
 
 def _next_feature(parameters: Cornered, points: ContactPoints, r: np.ndarray) -> float:

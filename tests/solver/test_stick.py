@@ -15,6 +15,7 @@ def points(x, closed, sticking):
     return ContactPoints(
         x=np.array(x, dtype=float),
         pressure=np.array(closed, dtype=float),
+        shear=np.zeros(len(x)),
         closed=np.array(closed, dtype=bool),
         sticking=np.array(sticking, dtype=bool),
     )

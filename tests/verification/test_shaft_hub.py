@@ -43,6 +43,14 @@ def test_friction_changes_the_power_as_the_wedge_problem_says(
     assert (exact < singular_power()) == (loading == "pressure" and friction > 0)
 
 
+def test_no_power_is_told_where_the_edge_sticks_and_another_term_is_larger() -> None:
+    """Its power is that of a notch, 0.5445, but only nearer to the edge than the mesh resolves."""
+    found = run(loading="interference", friction=0.4).scalars
+    assert found["stick_fraction"] > 0.999
+    assert np.isnan([found["singular_power"], found["singular_power_error"]]).all()
+    assert 0.8 < found["apparent_power"] < 0.9
+
+
 @pytest.mark.parametrize("loading", ["pressure", "interference"])
 def test_friction_moves_what_is_seen_of_the_power(loading: str) -> None:
     frictions = (0.0, 0.1, 0.2)

@@ -20,6 +20,9 @@ NEAR_LARGE, ENOUGH = 0.7, 0.024
 """The same where a steady pass that adds more than 30 % of plastic strain counts as a limit, which
 may be well before the limit load; the slope / Young's modulus from which hardening lets it add
 more."""
+FLATTER = 2.5
+"""Approach of the hub / (half-width^2 / radius): log(4 radius / half-width) - 1/2 for a soft wheel
+(K.L. Johnson, Contact Mechanics (1985), section 5.6), 2.5 at the largest slope, 0.2."""
 BORNE = 1 / (1 + math.pi / 2)
 """Most traction over vertical force that a surface without hardening bears: k times a width that
 bears (1 + pi / 2) k beside it (A.P. Green, J. Mech. Phys. Solids 2 (1954) 197-211)."""
@@ -27,7 +30,7 @@ bears (1 + pi / 2) k beside it (A.P. Green, J. Mech. Phys. Solids 2 (1954) 197-2
 
 def bears(parameters: RollingParameters) -> bool:
     """Whether an equilibrium is certain to exist in every pass."""
-    return all(_borne(own) for own in parameters.block)
+    return all(_borne(own) and _held(own) for own in parameters.block)
 
 
 def flows_ahead(parameters: RollingParameters) -> bool:
@@ -49,6 +52,15 @@ def _sheared(p: RollingParameters) -> float:
     A wheel whose creepage is given, or that is locked, slips wherever it touches at worst.
     """
     return (1.0 if p.guided else abs(p.traction)) * p.friction * p.peak_pressure
+
+
+def _held(p: RollingParameters) -> bool:
+    """Whether friction certainly bears the moment of a wheel.
+
+    The moment is told for the wheel's radius; friction acts on the arm that a flattened rim leaves.
+    """
+    shorter = FLATTER * (p.half_width / p.radius) ** 2
+    return p.load == "hertz" or p.guided or abs(p.traction) <= 1 - shorter
 
 
 def _borne(p: RollingParameters) -> bool:
