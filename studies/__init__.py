@@ -24,10 +24,12 @@ if TYPE_CHECKING:
     from studies.definition.study import Study
     from studies.execution.cluster import Access, own_workers
     from studies.execution.estimate import Bounds, Estimate, estimate
+    from studies.execution.function import sweep
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
     from studies.views.reading import open_netcdf, open_study
+    from studies.views.solution import to_xarray
 
 _HOMES = {
     "Access": "execution.cluster",
@@ -46,6 +48,8 @@ _HOMES = {
     "own_workers": "execution.cluster",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
+    "sweep": "execution.function",
+    "to_xarray": "views.solution",
 }
 
 _RENAMED = {"Path": "LoadingPath"}
@@ -74,6 +78,8 @@ __all__ = [
     "own_workers",
     "run_study",
     "scene_schema",
+    "sweep",
+    "to_xarray",
 ]
 
 

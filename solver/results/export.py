@@ -1,4 +1,4 @@
-"""A solution as files of other programs: VTU for ParaView, xarray for notebooks."""
+"""States as files of other programs: VTU for ParaView."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from solver.results.samples import Nodal
 from solver.tensors import COMPONENTS, to_tensor, von_mises
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import meshio
-    import xarray as xr
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
-    from solver.results.solution import Solution
+    from solver.contact.system import System
 
     Array = NDArray[np.float64]
 
@@ -32,16 +33,16 @@ _CELLS = {
 """Element -> cell of meshio. Corners, mid-sides and the middle have the same order in both."""
 
 
-def nodal_fields(solution: Solution, body: str, at: Converged) -> dict[str, Array]:
+def nodal_fields(system: System, body: str, at: Converged) -> dict[str, Array]:
     """Return fields at the nodes of a body, components first.
 
     They are displacement (2, n) [mm], stress (4, n) [MPa], von Mises stress (n,) [MPa] and
     equivalent plastic strain (n,).
     """
-    nodal = Nodal(solution.system)
-    stress = solution.system.response(body, at).stress
+    nodal = Nodal(system)
+    stress = system.response(body, at).stress
     return {
-        "displacement": solution.system.displacement(body, at.state).reshape(-1, 2).T,
+        "displacement": system.displacement(body, at.state).reshape(-1, 2).T,
         "stress": to_tensor(nodal.stress(body, at)),
         # recovered from the points: that of recovered stress would go beyond the strength
         "von_mises": np.maximum(nodal.of_points(body, von_mises(stress)), 0.0),
@@ -49,7 +50,7 @@ def nodal_fields(solution: Solution, body: str, at: Converged) -> dict[str, Arra
     }
 
 
-def write_vtu(solution: Solution, folder: Path) -> Path:
+def write_vtu(system: System, states: Mapping[str, Converged], folder: Path) -> Path:
     """Write a .vtu for each stage and the .pvd that holds them together; return the latter.
 
     All bodies are in one mesh, told apart by the cell field ``body`` (their number). Displacement
@@ -62,9 +63,9 @@ def write_vtu(solution: Solution, folder: Path) -> Path:
         raise ModelError("folder", str(folder), "must be a folder, or not exist yet") from None
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     stages = ElementTree.SubElement(root, "Collection")
-    for number, (name, at) in enumerate(solution.stages.items()):
+    for number, (name, at) in enumerate(states.items()):
         file = folder / f"{number}-{''.join(c if c.isalnum() else '-' for c in name)}.vtu"
-        _mesh(solution, at).write(file)
+        _mesh(system, at).write(file)
         ElementTree.SubElement(
             stages, "DataSet", timestep=repr(float(number)), name=name, file=file.name
         )
@@ -73,18 +74,18 @@ def write_vtu(solution: Solution, folder: Path) -> Path:
     return path
 
 
-def _mesh(solution: Solution, at: Converged) -> meshio.Mesh:
+def _mesh(system: System, at: Converged) -> meshio.Mesh:
     import meshio  # only who writes needs it
 
     points, cells, numbers, fields = [], [], [], []
     first = 0
-    for number, name in enumerate(solution.system.names):
-        whole = solution.system.full(name)
+    for number, name in enumerate(system.names):
+        whole = system.full(name)
         points.append(np.pad(whole.X.T, ((0, 0), (0, 1))))
         connected = _turned_left(whole.basis.element_dofs.T, whole.X)
         cells.append((_CELLS[whole.body.element], first + connected))
         numbers.append(np.full(len(connected), number))
-        fields.append(nodal_fields(solution, name, at))
+        fields.append(nodal_fields(system, name, at))
         first += whole.X.shape[1]
     together = {name: np.hstack([each[name] for each in fields]) for name in fields[0]}
     moved, stress = together.pop("displacement"), together.pop("stress")
@@ -109,42 +110,3 @@ def _turned_left(cells: NDArray[np.int64], X: Array) -> NDArray[np.int64]:
     order[1:corners] = order[1:corners][::-1]
     order[corners : 2 * corners] = order[corners : 2 * corners][::-1]
     return np.where(right[:, None], cells[:, order], cells)
-
-
-def to_xarray(solution: Solution) -> xr.Dataset:
-    """Return fields at all nodes over stages, with the body and the position of each node.
-
-    Variables: ``displacement`` (stage, axis, node) [mm], ``stress`` (stage, component, node) [MPa],
-    ``von_mises``, ``plastic_strain`` (stage, node).
-    """
-    import xarray as xr
-
-    names = list(solution.system.names)
-    x, y = np.hstack([solution.nodes(name) for name in names])
-    of = np.repeat(names, [solution.nodes(name).shape[1] for name in names])
-    found = [
-        [nodal_fields(solution, name, at) for name in names] for at in solution.stages.values()
-    ]
-    dims = {
-        "displacement": ("axis", "node"), "stress": ("component", "node"),
-        "von_mises": ("node",), "plastic_strain": ("node",),
-    }  # fmt: skip
-    units = {"displacement": "mm", "stress": "MPa", "von_mises": "MPa", "plastic_strain": "1"}
-    return xr.Dataset(
-        {
-            name: (
-                ("stage", *own),
-                np.stack([np.concatenate([b[name] for b in at], axis=-1) for at in found]),
-                {"units": units[name]},
-            )
-            for name, own in dims.items()
-        },
-        coords={
-            "stage": list(solution.stages),
-            "axis": ["x", "y"],
-            "component": list(COMPONENTS),
-            "body": ("node", of),
-            "x": ("node", x, {"units": "mm"}),
-            "y": ("node", y, {"units": "mm"}),
-        },
-    )

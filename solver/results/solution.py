@@ -26,7 +26,6 @@ from solver.tensors import to_tensor
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import xarray as xr
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
@@ -136,13 +135,7 @@ class Solution:
         """
         from solver.results.export import write_vtu
 
-        return write_vtu(self, Path(folder))
-
-    def to_xarray(self) -> xr.Dataset:
-        """Return fields at all nodes of all bodies, over the stages."""
-        from solver.results.export import to_xarray
-
-        return to_xarray(self)
+        return write_vtu(self.system, self.stages, Path(folder))
 
     def audit(self, stage: str = "loaded") -> Audit:
         """Return the audit: figures of a state, violated conditions and warnings.

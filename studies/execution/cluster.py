@@ -6,7 +6,7 @@ import logging
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
@@ -200,3 +200,12 @@ def connect(access: Access) -> Client:
         return Client(access.address, security=security, set_as_default=False, timeout=_CONNECT)
     except (OSError, ValueError) as error:
         raise GridLost(f"no scheduler answers at {access.address}: {error}") from error
+
+
+def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
+    """Return what functions give that processes of their own call, in order."""
+    from dask.base import compute
+    from dask.delayed import delayed
+
+    later = [delayed(call)() for call in calls]
+    return list(compute(*later, scheduler="processes", num_workers=workers))

@@ -62,21 +62,6 @@ def test_files_for_paraview_hold_the_mesh_and_the_fields(element: str, tmp_path:
                 np.testing.assert_allclose(mesh.points[cells[:, corners + k]], ends, atol=1e-12)
 
 
-def test_a_data_set_has_the_stages_and_all_bodies() -> None:
-    found = pressed("quad8")
-    dataset = found.to_xarray()
-    lower = dataset.where(dataset.body == "lower", drop=True)
-    np.testing.assert_allclose(
-        lower.stress.sel(stage="unloaded", component="xx"), found.stress("lower")[0]
-    )
-    np.testing.assert_allclose(
-        lower.displacement.sel(stage="loaded", axis="y"), found.displacement("lower", "loaded")[1]
-    )
-    assert dataset.stress.units == "MPa"
-    assert float(dataset.von_mises.sel(stage="loaded").max()) <= 300.0 * 1.2
-    assert dataset.plastic_strain.sel(stage="unloaded").shape == dataset.x.shape
-
-
 def test_a_file_in_the_place_of_a_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(ModelError, match="must be a folder"):
