@@ -26,13 +26,14 @@ OUTDATED = "the solver has changed since the study was accepted: post it again"
 
 def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> None:
     """Compute what is missing of the study in the order, and tell how it goes."""
-    study = Study.known(order["study"])
+    store = Store(order["data"], held=True)
+    study = Study.known(order["study"], store.scene)
     if study.id != order["id"]:
         outlet.send("refused", {"reason": OUTDATED})
         return
     outcome = run_study(
         study,
-        Store(order["data"], held=True),
+        store,
         scheduler=Access.from_dict(order["access"]),
         limits=Limits(**order["limits"]),
         priority=order["priority"],

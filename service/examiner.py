@@ -73,9 +73,10 @@ class Examiner:
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Check a study, name its runs and tell what it costs; in a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the service's to handle
-    study = Study.known(content)
+    store = Store(directory)
+    study = Study.known(content, store.scene)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
-    cost = estimate(study, Store(directory))
+    cost = estimate(study, store)
     bounds.check(cost)
     return Examined(study, runs, cost)

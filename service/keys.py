@@ -21,7 +21,7 @@ from pathlib import Path
 from pydantic import BaseModel, TypeAdapter
 
 from studies.errors import StudyError
-from studies.storage.store import appearing
+from studies.storage.appearing import appearing
 
 
 class Scope(StrEnum):

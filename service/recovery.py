@@ -50,7 +50,7 @@ def open_queue(
 def _find(file: Path, jobs: Jobs, store: Store) -> None:
     """Put a study of the directory into the queue, if this version of the solver knows it."""
     try:
-        study = Study.known(json.loads(file.read_text(encoding="utf-8")))
+        study = Study.known(json.loads(file.read_text(encoding="utf-8")), store.scene)
     except (OSError, ValueError) as error:  # StudyError is a ValueError
         log.warning("studies/%s: not found again: %s", file.parent.name, error)
         return

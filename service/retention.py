@@ -166,7 +166,8 @@ class Keeper:
         for path in (self.store.directory / "studies").glob("*/study.json"):
             with suppress(ValueError, OSError):
                 if path.parent.name not in known:
-                    study = Study.known(json.loads(path.read_text(encoding="utf-8")))
+                    content = json.loads(path.read_text(encoding="utf-8"))
+                    study = Study.known(content, self.store.scene)
                     if study.id == path.parent.name:
                         needed.update(study.run_ids())
         return needed

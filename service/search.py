@@ -8,8 +8,9 @@ from typing import Any
 from service.schemas import RunFilter, Window
 from solver.scenes import SCENES
 from studies import StudyError
-from studies.definition.parameters import Parameter, one_of, parameters_of, plain, scene_named
+from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
+from studies.scenes.registry import one_of, scene_named
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Sequence
 
 
 class StudyError(ValueError):
@@ -24,6 +25,26 @@ class StudyError(ValueError):
 
     def __reduce__(self) -> tuple[type[StudyError], tuple[str, object, str]]:
         return type(self), (self.field, self.value, self.allowed)
+
+
+class SceneError(StudyError):
+    """A scene file with mistakes: all of them, each with its field, value and what is allowed.
+
+    Parameters
+    ----------
+    name : of the file
+    mistakes : one or more
+    """
+
+    def __init__(self, name: str, mistakes: Sequence[StudyError]) -> None:
+        count = f"{len(mistakes)} mistakes" if len(mistakes) > 1 else "a mistake"
+        listed = "".join(f"\n  {each}" for each in mistakes)
+        super().__init__("scene", name, f"has {count}:{listed}")
+        self.name = name
+        self.mistakes = tuple(mistakes)
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[str, tuple[StudyError, ...]]]:  # type: ignore[override]
+        return type(self), (self.name, self.mistakes)
 
 
 class Unusable(StudyError):

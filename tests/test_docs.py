@@ -1,8 +1,8 @@
 """What the pages show works, as a reader would try it.
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies ready to run; so do those of every page that has any. ``python`` blocks are programs; in
-``console`` blocks each line ``$ residua …`` runs and must succeed. A block after
+studies and scene files of `data`; so do those of every page that has any. ``python`` blocks are
+programs; in ``console`` blocks each line ``$ residua …`` runs and must succeed. A block after
 ``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
 minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that
 script, which is. Links lead to files and headings that exist, and so do the files a page names.
@@ -87,7 +87,8 @@ def test_the_first_page_is_run_and_fits_two_screens() -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "data" / "studies", tmp_path / "data" / "studies")
+    for folder in ("studies", "scenes"):
+        shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     for block in blocks((ROOT / page).read_text()):
         for program in [] if block.skipped else block.programs():

@@ -60,8 +60,8 @@ class Stepper:
     def rest(self, state: State, tally: Tally | None = None) -> Point:
         """Return a state without contact forces as the first point of a lap."""
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
-        stresses = zip(self.system.parts, at_rest.responses, strict=True)
-        stored = sum(elastic_energy(part, r.stress, state.time) for part, r in stresses)
+        each = zip(self.system.parts, state.u, at_rest.responses, strict=True)
+        stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
         now = replace(at_rest, state=state, energy=Energy(stored=stored))
         return Point(now, (), tally or Tally(), self._watched((), now))
 

@@ -140,7 +140,7 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
     tolerance = _SAME * float(np.ptp(corners, axis=1).max())
     first = np.arange(mesh.nvertices)
     pairs = cKDTree(corners.T).query_pairs(tolerance, output_type="ndarray")
-    first[pairs.max(axis=1)] = pairs.min(axis=1)
+    np.minimum.at(first, pairs.max(axis=1), pairs.min(axis=1))
     kept, number = np.unique(first, return_inverse=True)
     straight = MeshQuad(np.ascontiguousarray(corners[:, kept]), number[mesh.t], sort_t=False)
     ring = MeshQuad2.from_mesh(straight)

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from solver.errors import ModelError
-from solver.results.samples import Nodal
-from solver.tensors import COMPONENTS, to_tensor, von_mises
+from solver.results.nodal import nodal_fields
+from solver.tensors import COMPONENTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,23 +31,6 @@ _CELLS = {
     "tri6": "triangle6",
 }
 """Element -> cell of meshio. Corners, mid-sides and the middle have the same order in both."""
-
-
-def nodal_fields(system: System, body: str, at: Converged) -> dict[str, Array]:
-    """Return fields at the nodes of a body, components first.
-
-    They are displacement (2, n) [mm], stress (4, n) [MPa], von Mises stress (n,) [MPa] and
-    equivalent plastic strain (n,).
-    """
-    nodal = Nodal(system)
-    stress = system.response(body, at).stress
-    return {
-        "displacement": system.displacement(body, at.state).reshape(-1, 2).T,
-        "stress": to_tensor(nodal.stress(body, at)),
-        # recovered from the points: that of recovered stress would go beyond the strength
-        "von_mises": np.maximum(nodal.of_points(body, von_mises(stress)), 0.0),
-        "plastic_strain": nodal.plastic_strain(body, at),
-    }
 
 
 def write_vtu(system: System, states: Mapping[str, Converged], folder: Path) -> Path:

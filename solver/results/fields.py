@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,11 @@ RESIDUAL_PROFILE = declare(
 PLASTIC_STRAIN_PROFILE = declare(
     "plastic_strain_profile", "equivalent plastic strain along depth", dims=("station", "depth")
 )
+MAP_STRESS = declare("map_stress", "stress", "MPa", dims=("stage", "component", *_MAP))
+MAP_MISES = declare("map_mises", "von Mises stress", "MPa", dims=("stage", *_MAP))
+MAP_PLASTIC_STRAIN = declare(
+    "map_plastic_strain", "equivalent plastic strain", dims=("stage", *_MAP)
+)
 SURFACE_RESIDUAL = declare(
     "surface_residual", "residual stress at the contact surface", "MPa",
     dims=("body", "component", "s"),
@@ -52,6 +58,19 @@ def maps(look: Look) -> Values:
         RESIDUAL_MISES: von_mises(residual),
         PLASTIC_STRAIN: strain,
         MISES_LOADED: von_mises(under_load),
+    }
+
+
+def stress_maps(look: Look) -> Values:
+    """Return maps of stress and plastic strain in all stages, of bodies that are not released."""
+    samples = look.samples
+    states = [state for state, _ in look.stages]
+    stress = [samples.on_map(partial(samples.stress, converged=at)) for at in states]
+    strain = [samples.on_map(partial(samples.plastic_strain, converged=at)) for at in states]
+    return {
+        MAP_STRESS: np.stack([to_tensor(each) for each in stress]),
+        MAP_MISES: np.stack([von_mises(each) for each in stress]),
+        MAP_PLASTIC_STRAIN: np.stack(strain),
     }
 
 

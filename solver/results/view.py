@@ -73,7 +73,8 @@ class View:
     profile_body : the body whose profiles are taken
     surfaces : body -> boundary that is its contact surface, in the order of the dimension
     stages : states whose contact is recorded, by the names of the program's stages
-    loaded, unloaded : those of them that are taken as the states under load and after release
+    loaded, unloaded : those of them that are taken as the states under load and after release;
+        ``unloaded`` is empty where the bodies are not released
     following : those of them in which ``s`` is zero where the load is, not at x = 0
     symmetric : whether the bodies are one half of a model symmetric about s = 0
     """
@@ -94,14 +95,17 @@ class View:
 
     @property
     def coordinates(self) -> dict[str, Any]:
-        """The record's coordinates."""
-        return {
-            "component": np.array(COMPONENTS),
-            "stage": np.array(self.stages),
-            "body": np.array(list(self.surfaces)),
+        """The record's coordinates; of a grid without points there is none."""
+        grids = {
             "x": self.x,
             "y": self.y,
             "depth": self.depth,
             "station": self.station,
             "s": self.s,
+        }
+        return {
+            "component": np.array(COMPONENTS),
+            "stage": np.array(self.stages),
+            "body": np.array(list(self.surfaces)),
+            **{name: grid for name, grid in grids.items() if len(grid)},
         }

@@ -6,6 +6,7 @@ scene's ``branch`` parameter share the increments they have in common.
 
 from __future__ import annotations
 
+import solver.results.places  # noqa: F401  (declares what scenes of files store)
 from solver.scenes.ball import BALL
 from solver.scenes.effort import Effort
 from solver.scenes.elastic_punch import ELASTIC_PUNCH

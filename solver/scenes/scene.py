@@ -45,7 +45,7 @@ class Scene:
         ``annotated_types`` constraint where it has a range, an ``annotated_types.Unit`` and a
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
     branch : the parameter for whose values runs share increments: the run of a larger value goes
-        on where that of a smaller one ends, or leaves it later
+        on where that of a smaller one ends, or leaves it later; empty where there is none
     refining : parameters that change the accuracy of a result, not the problem: runs that differ
         in these alone solve the same problem, and can be compared
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
@@ -62,6 +62,8 @@ class Scene:
         microseconds, without a mesh; without it a study is estimated by its runs alone
     warnings : (run) -> texts for the user, added to the message of its record
     advice : for an outcome, what the user can do
+    quantities : numbers that only this scene has
+    source : digest of the data it was made from, if any; it counts in the ids of runs
     """
 
     name: str
@@ -81,14 +83,20 @@ class Scene:
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
     warnings: Callable[[Look], tuple[str, ...]] | None = None
     advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
+    quantities: tuple[Quantity, ...] = ()
+    source: str = ""
 
     def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
         """Yield one record for each value of the branch parameter, in increasing order.
 
+        A scene without one yields a single record.
+
         Each is yielded as soon as it is known; a failed run gives a record too.
         """
-        kind = type(getattr(self.parameters(), self.branch))
-        runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
+        runs = [parameters]
+        if self.branch:
+            kind = type(getattr(self.parameters(), self.branch))
+            runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
         method = self.method(runs[-1]) if self.method else by_increments
         for run, look in zip(runs, method(self, runs, monitor), strict=True):
             yield replace(self.record(look), parameters=run)
@@ -171,7 +179,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     for run, outcome in zip(runs, walker.walk(programs), strict=True):
 
         def check(outcome: Outcome = outcome) -> Audit:
-            loaded, unloaded = (outcome.points[name] for name in (view.loaded, view.unloaded))
+            loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
             return audit(system, loaded, unloaded, outcome.tally.dissipation)
 
         yield Look(parameters=run, samples=samples, touch=touch, outcome=outcome, check=check)

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 
 from studies.errors import StudyError
-from studies.storage.store import appearing
+from studies.storage.appearing import appearing
 
 _WAIT = 60.0
 """Seconds to wait for an answer."""

@@ -212,8 +212,8 @@ def _save(drawn: Any, path: Path) -> None:
 @contextmanager
 def _written(option: str, path: Path) -> Iterator[Path]:
     """Give a path to write to, for the file that an option names."""
+    from studies.storage.appearing import appearing
     from studies.storage.room import needs_room
-    from studies.storage.store import appearing
 
     try:
         with needs_room(path.parent), appearing(path) as part:

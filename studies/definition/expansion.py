@@ -107,7 +107,9 @@ class Expansion:
             yield LoadingPath(
                 self._path.id_of((axis.path, each.entries) for axis, each in self._at(indices[0])),
                 self._parameters(indices[0]),
-                tuple(sorted(map(self._case, indices), key=lambda case: case.values[branch])),
+                tuple(
+                    sorted(map(self._case, indices), key=lambda case: case.values.get(branch, 0))
+                ),
             )
 
     def _indices(self) -> Iterator[tuple[int, ...]]:

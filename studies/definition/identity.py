@@ -128,7 +128,15 @@ def written(scene: Scene) -> list[list[str]]:
     """
     functions = _functions(scene)
     digests = {name: _module_digest(name) for name in {each.__module__ for each in functions}}
-    return [[each.__qualname__, digests[each.__module__]] for each in functions]
+    found = [[each.__qualname__, digests[each.__module__]] for each in functions]
+    return [*found, *_read(scene)] if scene.source else found
+
+
+def _read(scene: Scene) -> list[list[str]]:
+    """Return the data that a scene was made from, and the modules that have read it."""
+    file = _own_file(type(scene).__module__)
+    modules = sorted(file.parent.glob("*.py")) if file else []
+    return [["source", scene.source], *([each.name, _file_digest(each)] for each in modules)]
 
 
 def sources(scene: Scene) -> list[Path]:
@@ -156,6 +164,13 @@ def _own_file(module: str) -> Path | None:
     if file is None or Path(file).is_relative_to(Path(solver.__file__).parent):
         return None
     return Path(file)
+
+
+@cache
+def _file_digest(file: Path) -> str:
+    from studies.definition.meaning import meaning
+
+    return _digest(meaning(file.read_bytes()).encode())
 
 
 def _module_digest(name: str) -> str:

@@ -8,10 +8,9 @@ is put into words.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import UnionType
@@ -20,8 +19,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from annotated_types import Unit
 from pydantic import TypeAdapter, ValidationError
 
-from solver.scenes import SCENES, Scene
+from solver.scenes import Scene
 from studies.errors import StudyError
+from studies.scenes.registry import scene_named
 
 _RELATIONS = {
     "exclusiveMinimum": ">",
@@ -92,25 +92,6 @@ class Parameter:
         return StudyError(field, value, f"must be {self.allowed}")
 
 
-def scene_named(name: Any) -> Scene:
-    """Return the scene called `name`, or raise a `StudyError` that says which exist."""
-    if isinstance(name, str) and name in SCENES:
-        return SCENES[name]
-    raise StudyError("scene", name, one_of(name, SCENES))
-
-
-def one_of(name: Any, names: Iterable[str]) -> str:
-    """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
-    known = list(names)
-    return f"must be one of {', '.join(known)}{nearest(name, known)}"
-
-
-def nearest(name: Any, names: Iterable[str]) -> str:
-    """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
-    matches = difflib.get_close_matches(str(name), list(names), n=1)
-    return f"; did you mean {matches[0]}?" if matches else ""
-
-
 @cache
 def parameters_of(scene: Scene) -> dict[str, Parameter]:
     """Return the parameters of a scene, by name, in the order in which it declares them."""
@@ -160,9 +141,9 @@ def defaults(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
     return declared | {name: chosen[name] for name in left_out}
 
 
-def scene_schema(name: str) -> dict[str, Any]:
+def scene_schema(scene: Scene | str) -> dict[str, Any]:
     """Return the JSON Schema of a scene's parameters, each with its ``unit``."""
-    scene = scene_named(name)
+    scene = scene_named(scene) if isinstance(scene, str) else scene
     schema = TypeAdapter(scene.parameters).json_schema()
     for parameter in parameters_of(scene).values():
         own = schema["properties"][parameter.name]

@@ -8,13 +8,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
-from solver.scenes import SCENES
+from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
 from studies.definition.identity import content_id
-from studies.definition.parameters import one_of, parameters_of, scene_named
+from studies.definition.parameters import parameters_of
 from studies.definition.sweep import (
     Axes,
     checked_axes,
@@ -24,6 +32,7 @@ from studies.definition.sweep import (
     owners,
 )
 from studies.errors import StudyError
+from studies.scenes.registry import Find, beside, name_of, nothing, one_of, scene_named
 
 
 class Study(BaseModel):
@@ -34,7 +43,7 @@ class Study(BaseModel):
     Attributes
     ----------
     name : 1 to 80 of ``A-Z a-z 0-9 . _ -``, not beginning with a dot
-    scene : name of the scene
+    scene : name of the scene; of a scene from a file its content id
     parameters : fixed parameters; the rest are the scene's defaults
     sweep : axes: lists of values by parameter, and linked axes, which have names of their own
         and set several parameters by label; see `checked_axes` for their order
@@ -46,10 +55,11 @@ class Study(BaseModel):
     scene: str
     parameters: dict[str, Any] = Field(default_factory=dict)
     sweep: Axes = Field(default_factory=dict)
+    _problem: Scene = PrivateAttr()
 
     @classmethod
     def from_toml(cls, path: Path | str) -> Self:
-        """Read a study file."""
+        """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``."""
         try:
             text = Path(path).read_text(encoding="utf-8")
             content = tomllib.loads(text)
@@ -57,18 +67,29 @@ class Study(BaseModel):
             raise StudyError("file", str(path), f"cannot be read: {error.strerror}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
             raise StudyError("file", str(path), f"must be valid TOML: {error}") from None
-        return cls.from_dict(content)
+        return cls.from_dict(content, scenes=beside(Path(path).parent))
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+    def from_dict(
+        cls, content: Mapping[str, Any], scene: Scene | None = None, scenes: Find = nothing
+    ) -> Self:
         """Check and normalise the content of a study file (or of its JSON equivalent).
 
         All combinations of the sweep are gone through once; none is kept.
+
+        Parameters
+        ----------
+        content : name, scene, parameters and sweep
+        scene : a scene of one's own, in place of the name of one
+        scenes : where scenes are found that are neither built in nor installed
         """
-        return cls.known(content).checked()
+        if scene is not None:
+            own = scene
+            content, scenes = {**content, "scene": name_of(own)}, lambda name: own
+        return cls.known(content, scenes).checked()
 
     @classmethod
-    def known(cls, content: Mapping[str, Any]) -> Self:
+    def known(cls, content: Mapping[str, Any], scenes: Find = nothing) -> Self:
         """Return the study without going through its combinations; the rest is checked.
 
         This is for content that `from_dict` has accepted before, and for looking at the size of a
@@ -77,7 +98,7 @@ class Study(BaseModel):
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
         try:
-            return cls.model_validate(dict(content))
+            return cls.model_validate(dict(content), context={"scenes": scenes})
         except ValidationError as error:
             first = error.errors()[0]
             cause = first.get("ctx", {}).get("error")
@@ -99,11 +120,13 @@ class Study(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _check(cls, content: dict[str, Any]) -> dict[str, Any]:
+    def _check(cls, content: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         for key in content:
             if key not in cls.model_fields:
                 raise StudyError(str(key), content[key], one_of(key, cls.model_fields))
-        scene = scene_named(content.get("scene"))
+        context = info.context if info.context is not None else {}
+        scene = scene_named(content.get("scene"), context.get("scenes", nothing))
+        context["found"] = scene
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
         axes = checked_axes(content.get("sweep", {}), known)
@@ -115,12 +138,21 @@ class Study(BaseModel):
         parameters = {
             key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
         }
-        return {"name": name, "scene": scene.name, "parameters": parameters, "sweep": axes}
+        return {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep the scene that was found."""
+        self._problem = context["found"] if context else scene_named(self.scene)
+
+    @property
+    def problem(self) -> Scene:
+        """The scene that is swept."""
+        return self._problem
 
     @cached_property
     def expansion(self) -> Expansion:
         """The runs, built when they are asked for."""
-        return Expansion(SCENES[self.scene], self.parameters, self.sweep)
+        return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property
     def id(self) -> str:
@@ -140,7 +172,7 @@ class Study(BaseModel):
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
-        known = parameters_of(SCENES[self.scene])
+        known = parameters_of(self.problem)
         swept = owners(self.sweep)
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters

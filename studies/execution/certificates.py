@@ -15,7 +15,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
-from studies.storage.store import appearing
+from studies.storage.appearing import appearing
 
 _LIFE = timedelta(days=3650)
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from solver.scenes import SCENES
 from studies.definition.cases import LoadingPath
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
@@ -120,8 +119,8 @@ _MEANING = {
 
 def estimate(study: Study, store: Store) -> Estimate:
     """Return what `study` will cost beyond what `store` has of it; nothing is written."""
-    scene = SCENES[study.scene]
-    pace = pace_of(store, study.scene)
+    scene = study.problem
+    pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
     seconds = [0.0, 0.0, 0.0]
     for path, missing in _missing(study, store):
@@ -145,14 +144,14 @@ def estimate(study: Study, store: Store) -> Estimate:
         increments=increments if told else None,
         longest=longest if told else None,
         cpu_seconds=(low, likely, high) if told else None,
-        bytes=round(to_compute * _file_size(store, study.scene) * _COMBINED),
-        basis=pace.basis if told else f"{study.scene} does not tell the work of its paths",
+        bytes=round(to_compute * _file_size(store, scene.name) * _COMBINED),
+        basis=pace.basis if told else f"{scene.name} does not tell the work of its paths",
     )
 
 
 def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[float]]]:
     """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
-    branch = SCENES[study.scene].branch
+    branch = study.problem.branch
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
         ids = (case.id for path in batch for case in path.cases)

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.storage.store import Store, appearing
+from studies.storage.appearing import appearing
+from studies.storage.store import Store
 
 _PATIENCE = 2.0
 """Seconds a worker looks for the token. While it looks, other workers get the paths."""

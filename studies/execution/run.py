@@ -12,7 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from solver.scenes import SCENES
+from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
@@ -93,9 +93,10 @@ class StudyOutcome:
 
 
 def run_study(
-    study: Study,
+    study: Study | Mapping[str, Any],
     store: Store,
     *,
+    scene: Scene | None = None,
     workers: int | None = None,
     scheduler: Access | str | None = None,
     resume: bool = False,
@@ -109,8 +110,9 @@ def run_study(
 
     Parameters
     ----------
-    study : what to compute
+    study : what to compute: a study, or the content of a study file
     store : where runs are kept, whichever study asked for them first
+    scene : with such content, a scene of one's own in place of the name of one
     workers : worker processes on this machine; by default one a core
     scheduler : a running dask scheduler, to be used instead; its workers must see the store
         under the same path
@@ -136,6 +138,8 @@ def run_study(
         computes the rest
     """
     started = time.monotonic()
+    if not isinstance(study, Study):
+        study = Study.from_dict(study, scene)
     asked = False
 
     def stop() -> bool:
@@ -228,7 +232,7 @@ class _Work:
             raise Unusable("directory", directory, error.allowed)
 
     def _tasks(self, proof: Proof) -> Iterator[PathTask]:
-        scene, directory = SCENES[self.study.scene], self.store.directory.resolve()
+        scene, directory = self.study.problem, self.store.directory.resolve()
         for path in map(self._rest, self.study.paths()):
             if path.cases:
                 self._walking[path.id] = (len(path.cases), 0.0)

@@ -108,15 +108,15 @@ def walk(
     stored = task.stored(store)
     for row in stored.values():
         keep(row)
-    owed = {
-        case.values[task.scene.branch]: case for case in task.path.cases if case.id not in stored
-    }
+    branch = task.scene.branch  # of a scene without one there is a single run
+    cases = (case for case in task.path.cases if case.id not in stored)
+    owed: dict[Any, Case] = {case.values.get(branch): case for case in cases}
     reason = NO_RECORD
     try:
         if owed:
             monitor(0.0)
             for record in task.scene.path(task.path.parameters, list(owed), monitor):
-                value = getattr(record.parameters, task.scene.branch)
+                value = getattr(record.parameters, branch, None)
                 row = _written(store, task.scene, owed[value], record)
                 del owed[value]
                 keep(row)

@@ -13,18 +13,19 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from solver.scenes import SCENES, Scene
+from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.parameters import parameters_of
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, STATUSES, SYMMETRIC
 from studies.errors import RunUnreadable
 from studies.storage import dataset as layout
+from studies.storage.appearing import appearing
 from studies.storage.held import Combined
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
 from studies.storage.runfile import global_attributes, opened, variables
-from studies.storage.store import Store, appearing
+from studies.storage.store import Store
 
 SAME = 1e-9
 """Relative difference below which two runs are taken to have the same grid."""
@@ -56,17 +57,17 @@ def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
 def _combined(
     study: Study, store: Store, found: Mapping[str, tuple[int, ...]], missing: Sequence[str]
 ) -> Combined:
-    scene = SCENES[study.scene]
+    scene = study.problem
     target = store.dataset_path(study.id)
-    axes, usual = _axes(study, scene), layout.usual_dimensions(scene)
-    frame = _Frame(axes=axes, usual=usual, linked=study.linked)
+    usual = layout.usual_dimensions(scene)
+    frame = _Frame(scene=scene, axes=_axes(study, scene), usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
     halves: set[int] = set()
     outcomes: dict[str, tuple[str, str]] = {}
     places: dict[str, tuple[int, ...]] = {}
     for run_id, index in found.items():
         own = dict(zip(study.axes, index, strict=True))
-        at = places[run_id] = tuple(own.get(name, 0) for name in axes)
+        at = places[run_id] = tuple(own.get(name, 0) for name in frame.axes)
         with opened(store.run_path(run_id)) as run:
             frame.learn(run, at)
             code, message = (frame.small[name][0][at] for name in ("status", "message"))
@@ -74,12 +75,11 @@ def _combined(
             ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    told = provenance(study.name, scene, study.fixed) | together(ran) | {"id": study.id}
-    symmetric = {SYMMETRIC: int(halves == {1})}
+    told = provenance(study.name, scene, study.fixed) | together(ran)
     store.clear_directory(target)
     with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
         with h5netcdf.File(disk, "w") as file:
-            file.attrs.update(told | symmetric)
+            file.attrs.update(told | {"id": study.id, SYMMETRIC: int(halves == {1})})
             frame.create_axes(file, scene)
             frame.create_fields(file)
             frame.write_small(file)
@@ -90,10 +90,10 @@ def _combined(
                     frame.fill(file, run, at)
                 disk.check()
         disk.check()
-    counts = Counter(status for status, _ in outcomes.values())
+    counts = Counter([status for status, _ in outcomes.values()] + [MISSING] * len(missing))
     return Combined(
         path=target,
-        counts=dict(counts | Counter({MISSING: len(missing)} if missing else {})),
+        counts=dict(counts),
         failed=[(run_id, *each) for run_id, each in outcomes.items() if each[0] != OK],
         missing=missing,
         anew=True,
@@ -113,7 +113,7 @@ class _Frame:
 
     Attributes
     ----------
-    axes, usual : all sweep dimensions with their values; those that the file of a run has
+    scene, axes, usual : all sweep dimensions with their values; those that a run's file has
     linked : parameter set by a linked axis -> the axis, the values over it
     labels : labelled dimension -> union of the labels
     grids, sizes, shortest : numeric dimension -> the grid found, of several alike the longest;
@@ -123,6 +123,7 @@ class _Frame:
     small : variable -> its values over the sweep: scalars, flags, texts
     """
 
+    scene: Scene
     axes: Mapping[str, Sequence[Any]]
     usual: Sequence[str]
     linked: dict[str, tuple[str, list[Any]]]
@@ -158,7 +159,7 @@ class _Frame:
                 self._learn_coordinate(name, _values(variable))
             elif variable.ndim > len(self.usual):
                 inner = [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]
-                self.fields[name] = (inner, layout.attributes_of(name))
+                self.fields[name] = (inner, layout.attributes_of(name, self.scene))
             else:
                 if name not in self.small:
                     self._hold(name, variable.dtype)
@@ -166,7 +167,7 @@ class _Frame:
 
     def _hold(self, name: str, kind: np.dtype[Any]) -> None:
         empty = np.full(self.shape, _absent(name, kind), dtype=kind)
-        self.small[name] = (empty, layout.attributes_of(name))
+        self.small[name] = (empty, layout.attributes_of(name, self.scene))
 
     def _learn_coordinate(self, name: str, values: np.ndarray) -> None:
         if values.dtype.kind not in "fi":

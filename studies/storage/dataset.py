@@ -29,9 +29,13 @@ def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
     return {key: value for key, value in given.items() if value}
 
 
-def attributes_of(name: str) -> dict[str, str]:
-    """Return the CF attributes of a variable or coordinate; unknown ones are named in words."""
-    quantity = QUANTITIES.get(name)
+def attributes_of(name: str, scene: Scene | None = None) -> dict[str, str]:
+    """Return the CF attributes of a variable or coordinate; unknown ones are named in words.
+
+    A ``scene`` may have numbers of its own.
+    """
+    own = {each.name: each for each in scene.quantities} if scene else {}
+    quantity = QUANTITIES.get(name) or own.get(name)
     known = quantity.attributes if quantity else {"long_name": name.replace("_", " ")}
     return known | dict(LABEL_ATTRIBUTES.get(name, {}))
 
@@ -55,9 +59,9 @@ def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
         if unnamed := set(dimensions) - set(record.coordinates):
             raise ValueError(f"{name} has dimensions without coordinates: {sorted(unnamed)}")
         array = np.asarray(values, dtype=float).reshape(*ones, *np.shape(values))
-        variables[name] = (*sweep, *dimensions), array, attributes_of(name)
+        variables[name] = (*sweep, *dimensions), array, attributes_of(name, scene)
     for name, number in record.scalars.items():
-        variables[name] = sweep, _scalar(name, number).reshape(ones), attributes_of(name)
+        variables[name] = sweep, _scalar(name, number).reshape(ones), attributes_of(name, scene)
     frame = _frame(scene, case, sweep, status, record.message)
     return frame.assign(variables).assign_attrs({SYMMETRIC: int(record.symmetric)})
 

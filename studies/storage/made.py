@@ -16,11 +16,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from solver.scenes import SCENES
 from studies.definition.identity import sources
 from studies.definition.study import Study
+from studies.storage.appearing import appearing
 from studies.storage.room import needs_room
-from studies.storage.store import Store, appearing
+from studies.storage.store import Store
 
 _LIBRARIES = ("h5netcdf", "matplotlib", "xarray")
 
@@ -87,7 +87,7 @@ class Made:
     @cached_property
     def _makers(self) -> list[str]:
         """Digests of the sources, and versions of libraries."""
-        found = [_hex(path.read_bytes()) for path in sources(SCENES[self._study.scene])]
+        found = [_hex(path.read_bytes()) for path in sources(self._study.problem)]
         return found + [importlib.metadata.version(name) for name in _LIBRARIES]
 
 

@@ -15,6 +15,7 @@ import solver
 from solver.errors import ModelError
 from solver.scenes import Scene
 from studies.definition.identity import solver_hash
+from studies.scenes.registry import attributes
 
 NONE = "none"
 """Stands for a library that is not installed, and for a linear solver that cannot be had."""
@@ -31,7 +32,7 @@ def provenance(title: str, scene: Scene, parameters: Mapping[str, Any]) -> dict[
     return {
         "Conventions": "CF-1.11",
         "title": title,
-        "scene": scene.name,
+        **attributes(scene),
         "parameters": json.dumps(parameters),
         "source": f"Residua {solver.__version__}",
         "solver_source": solver_hash(),

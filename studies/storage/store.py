@@ -2,6 +2,7 @@
 
 ```
 runs/<run id>.nc              one file a run, shared by all studies
+scenes/<scene id>/             scenes of files: scene.json and the meshes
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  what it was made of, and what was made of it
@@ -19,7 +20,6 @@ import fcntl
 import itertools
 import json
 import logging
-import os
 import tempfile
 import uuid
 from collections import Counter
@@ -28,12 +28,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from solver.scenes import Scene
 from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.definition.vocabulary import STATUSES
 from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, Unusable
 from studies.storage import dataset as layout
-from studies.storage import runfile
+from studies.storage import runfile, shelf
+from studies.storage.appearing import appearing
 from studies.storage.catalogue import Catalogue, Row
 from studies.storage.room import needs_room
 
@@ -79,6 +81,15 @@ class Store:
         """Return where the combined data set of a study is or will be."""
         return self.study_directory(study_id) / "dataset.nc"
 
+    def scene(self, scene_id: str) -> Scene | None:
+        """Return the scene of a file that is kept here under this id, if it is."""
+        return shelf.kept(self.directory, scene_id) if is_id(scene_id) else None
+
+    def save_scene(self, scene: Scene) -> None:
+        """Keep a scene of a file, so that studies can name it by its id."""
+        with self._writable():
+            shelf.keep(self.directory, scene)
+
     def outcomes(self, study_id: str) -> Counter[str]:
         """Return how many runs the data set of a study holds, by status."""
         import h5py
@@ -90,7 +101,8 @@ class Store:
             return Counter()
 
     def save_study(self, study: Study) -> Path:
-        """Keep what the study asks for, and return its directory."""
+        """Keep what the study asks for, its scene too, and return its directory."""
+        self.save_scene(study.problem)
         directory = self.study_directory(study.id)
         path = directory / "study.json"
         if not _holds_json(path):
@@ -268,19 +280,6 @@ class Store:
             path.rename(target)
         here, there = (each.relative_to(self.directory) for each in (path, target))
         _LOG.warning("%s cannot be read and is now %s: %s", here, there, reason)
-
-
-@contextmanager
-def appearing(path: Path) -> Iterator[Path]:
-    """Give a path to write to; what was written appears under `path` at once, or not at all."""
-    part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
-    try:
-        yield part
-        with part.open("rb") as written:
-            os.fsync(written.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _holds_json(path: Path) -> bool:

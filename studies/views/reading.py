@@ -90,18 +90,17 @@ def begun_studies(path: Path | str) -> list[str]:
 
 def _progress(file: Path) -> str:
     """Return the name of a study, and how many of its runs are finished."""
-    study = None
+    study, store = None, Store(file.parents[2])
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         name = content["name"]
-        study = Study.known(content)
+        study = Study.known(content, store.scene)
     except StudyError:  # such as a parameter that the scene no longer has
         pass
     except (OSError, ValueError, TypeError, KeyError):
         return f"{file.parent.name}: its {file.name} cannot be read"
     if study is None or study.id != file.parent.name:
         return f"{name}: begun with another version of the solver"
-    store = Store(file.parents[2])
     finished = sum(store.run_path(run_id).is_file() for run_id in study.run_ids())
     return f"{study.name}: {finished} of {study.size} runs finished"
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from solver.results.export import nodal_fields
+from solver.results.nodal import nodal_fields
 from solver.tensors import COMPONENTS
 
 if TYPE_CHECKING:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from solver.scenes import SCENES
-from studies.definition.parameters import Parameter, parameters_of, scene_named
+from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.vocabulary import OK, STATUSES
+from studies.scenes.registry import beside, known_scenes, scene_named
 from studies.views.columns import aligned, in_blocks, stacked
 from studies.views.reading import flags, sweep_axes, sweep_coordinates
 
@@ -120,12 +121,15 @@ def run_details(dataset: xr.Dataset) -> str:
 
 def scenes_table() -> str:
     """Return a line for each scene."""
-    return aligned([[scene.name, scene.summary] for scene in SCENES.values()])
+    return aligned([[scene.name, scene.summary] for scene in known_scenes()])
 
 
 def scene_table(name: str) -> str:
-    """Return a line for each parameter of a scene: default, what is allowed, what it means."""
-    scene = scene_named(name)
+    """Return a line for each parameter of a scene: default, what is allowed, what it means.
+
+    ``name`` is that of a scene, or the path of a scene file.
+    """
+    scene = scene_named(name, beside(Path()))
     known = parameters_of(scene).values()
     lines = [["parameter", "default", "allowed", "meaning"]]
     lines += [[each.name, _usual(each), each.allowed, each.description] for each in known]

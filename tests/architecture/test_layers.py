@@ -17,7 +17,7 @@ LAYERS = {
         "deprecation", "errors", "tensors", "linear", "mesh", "materials", "model", "fem",
         "contact", "loading", "steady", "results", "scenes",
     ),
-    "studies": ("errors", "definition", "storage", "execution", "views", "command"),
+    "studies": ("errors", "scenes", "definition", "storage", "execution", "views", "command"),
 }  # fmt: skip
 
 

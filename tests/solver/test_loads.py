@@ -150,6 +150,23 @@ def test_initial_stress_that_is_not_in_equilibrium_moves_the_body() -> None:
     assert found.displacement("bar")[0].min() == pytest.approx(-10.0 * 80.0 / E)
 
 
+@pytest.mark.parametrize("condense", [True, False])
+def test_the_energy_of_an_initial_stress_is_there_from_the_beginning(condense: bool) -> None:
+    """Of a body reduced to its surface too, whose points are not seen."""
+    pulled = InitialStress(stress=lambda x: np.tile([[-20.0], [0.0], [0.0], [0.0]], x.shape[1]))
+    bed = Body(name="bed", mesh=grid(np.linspace(-4.0, 4.0, 9), np.linspace(-3.0, 0.0, 4)),
+               material=ELASTIC, supports={"bottom": "xy"}, loads=(pulled,),
+               condense=condense)  # fmt: skip
+    block = Body(name="block", mesh=grid(np.linspace(-1.0, 1.0, 5), np.linspace(0.0, 2.0, 5)),
+                 material=STEEL, loads=(Pressure(boundary="top", value=50.0),))  # fmt: skip
+    pair = ContactPair(slave=("block", "bottom"), master=("bed", "top"), friction=0.3)
+    found = solve(Model(bodies=(bed, block), contacts=(pair,)))
+    assert found.loaded.energy.stored > 0.0
+    audit = found.audit()
+    assert audit.figures["audit_energy"] < 1e-8
+    assert audit.passed, audit.violations
+
+
 def test_what_equilibrium_makes_of_an_initial_stress_is_told() -> None:
     """A mean stress that no force balances goes; what has no resultants stays."""
     mesh = grid(np.linspace(0.0, 30.0, 31), np.linspace(0.0, 2.0, 9))

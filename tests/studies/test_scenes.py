@@ -14,7 +14,15 @@ from solver import SCENES, Record
 from solver.results.quantities import QUANTITIES
 from studies import Store, Study, open_study, run_study
 from studies.definition.vocabulary import LABEL_ATTRIBUTES
+from studies.scenes.scene import read_scene
 from studies.views.tables import runs_table
+
+ROOT = Path(__file__).parents[2]
+FILES = [
+    read_scene(ROOT / file)
+    for file in ("data/scenes/pin.toml", "tests/studies/scenes/everything.toml")
+]
+OWN = {quantity.name for scene in FILES for quantity in scene.quantities}
 
 COARSE = {"smallest_element": 0.05, "growth": 2.5, "load_step": 0.15, "hardening": "isotropic"}
 
@@ -53,6 +61,10 @@ def records() -> list[Record]:
         name = names[label]
         scene = SCENES[name]
         found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)
+    for own in FILES:
+        found += own.path(
+            own.parameters(), [getattr(own.parameters(), own.branch, None)], lambda share: None
+        )
     return found
 
 
@@ -68,7 +80,7 @@ def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
 
 def undeclared(record: Record) -> set[str]:
     """Return what a record gives and nobody has declared as it is given."""
-    unknown = (record.scalars.keys() | record.fields.keys()) - QUANTITIES.keys()
+    unknown = (record.scalars.keys() | record.fields.keys()) - QUANTITIES.keys() - OWN
     unknown |= record.coordinates.keys() - QUANTITIES.keys() - LABEL_ATTRIBUTES.keys()
     for name, (dims, _) in record.fields.items():
         own = QUANTITIES[name].dims if name in QUANTITIES else dims

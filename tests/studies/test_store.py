@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from studies import Store, StoreBusy, Study, run_study
-from studies.storage.store import appearing
+from studies.storage.appearing import appearing
 from tests.studies.conftest import compute_here, fake_study
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,8 @@ from typing import Any
 import xarray as xr
 
 from solver.scenes import Scene
-from studies.definition.parameters import completed, parameters_of, plain, scene_named
+from studies.definition.parameters import completed, parameters_of, plain
+from studies.scenes.registry import scene_of
 
 SAME = 1e-6
 """Relative difference below which two numbers are the same."""
@@ -21,7 +22,7 @@ Parameters = Mapping[str, Any]
 def run_parameters(run: xr.Dataset) -> dict[str, Any]:
     """Return all parameters of a single run: swept, fixed for the study, or the default."""
     fixed = json.loads(run.attrs["parameters"])
-    scene = scene_named(run.attrs["scene"])
+    scene = scene_of(run.attrs)
     known = parameters_of(scene)
     given = {name: fixed.get(name, parameter.default) for name, parameter in known.items()}
     swept = {name: plain(run[name].item(), given[name]) for name in known if name in run.coords}

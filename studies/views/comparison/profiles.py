@@ -13,9 +13,9 @@ import xarray as xr
 from scipy.signal import find_peaks
 
 from solver.scenes import Scene
-from studies.definition.parameters import scene_named
 from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
+from studies.scenes.registry import scene_named, scene_of
 from studies.views.comparison.problem import (
     SAME,
     Parameters,
@@ -140,7 +140,7 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
                 if not {CASE, "residual_profile"} <= dataset.variables.keys():
                     continue
                 found = True
-                scene = scene_named(dataset.attrs["scene"])
+                scene = scene_of(dataset.attrs)
                 scenes.add(scene.name)
                 for key, level, profile in _profiles(select(dataset, selection)):
                     known = profiles[key]
@@ -162,7 +162,7 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
 
 def _profiles(dataset: xr.Dataset) -> Iterator[tuple[Key, Level, Profile]]:
     """Yield the profiles of every successful run and pass."""
-    axes, sizes = sweep_axes(dataset), sizes_of(scene_named(dataset.attrs["scene"]))
+    axes, sizes = sweep_axes(dataset), sizes_of(scene_of(dataset.attrs))
     for at in np.argwhere(dataset["status"].to_numpy() == STATUSES.index(OK)):
         run = one_run(dataset.isel({axis: [i] for axis, i in zip(axes, at, strict=True)}))
         parameters = run_parameters(run)

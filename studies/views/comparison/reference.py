@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from studies.definition.parameters import one_of
 from studies.definition.study import Study
 from studies.errors import StudyError
+from studies.scenes.registry import one_of
 
 STRAIN = "plastic_strain"
 

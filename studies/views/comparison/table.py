@@ -8,7 +8,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from studies.definition.parameters import scene_named
+from studies.scenes.registry import scene_named
 from studies.views.columns import in_blocks, stacked
 from studies.views.comparison.compare import Comparison
 from studies.views.comparison.problem import Parameters, other_problem, told

@@ -10,7 +10,8 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
-from studies.definition.parameters import defaults, parameters_of, plain, scene_named
+from studies.definition.parameters import defaults, parameters_of, plain
+from studies.scenes.registry import scene_of
 
 _STAY = "\N{NO-BREAK SPACE}"
 
@@ -54,7 +55,7 @@ def setting(run: xr.Dataset) -> str:
     defaults. The two-dimensional state is told in any case.
     """
     scene = run.attrs["scene"]
-    known = parameters_of(scene_named(scene))
+    known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
     usual = _usual(run, given)
     state = [words(given["state"])] if "state" in given and "state" not in run.coords else []
@@ -78,7 +79,7 @@ def setting(run: xr.Dataset) -> str:
 
 def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the defaults of the parameters of a run; of several runs, those that they declare."""
-    scene = scene_named(run.attrs["scene"])
+    scene = scene_of(run.attrs)
     known = parameters_of(scene)
     swept = {
         str(name): plain(each.item(), known[name].default)

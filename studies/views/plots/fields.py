@@ -6,9 +6,9 @@ import math
 
 import xarray as xr
 
-from studies.definition.parameters import one_of
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError
+from studies.scenes.registry import one_of
 
 MAP = ("y", "x")
 ALONG = ("s", "depth", "increment")

@@ -1,0 +1,134 @@
+"""Numbers that a user asks for: the extreme value, the integral or the extent of a field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.quantities import Quantity
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.results.look import Values
+    from solver.results.places import Fields, Places
+
+    Array = NDArray[np.float64]
+    Span = tuple[float, float]
+
+_UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
+          "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
+_COMPONENTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
+EXTREME = ("maximum", "minimum")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """A number of every run; a maximum and a minimum with their place.
+
+    Attributes
+    ----------
+    name : of the variable; those of the place end in ``_x`` and ``_y``
+    of : of a body ``stress.xx`` (``yy``, ``zz``, ``xy``), ``mises``, ``plastic_strain`` or
+        ``displacement.x`` (``y``); of a contact ``pressure``, ``shear``, ``gap`` or ``slip``. In a
+        body ``mises`` and ``plastic_strain`` are those at integration points, others at nodes
+    take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
+        along which the value is above zero; of a pressure that is the length of contact
+    stage : the state
+    body, line, contact : where: one of them
+    x, y : the box of the body where it is sought [mm]
+    description : what it is, in words
+    """
+
+    name: str
+    of: str
+    take: str
+    stage: str
+    body: str | None = None
+    line: str | None = None
+    contact: str | None = None
+    x: Span | None = None
+    y: Span | None = None
+    description: str = ""
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The number and, of an extreme value, its place."""
+        where = next(filter(None, (self.body, self.line, self.contact)))
+        usual = f"{self.take} of {self.of} in {where}, stage {self.stage}"
+        units = _UNITS[self.of.partition(".")[0]]
+        units = {"extent": "mm", "integral": f"{units} mm".removeprefix("1 ")}.get(self.take, units)
+        number = Quantity(name=self.name, long_name=self.description or usual, units=units)
+        if self.take not in EXTREME:
+            return (number,)
+        return number, *(
+            Quantity(
+                name=f"{self.name}_{axis}", long_name=f"{axis} where {self.name} is", units="mm"
+            )
+            for axis in "xy"
+        )
+
+    def values(
+        self, fields: Fields, lines: Mapping[str, Places], contacts: Sequence[str]
+    ) -> Values:
+        """Return the number of a run, NaN where the field is not known.
+
+        Parameters
+        ----------
+        lines : those that ``line`` may name
+        contacts : names of the contact pairs
+        """
+        found = self._found(fields, lines, contacts)
+        return dict(zip(self.quantities, found, strict=True))
+
+    def _found(
+        self, fields: Fields, lines: Mapping[str, Places], contacts: Sequence[str]
+    ) -> tuple[float, ...]:
+        if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
+            return (fields.on_pair(contacts.index(self.contact), self.stage).length,)
+        values, X = self._sought(fields, lines, contacts)
+        known = np.isfinite(values)
+        if not known.any():
+            return (np.nan,) * len(self.quantities)
+        if self.take in EXTREME:
+            k = int((np.nanargmax if self.take == "maximum" else np.nanargmin)(values))
+            return float(values[k]), float(X[0, k]), float(X[1, k])
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X), axis=0))])
+        values = np.where(known, values, 0.0)
+        if self.take == "integral":
+            return (float(np.trapezoid(values, s)),)
+        return (_positive_length(values, s),)
+
+    def _sought(
+        self, fields: Fields, lines: Mapping[str, Places], contacts: Sequence[str]
+    ) -> tuple[Array, Array]:
+        """Return the values it is taken of (n,), NaN outside of the box, and where they are."""
+        kind, _, part = self.of.partition(".")
+        if self.contact is not None:
+            slave = fields.on_pair(contacts.index(self.contact), self.stage)
+            return getattr(slave, kind), slave.X
+        name, body = {"mises": "von_mises"}.get(kind, kind), str(self.body)
+        if self.line is not None:
+            found, X = fields.at(lines[self.line], self.stage)[name], lines[self.line].X
+        elif kind in ("mises", "plastic_strain"):  # recovered at nodes they may be beyond the law
+            X, mises, strain = fields.at_points(body, self.stage)
+            found = mises if kind == "mises" else strain
+        else:
+            found, X = fields.at_nodes(body, self.stage)[name], fields.system.full(body).X
+        values = found[_COMPONENTS[part]] if part else found
+        inside = np.ones(X.shape[1], dtype=bool)
+        for at, span in zip(X, (self.x, self.y), strict=True):
+            if span is not None:
+                inside &= (at >= span[0]) & (at <= span[1])
+        return np.where(inside, values, np.nan), X
+
+
+def _positive_length(values: Array, s: Array) -> float:
+    """Return the length along which values, linear between points, are above zero."""
+    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
+    rise = np.where(high > low, high - low, 1.0)
+    share = np.where(low > 0, 1.0, np.clip(high, 0.0, None) / rise)
+    return float(share @ np.diff(s))

@@ -1,0 +1,273 @@
+"""From tables to a model and its loading; every mistake on the way is kept, none hides another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.loading.program import Lap, Program, Stage, load_and_release
+from solver.model.amplitude import Amplitude
+from solver.scenes.material_parameters import MaterialParameters
+from studies.errors import StudyError
+from studies.scenes import tables
+from studies.scenes.meshfile import MeshFile
+from studies.scenes.shape_tables import Line
+from studies.scenes.shapes import mesh_of
+
+if TYPE_CHECKING:
+    from skfem import Mesh
+
+    from solver.contact.system import System
+    from solver.materials.law import Law
+    from solver.model.body import Body
+    from solver.model.loads import Load
+    from solver.model.model import ContactPair, Model
+    from solver.model.rigid import RigidBody
+
+T = TypeVar("T")
+_NEAR = 0.1
+"""Gap / shortest edge of a surface, up to which a body held by contact alone counts as touching."""
+
+
+@dataclass
+class Builder:
+    """Makes the parts of a scene.
+
+    Attributes
+    ----------
+    scene : its tables, for values of its parameters
+    meshes : mesh files by the name that bodies give
+    mistakes : what was found wrong so far
+    """
+
+    scene: tables.SceneFile
+    meshes: Mapping[str, MeshFile] | None
+    mistakes: list[StudyError] = field(default_factory=list)
+
+    def model(self) -> Model | None:
+        """Return the model; None where there are mistakes."""
+        from solver.model.model import Model
+
+        t = self.scene
+        laws = {name: self._law(name, table) for name, table in t.materials.items()}
+        bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
+        rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
+        contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
+        if self.mistakes:
+            return None
+        return self.tried(
+            "",
+            lambda: Model(
+                bodies=tuple(filter(None, bodies)),
+                rigid=tuple(filter(None, rigid)),
+                contacts=tuple(filter(None, contacts)),
+            ),
+        )
+
+    def tried(self, where: str, make: Callable[[], T]) -> T | None:
+        """Return what is made; None where it fails, which is kept as a mistake of an entry."""
+        try:
+            return make()
+        except ModelError as error:
+            name = f"{where}.{error.field}" if where else error.field
+            self.mistakes.append(StudyError(name, error.value, error.allowed))
+            return None
+
+    # -- bodies ------------------------------------------------------------------------------
+
+    def _law(self, name: str, table: Any) -> Law | None:
+        given = table.model_dump(exclude_unset=True, exclude_none=True)
+        elastic = "yield_stress" not in given
+        return self.tried(
+            f"materials.{name}", lambda: MaterialParameters(**given).material(elastic=elastic)
+        )
+
+    def _body(self, name: str, table: tables.Body, laws: Mapping[str, Law | None]) -> Body | None:
+        from solver.model.body import Body
+
+        where = f"bodies.{name}"
+        as_made = self.tried(
+            where if table.shape is None else f"{where}.shape", lambda: self._mesh(table)
+        )
+        mesh = self.tried(where, lambda: _placed(as_made, table)) if as_made else None
+        law = laws.get(table.material)
+        if mesh is None or law is None:
+            return None
+        each = enumerate(self.scene.loads)
+        loads = tuple(self._load(k, load) for k, load in each if load.body == name)
+        usual = "quad8" if mesh.t.shape[0] == 4 else "tri6"
+        return self.tried(
+            where,
+            lambda: Body(
+                name=name,
+                mesh=mesh,
+                material=law,
+                kinematics=self.scene.kinematics,
+                element=table.element or usual,
+                thickness=self.scene.thickness,
+                supports=table.supports,
+                loads=loads,
+            ),
+        )
+
+    def _mesh(self, table: tables.Body) -> Mesh:
+        """Return the mesh of a body as its shape or its file has it."""
+        if table.mesh is None:
+            cells = "tri" if (table.element or "").startswith("tri") else "quad"
+            return mesh_of(table.shape, cells)
+        if self.meshes is None:
+            raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")
+        return self.meshes[table.mesh].mesh(table.part)
+
+    def _rigid(self, name: str, table: tables.Rigid) -> RigidBody | None:
+        from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc
+
+        surfaces = {}
+        for each, surface in table.surfaces.items():
+            if isinstance(surface, Line):
+                surfaces[each] = Curve(points=np.array(surface.points).T)
+            else:
+                start, end = np.radians(surface.angles)
+                surfaces[each] = arc(surface.centre, surface.radius, (start, end), surface.edges)
+        motions: dict[str, Moved | Pushed] = {}
+        for axis in ("x", "y", "rotation"):
+            motion: tables.Motion = getattr(table, axis)
+            amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
+            if motion.pushed is not None:
+                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude)
+            else:
+                motions[axis] = Moved(value=motion.moved or 0.0, amplitude=amplitude)
+        return self.tried(
+            f"rigid.{name}",
+            lambda: RigidBody(
+                name=name,
+                surfaces=surfaces,
+                centre=table.centre,
+                thickness=self.scene.thickness,
+                **motions,
+            ),
+        )
+
+    # -- what acts ---------------------------------------------------------------------------
+
+    def _load(self, k: int, table: Any) -> Load:
+        from solver.model import loads
+
+        where = f"loads[{k}]"
+        given = table.model_dump(exclude={"kind", "body", "amplitude"}, exclude_unset=True)
+        if isinstance(table, tables.InitialStress):
+            even = np.array([[table.xx], [table.yy], [table.zz], [table.xy]])
+            return loads.InitialStress(stress=lambda x: np.tile(even, x.shape[1]))
+        kinds = {"pressure": loads.Pressure, "traction": loads.Traction,
+                 "displacement": loads.Displacement, "temperature": loads.Temperature}  # fmt: skip
+        made: Load = kinds[table.kind](**given, amplitude=self._amplitude(where, table.amplitude))
+        return made
+
+    def _contact(self, k: int, table: tables.Contact) -> ContactPair | None:
+        from solver.model.model import ContactPair
+
+        given = table.model_dump(exclude={"name", "slave", "master", "amplitude", "shear_limit"})
+        slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
+        amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
+        return self.tried(
+            f"contacts[{k}]",
+            lambda: ContactPair(
+                slave=(slave[0], slave[1]),
+                master=(master[0], master[1]),
+                shear_limit=table.shear_limit or math.inf,
+                amplitude=amplitude,
+                **given,
+            ),
+        )
+
+    def _amplitude(self, where: str, given: tables.Amplitude | None) -> Amplitude | None:
+        """Return a load factor over time: time k is the end of the k-th stage."""
+        stages = self.scene.stages
+        if not stages:
+            if given is not None:
+                allowed = "needs stages: with loading all loads grow together"
+                self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
+            return None
+        values, now = [0.0], 0.0 if given is not None else 1.0
+        for stage in stages:
+            if given is None:
+                values.append(0.0 if stage.release else 1.0)
+                continue
+            now = given.get(stage.name, 0.0 if stage.release else now)
+            values.append(now)
+        return Amplitude(np.arange(len(values), dtype=float), np.array(values))
+
+    def program(self) -> Program:
+        """Return the loading history."""
+        loading = self.scene.loading
+        if loading is not None:
+            return load_and_release(loading.factor, loading.step, loading.release_increments)
+        stages = tuple(
+            Stage(
+                name=stage.name,
+                target=float(k + 1),
+                steps=stage.increments,
+                apart=stage.release,
+                turns=k > 0,
+            )
+            for k, stage in enumerate(self.scene.stages)
+        )
+        return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
+
+
+def apart(system: System) -> Iterator[StudyError]:
+    """Yield the bodies that contact alone must hold, and that touch nothing at the beginning."""
+    from solver.model.rigid import RigidBody
+
+    state = system.initial()
+    for number, (name, part) in enumerate(zip(system.all_names, system.parts, strict=True)):
+        own = [i for i in system.interfaces if number in (i.slave, i.master)]
+        if not part.rigid.shape[1] or not own:
+            continue
+        gap = min(float(i.pairing(state.u, 0.0).gap.min()) for i in own)
+        # a curved surface touches at a point, and its gap is a mean around it
+        if gap > _NEAR * min(i.slave_surface.shortest_edge for i in own):
+            allowed = f"is held by contact alone and stands {gap:.4g} mm away: move it there"
+            kind = "rigid" if isinstance(part.body, RigidBody) else "bodies"
+            yield StudyError(f"{kind}.{name}", name, allowed)
+
+
+def _place(names: list[str]) -> Any:
+    """Return the words for a time: the stage, and how much of it is done."""
+
+    def words(time: float) -> str:
+        k = min(max(math.ceil(time - 1e-9) - 1, 0), len(names) - 1)
+        return f"stage {names[k]}, {time - k:.4g} of it"
+
+    return words
+
+
+def _placed(mesh: Mesh, table: tables.Body) -> Mesh:
+    """Return a mesh where its body stands, with the boundaries of its table."""
+    if any(table.move):
+        mesh = mesh.translated(table.move)
+    own = {new: _within(mesh, new, each) for new, each in table.boundaries.items()}
+    return mesh.with_boundaries(own) if own else mesh
+
+
+def _within(mesh: Mesh, name: str, table: tables.Boundary) -> Any:
+    """Return the facets of other boundaries whose middles lie in a box."""
+    known = mesh.boundaries or {}
+    for other in table.of:
+        if other not in known:
+            allowed = f"must name boundaries of the mesh: {', '.join(known) or 'it has none'}"
+            raise ModelError(f"boundaries.{name}.of", other, allowed)
+    facets = np.unique(np.concatenate([np.asarray(known[other]) for other in table.of]))
+    x, y = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
+    inside = np.ones(len(facets), dtype=bool)
+    for at, span in ((x, table.x), (y, table.y)):
+        if span is not None:
+            inside &= (at >= span[0]) & (at <= span[1])
+    if not inside.any():
+        raise ModelError(f"boundaries.{name}", table.model_dump(), "has no facet in its box")
+    return facets[inside]

@@ -1,0 +1,188 @@
+"""What entries of a scene file say of each other: names that must exist, choices of one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from solver.results.quantities import QUANTITIES
+from solver.scenes import SCENES
+from studies.errors import StudyError
+from studies.scenes import tables
+from studies.scenes.arithmetic import is_expression
+
+_NODAL = ("stress.xx", "stress.yy", "stress.zz", "stress.xy", "mises", "plastic_strain",
+          "displacement.x", "displacement.y")  # fmt: skip
+RESERVED = frozenset({"status", "message", "id", "scene", "name", "title", "created"})
+"""Names that a data set or a query has already."""
+
+
+def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:
+    """Yield what entries say of each other that cannot be.
+
+    Parameters
+    ----------
+    meshes : names of the mesh files that are there; None where this does not matter
+    """
+    yield from _bodies(scene, None if meshes is None else set(meshes))
+    yield from _loads(scene)
+    yield from _contacts(scene)
+    yield from _stages(scene)
+    yield from _look(scene)
+    yield from _outputs(scene)
+    yield from _names(scene)
+
+
+def declarations(
+    parameters: Mapping[str, tables.Parameter], used: set[str]
+) -> Iterator[StudyError]:
+    """Yield what is wrong with declared parameters.
+
+    Parameters
+    ----------
+    used : those that some entry names
+    """
+    for name, each in parameters.items():
+        field, default = f"parameters.{name}", each.default
+        number = isinstance(default, int | float) and not isinstance(default, bool)
+        if name in QUANTITIES or name in RESERVED:
+            yield StudyError(field, name, "a data set has a variable of this name: choose another")
+        if name not in used:
+            yield StudyError(field, default, f"has no effect: no entry says ${name}")
+        if each.range is not None and not number:
+            yield StudyError(f"{field}.range", each.range, "goes with a number as default")
+        elif each.range is not None and not each.range[0] <= default <= each.range[1]:  # type: ignore[operator]
+            low, high = each.range
+            yield StudyError(
+                f"{field}.default", default, f"must be in its range, {low:g} to {high:g}"
+            )
+        if isinstance(default, str) and each.choices is None:
+            yield StudyError(f"{field}.choices", None, "must be given where the default is a word")
+        elif each.choices is not None and default not in each.choices:
+            listed = ", ".join(each.choices)
+            yield StudyError(f"{field}.default", default, f"must be one of its choices: {listed}")
+        if is_expression(default):
+            yield StudyError(f"{field}.default", default, "must be a value; see derived")
+
+
+def _one_of(field: str, name: str, known: Iterable[str]) -> Iterator[StudyError]:
+    names = list(known)
+    if name not in names:
+        yield StudyError(field, name, f"must be one of {', '.join(names) or '(there is none)'}")
+
+
+def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyError]:
+    for name, body in scene.bodies.items():
+        where = f"bodies.{name}"
+        yield from _one_of(f"{where}.material", body.material, scene.materials)
+        if (body.shape is None) == (body.mesh is None):
+            given = "both" if body.shape else None
+            yield StudyError(f"{where}.shape", given, "must be given, or mesh: one of the two")
+        if body.part is not None and body.mesh is None:
+            yield StudyError(f"{where}.part", body.part, "goes with mesh")
+        if body.mesh is not None and meshes is not None and body.mesh not in meshes:
+            yield StudyError(f"{where}.mesh", body.mesh, "this file did not come with the scene")
+        for other, span in ((o, s) for o, b in body.boundaries.items() for s in (b.x, b.y)):
+            if span is not None and not span[0] < span[1]:
+                allowed = "must be two increasing numbers"
+                yield StudyError(f"{where}.boundaries.{other}", list(span), allowed)
+    for name, rigid in scene.rigid.items():
+        for axis in ("x", "y", "rotation"):
+            motion = getattr(rigid, axis)
+            if motion.moved is not None and motion.pushed is not None:
+                allowed = "must be moved or pushed, not both"
+                yield StudyError(f"rigid.{name}.{axis}", "both", allowed)
+
+
+def _loads(scene: tables.SceneFile) -> Iterator[StudyError]:
+    for k, load in enumerate(scene.loads):
+        yield from _one_of(f"loads[{k}].body", load.body, scene.bodies)
+    amplitudes = [(f"loads[{k}]", getattr(a, "amplitude", None)) for k, a in enumerate(scene.loads)]
+    amplitudes += [(f"contacts[{k}]", a.amplitude) for k, a in enumerate(scene.contacts)]
+    amplitudes += [
+        (f"rigid.{name}.{axis}", getattr(rigid, axis).amplitude)
+        for name, rigid in scene.rigid.items()
+        for axis in ("x", "y", "rotation")
+    ]
+    names = [stage.name for stage in scene.stages]
+    for where, amplitude in amplitudes:
+        for stage in amplitude or {} if names else {}:
+            yield from _one_of(f"{where}.amplitude", stage, names)
+
+
+def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
+    bodies = [*scene.bodies, *scene.rigid]
+    for k, contact in enumerate(scene.contacts):
+        for side in ("slave", "master"):
+            body = getattr(contact, side).partition(".")[0]
+            yield from _one_of(f"contacts[{k}].{side}", body, bodies)
+
+
+def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
+    if bool(scene.stages) == (scene.loading is not None):
+        given = "both" if scene.stages else None
+        yield StudyError("stages", given, "must be given, or loading: one of the two")
+
+
+def stage_names(scene: tables.SceneFile) -> list[str]:
+    """Return the names of the states that are kept."""
+    return [stage.name for stage in scene.stages] or ["loaded", "unloaded"]
+
+
+def _look(scene: tables.SceneFile) -> Iterator[StudyError]:
+    for name, line in scene.look.lines.items():
+        where = f"look.lines.{name}"
+        yield from _one_of(f"{where}.body", line.body, scene.bodies)
+        straight = (line.start is not None, line.end is not None)
+        arc = tuple(each is not None for each in (line.centre, line.radius, line.angles))
+        if not (all(straight) and not any(arc)) and not (all(arc) and not any(straight)):
+            allowed = "must have start and end, or centre, radius and angles"
+            yield StudyError(where, line.model_dump(exclude_none=True), allowed)
+    for name, point in scene.look.points.items():
+        yield from _one_of(f"look.points.{name}.body", point.body, scene.bodies)
+
+
+def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
+    for name, output in scene.outputs.items():
+        where = f"outputs.{name}"
+        yield from _one_of(f"{where}.stage", output.stage, stage_names(scene))
+        places: dict[str, list[str]] = {
+            "body": list(scene.bodies),
+            "line": list(scene.look.lines),
+            "contact": [contact.name for contact in scene.contacts],
+        }
+        fitting = ("body", "line") if output.of in _NODAL else ("contact",)
+        given = {key: getattr(output, key) for key in places if getattr(output, key) is not None}
+        if len(given) != 1 or not set(given) <= set(fitting):
+            allowed = f"needs one of {', '.join(fitting)}, where {output.of} is taken"
+            yield StudyError(where, given, allowed)
+            continue
+        ((key, value),) = given.items()
+        yield from _one_of(f"{where}.{key}", value, places[key])
+        if key == "body" and output.take in ("integral", "extent"):
+            yield StudyError(f"{where}.take", output.take, "goes with a line or a contact")
+        if key != "body" and (output.x or output.y):
+            yield StudyError(where, given, "a box of x and y goes with a body")
+
+
+def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
+    groups: Mapping[str, list[str]] = {
+        "rigid": [name for name in scene.rigid if name in scene.bodies],
+        "stages": _twice([stage.name for stage in scene.stages]),
+        "contacts": _twice([contact.name for contact in scene.contacts]),
+    }
+    if scene.name in SCENES:
+        yield StudyError("name", scene.name, "a built-in scene has this name: choose another")
+    for field, names in groups.items():
+        for name in names:
+            yield StudyError(field, name, "two have this name: each needs one of its own")
+    taken: dict[str, Any] = {**QUANTITIES, **dict.fromkeys(RESERVED), **scene.parameters}
+    for name in scene.outputs:
+        for each in (name, f"{name}_x", f"{name}_y"):
+            if each in taken:
+                allowed = f"the data set has {each} already: choose another name"
+                yield StudyError(f"outputs.{name}", name, allowed)
+
+
+def _twice(names: list[str]) -> list[str]:
+    return sorted({name for name in names if names.count(name) > 1})

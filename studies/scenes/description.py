@@ -1,0 +1,238 @@
+"""What a scene file says: its tables, evaluated for values of its parameters, and its mistakes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+from pydantic import ValidationError
+
+from studies.errors import SceneError, StudyError
+from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
+from studies.scenes.meshfile import LARGEST, MeshFile
+from studies.scenes.refusals import dotted, mistakes_of
+from studies.scenes.tables import Parameter, SceneFile
+
+PLAIN = ("name", "summary", "parameters", "derived")
+"""Entries of a scene file in which no expression stands, and the table of derived numbers."""
+
+Where = tuple[str | int, ...]
+"""Keys and positions that lead to an entry."""
+
+
+class _Evaluated(NamedTuple):
+    """A tree whose expressions have been evaluated, and those that have no value."""
+
+    tree: Any
+    mistakes: list[tuple[Where, StudyError]]
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """The content of a scene file and of the meshes it names.
+
+    Attributes
+    ----------
+    file : name of the file, for messages
+    content : its tables, as TOML or JSON holds them
+    meshes : mesh files by the name that bodies give; None where they are not at hand, so that
+        no model can be built
+    """
+
+    file: str
+    content: Mapping[str, Any]
+    meshes: Mapping[str, MeshFile] | None
+
+    @classmethod
+    def read(cls, path: Path | str) -> Self:
+        """Read a scene file, and the meshes beside it.
+
+        Raises
+        ------
+        StudyError
+            when a file cannot be read, or is no TOML
+        """
+        path = Path(path)
+        content = toml_of(path.name, _bytes(path))
+        meshes = {}
+        for name in mesh_names(content):
+            beside = path.parent / name
+            meshes[name] = MeshFile(beside.name, _bytes(beside))
+        return cls(path.name, content, meshes)
+
+    @cached_property
+    def digest(self) -> str:
+        """Content id of the file and its meshes, 32 hexadecimal digits; words do not count."""
+        told = json.dumps(_without_words(self.content), sort_keys=True, default=str)
+        meshes = sorted((self.meshes or {}).items())
+        parts = [told, *(f"{name} {_digest(mesh.data)}" for name, mesh in meshes)]
+        return _digest("\n".join(parts).encode())[:32]
+
+    @cached_property
+    def parameters(self) -> dict[str, Parameter]:
+        """The declared parameters.
+
+        Raises
+        ------
+        SceneError
+            where a declaration is wrong
+        """
+        given = self.content.get("parameters", {})
+        stub = {"parameters": given}
+        try:
+            return SceneFile.model_validate_json(_json(self._bare() | stub), strict=True).parameters
+        except ValidationError as error:
+            raise SceneError(self.file, list(mistakes_of(error, SceneFile))) from None
+
+    def tables(self, values: Mapping[str, Any]) -> SceneFile:
+        """Return the tables for values of all parameters.
+
+        Raises
+        ------
+        SceneError
+            with all entries that are wrong
+        """
+        found = self._evaluated(values)
+        unknown = {where for where, _ in found.mistakes}
+        mistakes = [mistake for _, mistake in found.mistakes]
+        try:
+            tables = SceneFile.model_validate_json(_json(found.tree), strict=True)
+        except ValidationError as error:
+            mistakes += mistakes_of(error, SceneFile, unknown)
+        if mistakes:
+            raise SceneError(self.file, mistakes)
+        return tables
+
+    def used(self) -> set[str]:
+        """Return the parameters that some entry names, through derived numbers too."""
+        derived = dict(self.content.get("derived", {}))
+        rest = {key: value for key, value in self.content.items() if key not in PLAIN}
+        found = set().union(*(names(text) for _, text in _expressions(rest)))
+        for name in reversed(derived):
+            if name in found and is_expression(derived[name]):
+                found |= names(derived[name])
+        return found
+
+    def _bare(self) -> dict[str, Any]:
+        """Return the least that a scene file has: to check a part of one."""
+        material = {"youngs_modulus": 1.0, "poisson_ratio": 0.3}
+        return {"name": "scene", "materials": {"m": material}, "bodies": {"b": {"material": "m"}}}
+
+    def _evaluated(self, values: Mapping[str, Any]) -> _Evaluated:
+        mistakes: list[tuple[Where, StudyError]] = []
+        known = dict(values)
+        derived = self.content.get("derived", {})
+        for name, text in derived.items() if isinstance(derived, Mapping) else ():
+            where = ("derived", str(name))
+            if name in values:
+                mistakes.append(
+                    (
+                        where,
+                        StudyError(
+                            f"derived.{name}", text, "is a parameter too: give it another name"
+                        ),
+                    )
+                )
+            known[str(name)] = _value(where, text, known, mistakes)
+        tree: dict[str, Any] = {
+            key: value if key in PLAIN else _replaced((key,), value, known, mistakes)
+            for key, value in self.content.items()
+        }
+        return _Evaluated(tree, mistakes)
+
+
+def toml_of(name: str, data: bytes) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises
+    ------
+    StudyError
+        where it is none
+    """
+    try:
+        return tomllib.loads(data.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise StudyError("scene", name, f"must be valid TOML: {error}") from None
+
+
+def mesh_names(content: Mapping[str, Any]) -> list[str]:
+    """Return the names of the mesh files that bodies are read from."""
+    bodies = content.get("bodies")
+    found = (
+        [each.get("mesh") for each in bodies.values() if isinstance(each, Mapping)]
+        if isinstance(bodies, Mapping)
+        else []
+    )
+    return list(dict.fromkeys(name for name in found if isinstance(name, str)))
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise StudyError("scene", str(path), f"must be at most {LARGEST} bytes")
+        return path.read_bytes()
+    except OSError as error:
+        raise StudyError("scene", str(path), f"cannot be read: {error.strerror}") from None
+
+
+def _replaced(
+    where: Where, value: Any, known: Mapping[str, Any], mistakes: list[tuple[Where, StudyError]]
+) -> Any:
+    """Return a part of the tree with numbers and words in place of expressions."""
+    if isinstance(value, Mapping):
+        return {
+            str(key): each
+            if key == "description"
+            else _replaced((*where, str(key)), each, known, mistakes)
+            for key, each in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [_replaced((*where, k), each, known, mistakes) for k, each in enumerate(value)]
+    return _value(where, value, known, mistakes)
+
+
+def _value(
+    where: Where, value: Any, known: Mapping[str, Any], mistakes: list[tuple[Where, StudyError]]
+) -> Any:
+    if not is_expression(value):
+        return value
+    try:
+        return evaluated(value, known)
+    except ExpressionError as error:
+        mistakes.append((where, StudyError(dotted(where), value, str(error))))
+        return None
+
+
+def _expressions(value: Any) -> Iterator[tuple[Where, str]]:
+    if isinstance(value, Mapping):
+        for key, each in value.items():
+            yield from (((str(key), *at), text) for at, text in _expressions(each))
+    elif isinstance(value, list | tuple):
+        for k, each in enumerate(value):
+            yield from (((k, *at), text) for at, text in _expressions(each))
+    elif is_expression(value):
+        yield (), value
+
+
+def _without_words(content: Any) -> Any:
+    """Return tables without summary and descriptions, which make no numbers."""
+    if isinstance(content, Mapping):
+        kept = {k: v for k, v in content.items() if k not in ("summary", "description")}
+        return {key: _without_words(each) for key, each in kept.items()}
+    if isinstance(content, list | tuple):
+        return [_without_words(each) for each in content]
+    return content
+
+
+def _json(tree: Any) -> str:
+    return json.dumps(tree, default=str)
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

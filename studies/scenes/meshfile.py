@@ -1,0 +1,152 @@
+"""Meshes read from files by meshio, a part of them at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from skfem import Mesh
+
+OUTLINE = "outline"
+"""Boundary that every mesh has: all edges with an element on one side alone."""
+
+LARGEST = 50_000_000
+"""Bytes a mesh file may have."""
+
+_CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
+"""Cells of meshio that a body is made of, and their corners."""
+_LINES = ("line", "line3")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MeshFile:
+    """The content of a mesh file.
+
+    Attributes
+    ----------
+    name : of the file; its ending tells the format
+    data : its bytes
+    """
+
+    name: str
+    data: bytes
+
+    def mesh(self, part: str | None) -> Mesh:
+        """Return the part of this name, or all cells, boundaries named.
+
+        Raises
+        ------
+        ModelError
+            when the file cannot be read, has no such part, or is no mesh of a plane
+        """
+        return _mesh(self.name, self.data, part)
+
+
+@lru_cache(maxsize=32)
+def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
+    found = _read(name, data)
+    points = np.asarray(found.points, dtype=float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ModelError("mesh", name, "must have points of two or three coordinates")
+    if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
+        raise ModelError("mesh", name, "must lie in a plane: its z differ")
+    blocks = [(block.type, np.asarray(block.data)) for block in found.cells]
+    named = {key: each for key, each in found.cell_sets.items() if not key.startswith("gmsh:")}
+    sets = {key: dict(enumerate(each)) for key, each in named.items()}
+    plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
+    if not plane:
+        listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
+        raise ModelError("mesh", name, f"must have cells {', '.join(_CELLS)}; it has {listed}")
+    chosen = {k: blocks[k][1] for k in plane}
+    if part is not None:
+        parts = {key for key, own in sets.items() if any(_rows(own, k).size for k in plane)}
+        if part not in parts:
+            raise ModelError(
+                "part",
+                part,
+                f"must be a part of {name}: {', '.join(sorted(parts)) or 'it has none'}",
+            )
+        chosen = {k: blocks[k][1][_rows(sets[part], k)] for k in plane}
+    chosen = {k: cells for k, cells in chosen.items() if len(cells)}
+    kind, *others = sorted({blocks[k][0] for k in chosen})
+    if others:
+        raise ModelError(
+            "mesh", name, f"a body must have cells of one kind, not {', '.join((kind, *others))}"
+        )
+    mesh, number = _made(points[:, :2], np.vstack(list(chosen.values())), kind)
+    lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
+    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets))
+
+
+def _read(name: str, data: bytes) -> Any:
+    import meshio
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"mesh{''.join(Path(name).suffixes[-1:])}"
+        path.write_bytes(data)
+        try:
+            with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
+                return meshio.read(path)  # it prints what it thinks of the file
+        except SystemExit:  # so meshio refuses a format
+            reason = "its format is not known"
+        except MemoryError:
+            raise
+        except Exception as error:  # whatever a damaged file makes a reader raise
+            reason = str(error).replace(str(path), name) or type(error).__name__
+    raise ModelError("mesh", name, f"cannot be read: {reason}")
+
+
+def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:
+    """Return the cells of a block that belong to a set."""
+    rows = own.get(block)
+    return np.asarray([] if rows is None else rows, dtype=np.int64)
+
+
+def _made(points: NDArray[np.float64], cells: NDArray[np.int64], kind: str) -> tuple[Mesh, Any]:
+    """Return the mesh, and the number of its corner at each point, -1 elsewhere."""
+    from skfem import MeshQuad, MeshQuad2, MeshTri, MeshTri2
+
+    corners = _CELLS[kind]
+    straight, curved = (MeshQuad, MeshQuad2) if corners == 4 else (MeshTri, MeshTri2)
+    used, local = np.unique(cells[:, :corners], return_inverse=True)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    nodes = np.ascontiguousarray(points[used].T)
+    mesh = straight(nodes, np.ascontiguousarray(local.reshape(-1, corners).T), sort_t=False)
+    if cells.shape[1] == corners:
+        return mesh, number
+    bent = curved.from_mesh(mesh)
+    at = bent.doflocs.copy()
+    dofs = bent.dofs.element_dofs
+    for k in range(corners, 2 * corners):  # both count the sides from the first corner on
+        at[:, dofs[k]] = points[cells[:, k]].T
+    if corners == 4:
+        X = points[cells].transpose(2, 1, 0)
+        middle = X[:, 8] if cells.shape[1] == 9 else X[:, 4:8].sum(1) / 2 - X[:, :4].sum(1) / 4
+        at[:, dofs[8]] = middle
+    return curved(doflocs=at, t=bent.t, sort_t=False, validate=False), number
+
+
+def _boundaries(
+    mesh: Mesh, number: NDArray[np.int64], lines: dict[int, Any], sets: dict[str, dict[int, Any]]
+) -> dict[str, NDArray[np.int64]]:
+    """Return the facets of each set of lines that lies on the mesh, and the outline."""
+    facets = {ends: k for k, ends in enumerate(map(tuple, np.sort(mesh.facets, axis=0).T.tolist()))}
+    found = {OUTLINE: np.asarray(mesh.boundary_facets())}
+    for name, own in sets.items():
+        pairs = [number[cells[_rows(own, k)]] for k, cells in lines.items()]
+        ends = np.sort(np.vstack([np.zeros((0, 2), dtype=int), *pairs]), axis=1)
+        known = [facets[pair] for pair in map(tuple, ends.tolist()) if pair in facets]
+        if known:
+            found[name] = np.unique(known)
+    return found

@@ -1,0 +1,132 @@
+"""Scenes by name: the built-in ones, those of installed packages, and those of files."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from solver.scenes import SCENES, Scene
+from studies.errors import StudyError
+from studies.scenes.description import Description
+
+GROUP = "residua.scenes"
+"""Entry-point group of installed packages: each gives a `Scene`, or the path of a scene file."""
+
+Find = Callable[[str], Scene | None]
+"""Returns the scene of a name or content id, or None."""
+
+
+def nothing(name: str) -> Scene | None:
+    """Find no scene."""
+    del name
+    return None
+
+
+def scene_named(name: Any, find: Find = nothing) -> Scene:
+    """Return the scene of this name.
+
+    Parameters
+    ----------
+    name : of a built-in scene or of one that an installed package gives, or what ``find`` knows
+    find : where scenes of files are found
+
+    Raises
+    ------
+    StudyError
+        that says which scenes exist
+    """
+    if isinstance(name, str):
+        found = SCENES.get(name) or find(name)
+        if found is None and (entry := _installed().get(name)):
+            found = _loaded(entry)
+        if found is not None:
+            return found
+    raise StudyError("scene", name, one_of(name, known_names()))
+
+
+def known_names() -> list[str]:
+    """Return the names of the built-in scenes and of those of installed packages."""
+    return list(dict.fromkeys((*SCENES, *_installed())))
+
+
+def known_scenes() -> Iterator[Scene]:
+    """Yield the same scenes."""
+    return map(scene_named, known_names())
+
+
+def name_of(scene: Scene) -> str:
+    """Return what a study calls a scene: its name, or the content id of one from a file."""
+    from studies.scenes.scene import FileScene
+
+    return scene.id if isinstance(scene, FileScene) else scene.name
+
+
+def beside(folder: Path) -> Find:
+    """Return what finds scenes by the name of their file in a folder."""
+
+    def find(name: str) -> Scene | None:
+        if not name.endswith(".toml"):
+            return None
+        from studies.scenes.scene import read_scene
+
+        return read_scene(folder / name)
+
+    return find
+
+
+def attributes(scene: Scene) -> dict[str, str]:
+    """Return what a data set tells of its scene, so that it can be read without the file."""
+    from studies.scenes.scene import FileScene
+
+    if not isinstance(scene, FileScene):
+        return {"scene": scene.name}
+    content = scene.description.content
+    return {"scene": scene.name, "scene_id": scene.id, "scene_file": json.dumps(content)}
+
+
+def scene_of(told: Mapping[str, Any]) -> Scene:
+    """Return the scene that the attributes of a data set tell; its meshes may be missing.
+
+    Raises
+    ------
+    StudyError
+        when it is none that exists here
+    """
+    if "scene_file" not in told:
+        return scene_named(told["scene"])
+    from studies.scenes.scene import file_scene
+
+    return file_scene(Description(str(told["scene"]), json.loads(told["scene_file"]), None))
+
+
+def one_of(name: Any, names: Iterable[str]) -> str:
+    """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
+    known = list(names)
+    return f"must be one of {', '.join(known)}{nearest(name, known)}"
+
+
+def nearest(name: Any, names: Iterable[str]) -> str:
+    """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
+    matches = difflib.get_close_matches(str(name), list(names), n=1)
+    return f"; did you mean {matches[0]}?" if matches else ""
+
+
+def _installed() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _loaded(entry: EntryPoint) -> Scene:
+    """Return the scene that an installed package gives."""
+    given = entry.load()
+    if isinstance(given, str | Path):
+        from studies.scenes.scene import read_scene
+
+        return read_scene(given)
+    if isinstance(given, Scene):
+        return given
+    allowed = f"must be a Scene or the path of a scene file, not {type(given).__name__}"
+    raise StudyError("scene", entry.name, f"{allowed}: entry point {entry.value}")

@@ -1,0 +1,257 @@
+"""A scene made of a scene file: parameters, model, loading and looks are read from its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, make_dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from annotated_types import Interval, Unit
+
+from solver.errors import ModelError
+from solver.results.fields import maps, stress_maps
+from solver.results.figures import cost
+from solver.results.look import Look, Values
+from solver.scenes.parameters import check, described
+from solver.scenes.scene import Scene
+from studies.errors import SceneError
+from studies.scenes import tables
+from studies.scenes.building import Builder, apart
+from studies.scenes.checking import clashes, declarations
+from studies.scenes.description import Description
+from studies.scenes.looking import asked, looked, view_of
+
+if TYPE_CHECKING:
+    from solver.contact.state import Converged
+    from solver.loading.program import Program
+    from solver.model.model import Model
+    from solver.results.samples import Samples
+    from solver.results.view import View
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FileScene(Scene):
+    """A scene made of a file.
+
+    Attributes
+    ----------
+    description : the content of the file and its meshes
+    """
+
+    description: Description
+
+    @property
+    def id(self) -> str:
+        """Content id of the file and its meshes."""
+        return self.description.digest
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return file_scene, (self.description,)
+
+    def __dask_tokenize__(self) -> tuple[Any, ...]:
+        return type(self).__name__, self.id
+
+
+def file_scene(description: Description) -> FileScene:
+    """Return the scene of a description, the same object for the same content.
+
+    Raises
+    ------
+    SceneError
+        with all mistakes that can be told without building the bodies
+    """
+    known = _SCENES.get(description.digest)
+    if known is None:
+        known = _SCENES[description.digest] = _made(description)
+        while len(_SCENES) > _MOST:
+            del _SCENES[next(iter(_SCENES))]
+    return known
+
+
+_SCENES: dict[str, FileScene] = {}
+_MOST = 64
+"""Scenes of files that a process keeps."""
+
+
+def _made(description: Description) -> FileScene:
+    parameters = description.parameters
+    mistakes = list(declarations(parameters, description.used()))
+    usual = {name: each.default for name, each in parameters.items()}
+    scene = None
+    try:
+        scene = description.tables(usual)
+    except SceneError as error:
+        mistakes += error.mistakes
+    if scene is not None:
+        mistakes += clashes(scene, description.meshes)
+    if mistakes or scene is None:
+        raise SceneError(description.file, mistakes)
+    return FileScene(
+        name=scene.name,
+        summary=scene.summary or f"scene of the file {description.file}",
+        parameters=_parameters(description, parameters),
+        branch=_branch(description),
+        model=partial(_model, description),
+        program=partial(_program, description),
+        view=partial(_view, description),
+        outputs=(*((_maps,) if scene.look.map else ()), partial(_looked, description)),
+        costs=(cost,),
+        watch=_watched,
+        quantities=tuple(q for number in asked(scene) for q in number.quantities),
+        source=description.digest,
+        description=description,
+    )
+
+
+def check_built(scene: FileScene) -> None:
+    """Build the scene with its defaults.
+
+    Raises
+    ------
+    SceneError
+        with all mistakes of meshes, boundaries, bodies and contact pairs
+    """
+    from solver.contact.system import System
+
+    description, parameters = scene.description, scene.parameters()
+    builder = Builder(_tables(description, parameters), description.meshes)
+    model = builder.model()
+    if model is not None:
+        system = builder.tried("", lambda: System(model))
+        builder.mistakes += apart(system) if system else ()
+    if builder.mistakes:
+        raise SceneError(description.file, builder.mistakes)
+
+
+def read_scene(path: Path | str) -> FileScene:
+    """Return the scene of a file, checked with its default parameters.
+
+    Raises
+    ------
+    StudyError, SceneError
+        when the file cannot be read, or with all its mistakes
+    """
+    scene = file_scene(Description.read(path))
+    check_built(scene)
+    return scene
+
+
+# -- what the driver of scenes calls -------------------------------------------------------------
+
+
+def _model(description: Description, parameters: Any) -> Model:
+    builder = Builder(_tables(description, parameters), description.meshes)
+    model = builder.model()
+    if model is None:
+        raise SceneError(description.file, builder.mistakes)
+    return model
+
+
+def _program(description: Description, parameters: Any) -> Program:
+    return Builder(_tables(description, parameters), description.meshes).program()
+
+
+def _view(description: Description, parameters: Any) -> View:
+    return view_of(_tables(description, parameters))
+
+
+def _looked(description: Description, look: Look) -> Values:
+    return looked(
+        _tables(description, look.parameters), _program(description, look.parameters), look
+    )
+
+
+def _maps(look: Look) -> Values:
+    """Return residual stress where the bodies are released, else stress in all stages."""
+    return maps(look) if look.view.unloaded else stress_maps(look)
+
+
+def _watched(samples: Samples, converged: Converged) -> Any:
+    from solver.results.history import observe  # only who computes needs scipy
+
+    system: Any = samples.system
+    return observe(system, converged)
+
+
+# -- parameters ----------------------------------------------------------------------------------
+
+
+def _tables(description: Description, parameters: Any) -> tables.SceneFile:
+    return _tables_of(description, tuple(_values(parameters).items()))
+
+
+@lru_cache(maxsize=256)
+def _tables_of(description: Description, values: tuple[tuple[str, Any], ...]) -> tables.SceneFile:
+    return description.tables(dict(values))
+
+
+def _values(parameters: Any) -> dict[str, Any]:
+    return {item.name: getattr(parameters, item.name) for item in fields(parameters)}
+
+
+def _branch(description: Description) -> str:
+    """Return the parameter that is the load factor and nothing else, if there is one."""
+    loading = description.content.get("loading", {})
+    factor = loading.get("factor")
+    if not isinstance(factor, str) or factor.removeprefix("$") not in description.parameters:
+        return ""
+    name = factor.removeprefix("$")
+    rest = dict(description.content) | {"loading": {**loading, "factor": 1.0}}
+    others = Description(description.file, rest, description.meshes).used()
+    return "" if name in others else name
+
+
+def _parameters(description: Description, declared: Mapping[str, tables.Parameter]) -> type[Any]:
+    """Return the class of the scene's parameters, which checks itself as those of scenes do."""
+
+    def checked(self: Any) -> None:
+        check(self)
+        try:
+            _tables(description, self)
+        except SceneError as error:
+            first = error.mistakes[0]
+            raise ModelError(first.field, first.value, first.allowed) from None
+
+    def reduced(self: Any) -> tuple[Any, ...]:
+        return _again, (description, _values(self))
+
+    def token(self: Any) -> tuple[Any, ...]:
+        return "parameters", description.digest, tuple(_values(self).items())
+
+    return make_dataclass(
+        "Parameters",
+        [
+            (name, _kind(each), described(each.default, each.description))
+            for name, each in declared.items()
+        ],
+        frozen=True,
+        kw_only=True,
+        namespace={
+            "__post_init__": checked,
+            "__reduce__": reduced,
+            "__dask_tokenize__": token,
+            "__module__": __name__,
+        },
+    )
+
+
+def _again(description: Description, values: Mapping[str, Any]) -> Any:
+    """Return the parameters that another process had."""
+    return file_scene(description).parameters(**values)
+
+
+def _kind(declared: tables.Parameter) -> Any:
+    """Return the annotated type of a parameter."""
+    default = declared.default
+    if isinstance(default, bool):
+        return bool
+    if isinstance(default, str):
+        return Literal[declared.choices or (default,)]
+    marks: list[Any] = [Unit(declared.unit)]
+    if declared.range is not None:
+        low, high = declared.range
+        marks.append(Interval(ge=low, le=high))
+    kind = int if isinstance(default, int) and not isinstance(default, bool) else float
+    return Annotated[(kind, *marks)]

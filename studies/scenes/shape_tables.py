@@ -1,0 +1,131 @@
+"""Tables of shapes: of bodies that are meshed here, and of the surfaces of rigid ones."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from annotated_types import Interval
+from pydantic import Field
+
+from solver.scenes.parameters import Length
+from studies.scenes.table import Count, Place, Span, Table
+
+
+class Near(Table):
+    """Where a built-in shape is meshed finely.
+
+    Elements have the side ``size`` [mm] within ``radius`` of the place, and grow away from there.
+    """
+
+    at: Place
+    size: Length
+    radius: Annotated[float, Interval(ge=0.0, le=1e6)] = 0.0
+
+
+class _Meshed(Table):
+    """What shapes that are divided along two directions have.
+
+    ``size`` is the largest element side, ``growth`` the ratio of neighbouring sides.
+    """
+
+    size: Length
+    growth: Annotated[float, Interval(gt=1.0, le=3.0)] = 1.3
+    near: tuple[Near, ...] = ()
+
+
+class Rectangle(_Meshed):
+    """From ``x[0]`` to ``x[1]`` and ``y[0]`` to ``y[1]``: left, right, bottom, top."""
+
+    kind: Literal["rectangle"]
+    x: Span
+    y: Span
+
+
+class HalfPlane(_Meshed):
+    """A rectangle below y = 0, as deep as it reaches to either side; its half where symmetric."""
+
+    kind: Literal["half_plane"]
+    extent: Length
+    symmetric: bool = False
+
+
+class Pad(_Meshed):
+    """A block on y = 0, its bottom an arc that touches x = 0: left, right, bottom, top.
+
+    It is as high at its sides as in its middle.
+    """
+
+    kind: Literal["pad"]
+    width: Length
+    height: Length
+    radius: Length
+
+
+class Ring(_Meshed):
+    """Between two radii, and between two angles [degrees]: inner, outer, start, end."""
+
+    kind: Literal["ring", "sector"]
+    centre: Place = (0.0, 0.0)
+    radii: tuple[Length, Length]
+    angles: Span = (0.0, 360.0)
+
+
+class Fillet(_Meshed):
+    """A bar that narrows from ``wide`` to ``narrow`` over a fillet at y = 0, its axis at x = 0.
+
+    It reaches ``lengths`` below and above: left (the axis), bottom, right (the end of the wide
+    part), surface, fillet, top. Where something is ``near``, the whole fillet is fine.
+    """
+
+    kind: Literal["fillet"]
+    wide: Length
+    narrow: Length
+    radius: Length
+    lengths: tuple[Length, Length]
+
+
+class Disc(Table):
+    """A whole disc, meshed evenly: rim, and its quarters east, north, west, south."""
+
+    kind: Literal["disc"]
+    centre: Place = (0.0, 0.0)
+    radius: Length
+    size: Length
+
+
+class Round(Table):
+    """A disc that touches y = 0 at ``at``, fine there, without a cap on its far side.
+
+    Its boundaries are those of `solver.mesh.ball`: where it lies above, surface and cap.
+    """
+
+    kind: Literal["round"]
+    at: Place = (0.0, 0.0)
+    radius: Length
+    size: Length
+    fine: Length
+    growth: Annotated[float, Interval(gt=1.0, le=3.0)] = 1.3
+    above: bool = True
+    symmetric: bool = False
+
+
+Shape = Annotated[
+    Rectangle | HalfPlane | Pad | Ring | Fillet | Disc | Round, Field(discriminator="kind")
+]
+
+
+class Line(Table):
+    """A straight surface of a rigid body, which lies on the left of one who walks along it."""
+
+    kind: Literal["line"]
+    points: Annotated[tuple[Place, ...], Field(min_length=2, max_length=10_000)]
+
+
+class Arc(Table):
+    """An arc [degrees]; counter-clockwise the rigid body is inside the circle."""
+
+    kind: Literal["arc"]
+    centre: Place
+    radius: Length
+    angles: Span
+    edges: Count = 60

@@ -1,0 +1,24 @@
+"""What all tables of a scene file have, and the kinds of entries they share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Interval
+from pydantic import BaseModel, ConfigDict, StringConstraints
+
+Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,59}$")]
+"""A name that a scene file gives: 1 to 60 of ``A-Z a-z 0-9 _``, beginning with a letter."""
+FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}$")]
+"""The name of a file beside the scene file."""
+Place = tuple[float, float]
+Span = tuple[float, float]
+Count = Annotated[int, Interval(ge=1, le=10_000)]
+Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
+"""A surface: ``body.boundary``."""
+
+
+class Table(BaseModel):
+    """A table without unknown entries; numbers are finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

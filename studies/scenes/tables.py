@@ -1,0 +1,280 @@
+"""The tables of a scene file, as they are once its expressions have been evaluated."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated, Any, Literal, get_type_hints
+
+from annotated_types import Interval
+from pydantic import Field, StringConstraints, create_model
+
+from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.parameters import Friction, Length, Stress
+from studies.scenes.shape_tables import Arc, Line, Shape
+from studies.scenes.table import Count, FileName, Label, Place, Side, Span, Table
+
+# -- bodies ------------------------------------------------------------------------------------
+
+
+class Boundary(Table):
+    """Facets of other boundaries whose middles lie in a box, under a name of their own."""
+
+    of: Annotated[tuple[str, ...], Field(min_length=1)]
+    x: Span | None = None
+    y: Span | None = None
+
+
+class Body(Table):
+    """A body: a shape, or a mesh file and the part of it that the body is."""
+
+    material: str
+    shape: Shape | None = None
+    mesh: FileName | None = None
+    part: str | None = None
+    element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] | None = None
+    move: Place = (0.0, 0.0)
+    boundaries: dict[Label, Boundary] = Field(default_factory=dict)
+    supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)
+
+
+def _material() -> type[Table]:
+    """Return the table of a material: the parameters of the scenes' materials."""
+    hints = get_type_hints(MaterialParameters, include_extras=True)
+    known = {
+        field.name: (hints[field.name], field.default)
+        for field in dataclasses.fields(MaterialParameters)
+        if field.name != "accuracy"
+    }
+    known |= {name: (hints[name], ...) for name in ("youngs_modulus", "poisson_ratio")}
+    known["yield_stress"] = (Stress | None, None)
+    made: type[Table] = create_model("Material", __base__=Table, **known)  # type: ignore[call-overload]
+    made.__doc__ = "A material; one without a yield stress is elastic."
+    return made
+
+
+Material = _material()
+
+
+# -- rigid bodies --------------------------------------------------------------------------------
+
+
+Amplitude = dict[Label, float]
+"""Stage -> load factor at its end; a stage left out keeps that of the one before."""
+
+
+class Motion(Table):
+    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``)."""
+
+    moved: float | None = None
+    pushed: float | None = None
+    amplitude: Amplitude | None = None
+
+
+class Rigid(Table):
+    """A rigid body: its surfaces by name, its centre and motions."""
+
+    surfaces: Annotated[
+        dict[Label, Annotated[Line | Arc, Field(discriminator="kind")]], Field(min_length=1)
+    ]
+    centre: Place = (0.0, 0.0)
+    x: Motion = Motion()
+    y: Motion = Motion()
+    rotation: Motion = Motion()
+
+
+# -- what acts -----------------------------------------------------------------------------------
+
+
+class _Load(Table):
+    body: str
+    amplitude: Amplitude | None = None
+
+
+class Pressure(_Load):
+    """A pressure on a boundary, positive when it pushes [MPa]."""
+
+    kind: Literal["pressure"]
+    boundary: str
+    value: float
+
+
+class Traction(_Load):
+    """A force per area in fixed directions [MPa]."""
+
+    kind: Literal["traction"]
+    boundary: str
+    x: float = 0.0
+    y: float = 0.0
+
+
+class Displacement(_Load):
+    """A prescribed displacement of a boundary [mm]; what is left out is free."""
+
+    kind: Literal["displacement"]
+    boundary: str
+    x: float | None = None
+    y: float | None = None
+
+
+class Temperature(_Load):
+    """An even rise of temperature [K], which expands and softens the body."""
+
+    kind: Literal["temperature"]
+    rise: float
+    expansion: float
+    modulus_drop: float = 0.0
+    yield_drop: float = 0.0
+
+
+class InitialStress(Table):
+    """An even stress before any load [MPa]."""
+
+    kind: Literal["initial_stress"]
+    body: str
+    xx: float = 0.0
+    yy: float = 0.0
+    zz: float = 0.0
+    xy: float = 0.0
+
+
+Load = Annotated[
+    Pressure | Traction | Displacement | Temperature | InitialStress, Field(discriminator="kind")
+]
+
+
+class Contact(Table):
+    """Two surfaces that may touch; see `solver.ContactPair`. Its label is ``name``."""
+
+    name: Label
+    slave: Side
+    master: Side
+    friction: Friction = 0.0
+    cohesion: Annotated[float, Interval(ge=0.0, le=1e7)] = 0.0
+    shear_limit: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.0
+    sliding: Literal["auto", "small", "finite"] = "auto"
+    gap: float = 0.0
+    interference: float = 0.0
+    amplitude: Amplitude | None = None
+
+
+class Stage(Table):
+    """A part of the loading, in equal increments.
+
+    At the end of the first one a load without an amplitude is at its full value; where ``release``
+    is true such loads go to zero, and the bodies are taken apart.
+    """
+
+    name: Label
+    increments: Count = 10
+    release: bool = False
+
+
+class Loading(Table):
+    """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away."""
+
+    factor: Annotated[float, Interval(gt=0.0, le=1e6)]
+    step: Annotated[float, Interval(gt=0.0, le=1e6)]
+    release_increments: Count = 5
+
+
+# -- where to look -------------------------------------------------------------------------------
+
+
+class Spaced(Table):
+    """Equal steps from ``start`` to ``stop``."""
+
+    start: float
+    stop: float
+    num: Annotated[int, Interval(ge=2, le=2000)]
+
+
+class Map(Table):
+    """A grid on which stress and strain are stored."""
+
+    x: Spaced
+    y: Spaced
+
+
+class LookLine(Table):
+    """A straight line from one place to another, or an arc [degrees], in a body."""
+
+    body: str
+    start: Place | None = None
+    end: Place | None = None
+    centre: Place | None = None
+    radius: Length | None = None
+    angles: Span | None = None
+
+
+class LookPoint(Table):
+    """A place in a body."""
+
+    body: str
+    at: Place
+
+
+class Look(Table):
+    """Where results are stored; ``samples`` is their number along lines and contact surfaces."""
+
+    samples: Annotated[int, Interval(ge=2, le=5000)] = 201
+    map: Map | None = None
+    lines: dict[Label, LookLine] = Field(default_factory=dict)
+    points: dict[Label, LookPoint] = Field(default_factory=dict)
+
+
+class Output(Table):
+    """A number of every run, and the place where it was found.
+
+    ``of`` is a stress (``stress.xx``), ``mises``, ``plastic_strain`` or a displacement
+    (``displacement.x``) of a body, in a box of it or along a line; or ``pressure``, ``shear``,
+    ``gap`` or ``slip`` of a contact. ``take`` is the maximum, the minimum, the integral along the
+    line or contact, or the extent: the length along which the value is above zero. The extent of a
+    pressure is the length of contact.
+    """
+
+    of: Literal[
+        "stress.xx", "stress.yy", "stress.zz", "stress.xy", "mises", "plastic_strain",
+        "displacement.x", "displacement.y", "pressure", "shear", "gap", "slip",
+    ]  # fmt: skip
+    take: Literal["maximum", "minimum", "integral", "extent"] = "maximum"
+    stage: str
+    body: str | None = None
+    line: str | None = None
+    contact: str | None = None
+    x: Span | None = None
+    y: Span | None = None
+    description: str = ""
+
+
+# -- the whole -----------------------------------------------------------------------------------
+
+
+class Parameter(Table):
+    """A declared parameter: its default, range or choices, unit and meaning."""
+
+    default: bool | int | float | str
+    range: tuple[float, float] | None = None
+    choices: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    unit: Annotated[str, StringConstraints(max_length=40)] = "1"
+    description: Annotated[str, StringConstraints(max_length=400)] = ""
+
+
+class SceneFile(Table):
+    """A whole scene file."""
+
+    name: Label
+    summary: Annotated[str, StringConstraints(max_length=400)] = ""
+    kinematics: Literal["plane_strain", "plane_stress", "axisymmetric"] = "plane_strain"
+    thickness: Length = 1.0
+    symmetric: bool = False
+    parameters: dict[Label, Parameter] = Field(default_factory=dict)
+    derived: dict[Label, Any] = Field(default_factory=dict)
+    materials: Annotated[dict[Label, Material], Field(min_length=1)]  # type: ignore[valid-type]
+    bodies: Annotated[dict[Label, Body], Field(min_length=1)]
+    rigid: dict[Label, Rigid] = Field(default_factory=dict)
+    contacts: tuple[Contact, ...] = ()
+    loads: tuple[Load, ...] = ()
+    stages: tuple[Stage, ...] = ()
+    loading: Loading | None = None
+    look: Look = Look()
+    outputs: dict[Label, Output] = Field(default_factory=dict)

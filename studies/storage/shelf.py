@@ -1,0 +1,65 @@
+"""Scenes of files kept beside the runs: ``scenes/<scene id>/`` with scene.json and the meshes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from solver.scenes import Scene
+from studies.errors import StudyError
+from studies.scenes.description import Description
+from studies.scenes.meshfile import MeshFile
+from studies.scenes.scene import FileScene, file_scene
+from studies.storage.appearing import appearing
+
+_FILE = "scene.json"
+
+
+def keep(directory: Path, scene: Scene) -> None:
+    """Keep the content of a scene, if it comes from a file."""
+    if not isinstance(scene, FileScene):
+        return
+    folder = directory / "scenes" / scene.id
+    if (folder / _FILE).is_file():
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    meshes = scene.description.meshes or {}
+    written = {name: mesh.data for name, mesh in meshes.items()}
+    content = {"file": scene.description.file, "content": scene.description.content}
+    written |= {_FILE: (json.dumps(content, indent=2) + "\n").encode()}  # last: then all is there
+    for name, data in written.items():
+        with appearing(folder / name) as part:
+            part.write_bytes(data)
+
+
+def kept(directory: Path, scene_id: str) -> FileScene | None:
+    """Return the scene of this id, None where it is not kept.
+
+    Raises
+    ------
+    StudyError
+        when what is kept is not what its id says
+    """
+    folder = directory / "scenes" / scene_id
+    path = folder / _FILE
+    if len(Path(scene_id).parts) != 1 or not path.is_file():
+        return None
+    try:
+        told = json.loads(path.read_bytes())
+        meshes = {
+            each.name: MeshFile(each.name, each.read_bytes())
+            for each in folder.iterdir()
+            if each.name != _FILE and not each.name.endswith(".part")
+        }
+        scene = file_scene(Description(told["file"], told["content"], meshes))
+    except (OSError, ValueError, KeyError) as error:
+        raise StudyError("scene", scene_id, f"cannot be read from {path}: {error}") from None
+    if scene.id != scene_id:
+        raise StudyError("scene", scene_id, f"is not what {path} holds: its content has changed")
+    return scene
+
+
+def kept_ids(directory: Path) -> list[str]:
+    """Return the ids of the scenes that are kept, the newest first."""
+    files = list((directory / "scenes").glob(f"*/{_FILE}"))
+    return [each.parent.name for each in sorted(files, key=lambda f: -f.stat().st_mtime_ns)]

@@ -1,0 +1,113 @@
+"""Expressions of scene files: arithmetic and nothing else."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from studies.scenes.arithmetic import LONGEST, ExpressionError, evaluated, is_expression, names
+
+VALUES = {"a": 3.0, "n": 4, "rule": "mixed", "on": True}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2*$a", 6.0),
+        ("$a", 3.0),
+        ("$n", 4),
+        ("$rule", "mixed"),
+        ("$on", True),
+        ("-$a^2", -9.0),
+        ("2^3^2*$a/$a", 512.0),
+        ("($a + 1) * ($n - 2) / 4", 2.0),
+        ("1e-3*$a", 3e-3),
+        (".5*$a", 1.5),
+        ("--$a", 3.0),
+        ("$a - -$a", 6.0),
+        ("sqrt($a^2 + $n^2)", 5.0),
+        ("max($a, min($n, 2))", 3.0),
+        ("sin(pi/2)*$a", 3.0),
+        ("atan($a/$a)", math.pi / 4),
+        ("2/2/2*$n", 2.0),
+        ("10-4-3+$a", 6.0),
+    ],
+)
+def test_an_expression_has_the_value_of_arithmetic(text: str, value: object) -> None:
+    found = evaluated(text, VALUES)
+    assert found == pytest.approx(value) if isinstance(value, float) else found == value
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("2*$b", r"\$b is no parameter; the scene has \$a, \$n, \$rule, \$on"),
+        ("$a +", "ends too early"),
+        ("($a", "ends too early"),
+        ("$a)", r"from '\)' on"),
+        ("2 $a", "from 'a' on"),
+        ("$a ** 2", r"from '\*' on"),
+        ("$rule * 2", "only numbers"),
+        ("$on + 1", "only numbers"),
+        ("$a / 0", "no value"),
+        ("$a / ($a - 3)", "no value"),
+        ("sqrt(-$a)", "no value"),
+        ("log($a - 3)", "no value"),
+        ("$a^1000", "no value"),
+        ("1e308*10*$a", "finite"),
+        ("foo($a)", "foo is unknown"),
+        ("b*$a", r"write \$b for a parameter"),
+        ("sqrt($a, 2)", "takes 1 number"),
+        ("max($a)", "takes 2 number"),
+        ("__import__('os')+$a", "unknown|cannot be read"),
+        ("$a.real", "cannot be read"),
+        ("$a[0]", "cannot be read"),
+        ("(" * 30 + "$a" + ")" * 30, "parentheses"),
+        ("$a" + "+1" * LONGEST, "characters long"),
+        ("9^9^9^9*$a", "no value"),
+    ],
+)
+def test_what_is_no_arithmetic_is_refused_with_its_reason(text: str, reason: str) -> None:
+    with pytest.raises(ExpressionError, match=reason):
+        evaluated(text, VALUES)
+
+
+def test_names_are_those_after_a_dollar() -> None:
+    assert names("2*$a + $long_name3/sqrt($a)") == {"a", "long_name3"}
+    assert is_expression("$a") and not is_expression("a") and not is_expression(3)
+
+
+def test_text_of_any_kind_has_a_value_or_a_reason() -> None:
+    """A thousand texts of the characters of the grammar: none ends in another way."""
+    rng = random.Random(3)
+    kinds = [
+        "$a",
+        "$n",
+        "2",
+        "1.5e3",
+        "+",
+        "-",
+        "*",
+        "/",
+        "^",
+        "(",
+        ")",
+        ",",
+        "sqrt",
+        "max",
+        "pi",
+        " ",
+    ]
+    ended = {True: 0, False: 0}
+    for _ in range(1000):
+        text = "".join(rng.choices(kinds, k=rng.randint(1, 12)))
+        try:
+            value = evaluated(text, VALUES)
+        except ExpressionError:
+            ended[False] += 1
+        else:
+            assert isinstance(value, int | float) and math.isfinite(value)
+            ended[True] += 1
+    assert min(ended.values()) > 20

@@ -1,0 +1,110 @@
+"""Meshes from files: parts, boundaries, curved sides, and files that are none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from solver.errors import ModelError
+from solver.mesh.check import check_mesh
+from solver.mesh.elements import element_type
+from studies.scenes.meshfile import OUTLINE, MeshFile
+
+PIN = Path(__file__).parents[3] / "data/scenes/pin.msh"
+SQUARE = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], dtype=float)
+
+
+def written(tmp_path: Path, mesh: meshio.Mesh, name: str = "mesh.vtu") -> MeshFile:
+    path = tmp_path / name
+    mesh.write(path)
+    return MeshFile(name, path.read_bytes())
+
+
+def test_parts_of_a_gmsh_file_have_their_boundaries() -> None:
+    file = MeshFile("pin.msh", PIN.read_bytes())
+    pin, plate = file.mesh("pin"), file.mesh("plate")
+    assert {"rim", "bore", "middle", OUTLINE} == set(pin.boundaries)
+    assert {"hole", "outside", "middle", OUTLINE} == set(plate.boundaries)
+    for name, mesh in (("pin", pin), ("plate", plate)):
+        check_mesh(mesh, name, element_type("tri6"))
+    rim = np.unique(pin.dofs.facet_dofs[0, np.asarray(pin.boundaries["rim"])])
+    assert np.hypot(*pin.doflocs[:, rim]) == pytest.approx(10.0), "middles of sides are on the arc"
+    ends = np.unique(plate.facets[:, np.asarray(plate.boundaries["hole"])])
+    assert np.hypot(*plate.p[:, ends]) == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("kind", ["quad", "quad8", "quad9", "triangle", "triangle6"])
+def test_all_kinds_of_cells_are_read(tmp_path: Path, kind: str) -> None:
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    corners = quads if "quad" in kind else np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    n = corners.shape[1]
+    points, cells = list(SQUARE), []
+    for cell in corners:
+        nodes = list(cell)
+        if kind[-1] in "689":
+            middles = [
+                (SQUARE[a] + SQUARE[b]) / 2 for a, b in zip(cell, np.roll(cell, -1), strict=True)
+            ]
+            middles += [SQUARE[cell].mean(axis=0)] if kind == "quad9" else []
+            nodes += range(len(points), len(points) + len(middles))
+            points += middles
+        cells.append(nodes)
+    mesh = meshio.Mesh(np.pad(points, ((0, 0), (0, 1))), [(kind, np.array(cells))])
+    found = written(tmp_path, mesh).mesh(None)
+    usual = "quad8" if n == 4 else "tri6"
+    check_mesh(found, "square", element_type(usual))
+    assert found.nelements == len(corners)
+    assert len(found.boundaries[OUTLINE]) == 6
+
+
+def test_curved_sides_of_quad8_stay_curved(tmp_path: Path) -> None:
+    angle = np.radians([0, 90, 90, 0, 45, 90, 45, 0])
+    radius = np.array([1, 1, 2, 2, 1, 1.5, 2, 1.5])
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], axis=1)
+    order = np.array([[0, 3, 2, 1, 7, 6, 5, 4]])
+    found = written(tmp_path, meshio.Mesh(points, [("quad8", order)])).mesh(None)
+    radii = np.sort(np.hypot(*found.doflocs))
+    assert radii[[0, 1, 2]] == pytest.approx(1.0)
+    assert radii[[-1, -2, -3]] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "cells", "words"),
+    [
+        (SQUARE, [("line", [[0, 1]])], "must have cells"),
+        (SQUARE, [("triangle", [[0, 1, 4]]), ("quad", [[1, 2, 5, 4]])], "of one kind"),
+        (None, [("quad", [[0, 1, 4, 3]])], "lie in a plane"),
+    ],
+)
+def test_what_is_no_plane_mesh_is_refused(
+    tmp_path: Path, points: np.ndarray | None, cells: list[tuple[str, list[list[int]]]], words: str
+) -> None:
+    flat = np.pad(SQUARE, ((0, 0), (0, 1)))
+    at = flat + (np.arange(6)[:, None] * [0, 0, 1] if points is None else 0)
+    mesh = meshio.Mesh(at, [(kind, np.array(each)) for kind, each in cells])
+    with pytest.raises(ModelError, match=words):
+        written(tmp_path, mesh).mesh(None)
+
+
+@pytest.mark.parametrize(
+    "name", ["mesh.msh", "mesh.vtu", "mesh.vtk", "mesh.inp", "mesh.what", "mesh"]
+)
+@pytest.mark.parametrize("data", [b"", b"nothing", bytes(range(256)) * 20])
+def test_a_file_that_is_no_mesh_is_refused(name: str, data: bytes) -> None:
+    with pytest.raises(ModelError, match=name):
+        MeshFile(name, data).mesh(None)
+
+
+def test_a_damaged_gmsh_file_is_refused() -> None:
+    data = PIN.read_bytes()
+    for cut in (100, 5000, len(data) // 2):
+        with pytest.raises(ModelError, match=r"pin\.msh"):
+            MeshFile("pin.msh", data[:cut]).mesh("pin")
+
+
+def test_an_unknown_part_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ModelError, match="pin, plate"):
+        MeshFile("pin.msh", PIN.read_bytes()).mesh("lug")

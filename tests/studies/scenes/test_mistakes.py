@@ -1,0 +1,243 @@
+"""What is wrong with a scene file is told, all of it at once, each by its entry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from studies.errors import SceneError
+from tests.studies.scenes.conftest import blocks, built
+
+Tables = dict[str, Any]
+
+
+def put(*path: Any) -> Callable[[Tables], None]:
+    """Return what writes the last of ``path`` at the place that the others lead to."""
+
+    def change(tables: Tables) -> None:
+        at: Any = tables
+        for key in path[:-2]:
+            at = at[key]
+        at[path[-2]] = path[-1]
+
+    return change
+
+
+def rigid(**changes: Any) -> Callable[[Tables], None]:
+    body = {"surfaces": {"face": {"kind": "line", "points": [[-1, 2.5], [5, 2.5]]}}} | changes
+    return put("rigid", {"plate": body})
+
+
+def without(*path: Any) -> Callable[[Tables], None]:
+    def change(tables: Tables) -> None:
+        at: Any = tables
+        for key in path[:-1]:
+            at = at[key]
+        del at[path[-1]]
+
+    return change
+
+
+SHAPE = ("bodies", "upper", "shape")
+MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
+    "text for a number": (
+        put("contacts", 0, "friction", "high"),
+        "contacts[0].friction",
+        "must be a number",
+    ),
+    "number out of range": (
+        put("contacts", 0, "friction", -1.0),
+        "contacts[0].friction",
+        "at least 0",
+    ),
+    "infinite number": (put("loads", 0, "value", float("inf")), "loads[0].value", "finite"),
+    "unknown entry": (
+        put("contacts", 0, "frictoin", 0.1),
+        "contacts[0].frictoin",
+        "did you mean friction?",
+    ),
+    "unknown table": (put("body", {}), "body", "did you mean bodies?"),
+    "missing entry": (without("loads", 0, "boundary"), "loads[0].boundary", "must be given"),
+    "unknown kind": (put("loads", 0, "kind", "push"), "loads[0]", "'pressure', 'traction'"),
+    "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
+    "unknown parameter": (
+        put("contacts", 0, "friction", "$nu"),
+        "contacts[0].friction",
+        "$nu is no parameter",
+    ),
+    "no arithmetic": (put("loads", 0, "value", "2*($wide"), "loads[0].value", "ends too early"),
+    "without effect": (put("contacts", 0, "friction", 0.1), "parameters.mu", "has no effect"),
+    "default out of range": (
+        put("parameters", "mu", "default", 2.0),
+        "parameters.mu.default",
+        "in its range, 0 to 1",
+    ),
+    "default not a choice": (
+        put("parameters", "rule", "default", "kinematic"),
+        "parameters.rule.default",
+        "one of its choices",
+    ),
+    "name taken": (
+        put("outputs", {"plastic_work": {"of": "mises", "stage": "pressed", "body": "lower"}}),
+        "outputs.plastic_work",
+        "choose another",
+    ),
+    "unknown material": (
+        put("bodies", "upper", "material", "brass"),
+        "bodies.upper.material",
+        "one of steel",
+    ),
+    "unknown body": (put("loads", 0, "body", "top"), "loads[0].body", "one of upper, lower"),
+    "unknown body of a surface": (
+        put("contacts", 0, "slave", "top.bottom"),
+        "contacts[0].slave",
+        "one of upper, lower",
+    ),
+    "unknown stage": (
+        put("outputs", "least", "stage", "loaded"),
+        "outputs.least.stage",
+        "one of pressed",
+    ),
+    "unknown stage of an amplitude": (
+        put("loads", 0, "amplitude", {"later": 1.0}),
+        "loads[0].amplitude",
+        "one of pressed",
+    ),
+    "output nowhere": (
+        without("outputs", "least", "body"),
+        "outputs.least",
+        "needs one of body, line",
+    ),
+    "shape and mesh": (
+        put("bodies", "upper", "mesh", "a.msh"),
+        "bodies.upper.shape",
+        "one of the two",
+    ),
+    "mesh not there": (
+        lambda t: (
+            t["bodies"]["upper"].update(mesh="a.msh", shape=None)
+            or t["bodies"]["upper"].pop("shape")
+        ),
+        "bodies.upper.mesh",
+        "did not come",
+    ),
+    "mesh elsewhere": (
+        put("bodies", "upper", "mesh", "../a.msh"),
+        "bodies.upper.mesh",
+        "must match",
+    ),
+    "stages and loading": (
+        put("loading", {"factor": 1.0, "step": 0.1}),
+        "stages",
+        "one of the two",
+    ),
+    "two of one name": (
+        lambda t: t["stages"].append({"name": "pressed"}),
+        "stages",
+        "two have this name",
+    ),
+    "wrong place of a line": (
+        put("look", "lines", "middle", "radius", 1.0),
+        "look.lines.middle",
+        "start and end, or",
+    ),
+    "list of a wrong length": (
+        put("look", "lines", "middle", "end", [1.0]),
+        "look.lines.middle.end[1]",
+        "must be given",
+    ),
+    "unknown boundary": (
+        put("loads", 0, "boundary", "up"),
+        "bodies.upper.pressure",
+        "bottom, left, right, top|left, right, bottom, top",
+    ),
+    "unknown contact boundary": (
+        put("contacts", 0, "master", "lower.up"),
+        "master",
+        "must name a boundary",
+    ),
+    "size too large": (put(*SHAPE, "size", 1e-5), "bodies.upper.shape.size", "200000"),
+    "shape inside out": (put(*SHAPE, "x", [4, 0]), "bodies.upper.shape.x", "increasing"),
+    "body left free": (
+        without("bodies", "lower", "supports"),
+        "supports",
+        "body 'upper' can move freely|body 'lower' can move freely",
+    ),
+    "bodies apart": (
+        put("bodies", "upper", "move", [0.0, 0.5]),
+        "bodies.upper",
+        "stands 0.5 mm away",
+    ),
+    "bodies overlap": (
+        put("bodies", "upper", "move", [0.0, -0.5]),
+        "contacts",
+        "overlaps 'lower' by 0.5 mm",
+    ),
+    "hardening without its curve": (
+        put("parameters", "rule", {"default": "table", "choices": ["table"]}),
+        "materials.steel.curve",
+        "must be points",
+    ),
+    "axis crossed": (
+        lambda t: t.update(kinematics="axisymmetric") or put(*SHAPE, "x", [-1, 3])(t),
+        "bodies.upper.mesh",
+        "x >= 0",
+    ),
+    "rigid both moved and pushed": (
+        rigid(x={"moved": 1.0, "pushed": 2.0}),
+        "rigid.plate.x",
+        "not both",
+    ),
+    "rigid without surface": (rigid(surfaces={}), "rigid.plate.surfaces", "1 or more"),
+    "rigid of one name": (
+        lambda t: rigid()(t) or t["rigid"].update(upper=t["rigid"].pop("plate")),
+        "rigid",
+        "two have this name",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", MISTAKES)
+def test_a_mistake_is_told_by_its_entry(kind: str) -> None:
+    change, field, allowed = MISTAKES[kind]
+    tables = blocks()
+    change(tables)
+    with pytest.raises(SceneError) as caught:
+        built(tables)
+    found = {each.field: each.allowed for each in caught.value.mistakes}
+    assert field in found, caught.value
+    assert any(words in found[field] for words in allowed.split("|")), found[field]
+    assert "blocks.toml" in str(caught.value)
+
+
+def test_all_mistakes_are_told_at_once() -> None:
+    tables = blocks()
+    for kind in ("text for a number", "unknown entry", "no arithmetic", "unknown word"):
+        MISTAKES[kind][0](tables)
+    with pytest.raises(SceneError, match="5 mistakes") as caught:
+        built(tables)
+    fields = {each.field for each in caught.value.mistakes}
+    assert fields == {
+        "parameters.mu",
+        "contacts[0].friction",
+        "contacts[0].frictoin",
+        "loads[0].value",
+        "kinematics",
+    }
+
+
+def test_all_mistakes_of_bodies_are_told_at_once() -> None:
+    tables = blocks()
+    for kind in ("unknown boundary", "hardening without its curve"):
+        MISTAKES[kind][0](tables)
+    tables["bodies"]["lower"]["shape"]["x"] = [4, 0]
+    with pytest.raises(SceneError, match="mistakes") as caught:
+        built(tables)
+    fields = {each.field for each in caught.value.mistakes}
+    assert {"bodies.lower.shape.x", "materials.steel.curve"} <= fields
+
+
+def test_the_scene_itself_has_no_mistake() -> None:
+    assert built(blocks()).name == "blocks"

@@ -1,0 +1,272 @@
+"""Scene files as scenes: swept, stored, read back, the same on every way."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import studies.scenes.registry as registry
+from solver import SCENES, ModelError, Record, Status
+from solver.scenes.punch import PUNCH, PunchParameters
+from studies import Store, Study, StudyError, open_study, run_study, scene_schema
+from studies.errors import SceneError
+from studies.scenes.description import Description
+from studies.scenes.registry import scene_named, scene_of
+from studies.scenes.scene import FileScene, file_scene, read_scene
+from tests.studies.scenes.conftest import BLOCKS, blocks, built
+
+ROOT = Path(__file__).parents[3]
+FILES = sorted((ROOT / "data/scenes").glob("*.toml"))
+
+
+def run(scene: FileScene, **values: Any) -> Record:
+    """Return the record of a run."""
+    parameters = scene.parameters(**values)
+    (record,) = scene.path(parameters, [values.get(scene.branch)], lambda share: None)
+    return record
+
+
+def test_a_block_under_pressure_has_the_stress_of_the_pressure(scene: FileScene) -> None:
+    record = run(scene, mu=0.0)
+    assert record.status is Status.OK, record.message
+    dims, stress = record.fields["line_stress"]
+    assert dims == ("line", "stage", "component", "fraction")
+    # free to grow sideways but at the bottom: in the middle of the upper block all is uniaxial
+    assert record.scalars["least"] < -150.0
+    _, pressure = record.fields["pair_pressure"]
+    assert pressure[0, 0].mean() == pytest.approx(150.0, rel=0.01)
+    _, force = record.fields["contact_normal_force"]
+    assert force[0] == pytest.approx([0.0, 300.0, 600.0], abs=1e-6)
+    _, reaction = record.fields["reaction_y"]
+    assert reaction[1] == pytest.approx([0.0, 300.0, 600.0], abs=1e-6)
+    assert record.fields["moment_time"][1] == pytest.approx([0.0, 0.5, 1.0])
+    assert stress.shape == (1, 1, 4, 11)
+
+
+def test_parameters_check_themselves(scene: FileScene) -> None:
+    with pytest.raises(ModelError, match="mu = -1"):
+        scene.parameters(mu=-1.0)
+    with pytest.raises(ModelError, match="rule"):
+        scene.parameters(rule="soft")
+    tables = blocks()
+    tables["contacts"][0]["friction"] = "$mu - 0.1"
+    with pytest.raises(ModelError, match=r"contacts\[0\]\.friction = -0\.1"):
+        built(tables).parameters(mu=0.0)
+
+
+def test_the_schema_tells_range_unit_and_meaning(scene: FileScene) -> None:
+    known = scene_schema(scene)["properties"]
+    assert known["wide"]["unit"] == "mm"
+    assert (known["mu"]["minimum"], known["mu"]["maximum"]) == (0.0, 1.0)
+    assert known["rule"]["enum"] == ["none", "isotropic"]
+    assert known["mu"]["description"] == "friction"
+
+
+def test_a_scene_and_its_parameters_reach_other_processes(scene: FileScene) -> None:
+    parameters = scene.parameters(mu=0.3)
+    same, its = pickle.loads(pickle.dumps((scene, parameters)))
+    assert same is scene and its == parameters
+    told = {"data": pickle.dumps((scene, parameters)).hex()}
+    code = (
+        "import json, pickle, sys; told = json.load(sys.stdin)['data'];"
+        "scene, p = pickle.loads(bytes.fromhex(told));"
+        "print(scene.id, p.mu, isinstance(p, scene.parameters))"
+    )
+    command = [sys.executable, "-c", code]
+    answer = subprocess.run(
+        command, input=json.dumps(told), capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert answer.stdout.split() == [scene.id, "0.3", "True"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ("value = 150.0", "value = 151.0", False),
+        ('default = 0.2', "default = 0.3", False),
+        ('description = "friction"', 'description = "the friction"', True),
+        ('summary = "a block', 'summary = "one block', True),
+        ("increments = 2", "increments = 2  # few", True),
+        ("value = 150.0", "value = 1.5e2", True),
+    ],
+)  # fmt: skip
+def test_the_id_is_the_content(tmp_path: Path, old: str, new: str, same: bool) -> None:
+    assert BLOCKS.count(old) >= 1
+    paths = [tmp_path / "a.toml", tmp_path / "b.toml"]
+    for path, text in zip(paths, (BLOCKS, BLOCKS.replace(old, new, 1)), strict=True):
+        path.write_text(text)
+    first, second = (Description.read(path).digest for path in paths)
+    assert (first == second) is same
+
+
+def test_the_mesh_counts_in_the_id(tmp_path: Path) -> None:
+    pin = read_scene(ROOT / "data/scenes/pin.toml")
+    (tmp_path / "pin.toml").write_bytes((ROOT / "data/scenes/pin.toml").read_bytes())
+    mesh = (ROOT / "data/scenes/pin.msh").read_bytes()
+    (tmp_path / "pin.msh").write_bytes(mesh)
+    assert Description.read(tmp_path / "pin.toml").digest == pin.id
+    (tmp_path / "pin.msh").write_bytes(mesh + b"\n")
+    assert Description.read(tmp_path / "pin.toml").digest != pin.id
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Study, Store, xr.Dataset]]:
+    """Sweep the blocks from a study file."""
+    folder = tmp_path_factory.mktemp("blocks")
+    (folder / "blocks.toml").write_text(BLOCKS)
+    (folder / "study.toml").write_text(
+        'name = "blocks"\nscene = "blocks.toml"\n'
+        "[sweep]\nmu = [0.0, 0.5]\nwide = {start = 2.0, stop = 4.0, num = 2}\n"
+    )
+    study, store = Study.from_toml(folder / "study.toml"), Store(folder / "out")
+    assert run_study(study, store, workers=2).ok
+    with open_study(folder / "out") as dataset:
+        yield study, store, dataset
+
+
+def test_a_study_sweeps_a_file(swept: tuple[Study, Store, xr.Dataset]) -> None:
+    study, _, dataset = swept
+    assert dict(dataset.sizes) | {"mu": 2, "wide": 2, "fraction": 11} == dict(dataset.sizes)
+    assert dataset["wide"].attrs["units"] == "mm"
+    # lengths differ, and the index is one: a fraction of the line
+    assert dataset["line_x"].sel(mu=0.0, wide=2.0, fraction=0.5).item() == pytest.approx(1.0)
+    assert dataset["line_x"].sel(mu=0.0, wide=4.0, fraction=0.5).item() == pytest.approx(2.0)
+    assert (dataset["least"] < -150.0).all()
+    assert dataset["least"].attrs["units"] == "MPa"
+    assert "minimum of stress.yy in lower" in dataset["least"].attrs["long_name"]
+    assert dataset["least_x"].attrs["units"] == "mm"
+    assert study.scene == study.problem.id and study.problem.name == "blocks"
+
+
+def test_a_data_set_knows_its_scene_without_the_file(
+    swept: tuple[Study, Store, xr.Dataset],
+) -> None:
+    study, _, dataset = swept
+    assert dataset.attrs["scene"] == "blocks"
+    assert dataset.attrs["scene_id"] == study.scene
+    known = scene_of(dataset.attrs)
+    assert known.parameters().mu == 0.2
+    assert scene_schema(known)["properties"]["wide"]["unit"] == "mm"
+
+
+def test_a_store_keeps_the_scene_and_gives_it_by_its_id(
+    swept: tuple[Study, Store, xr.Dataset],
+) -> None:
+    study, store, _ = swept
+    again = Study.known(study.to_dict(), store.scene)
+    assert again.id == study.id
+    assert list(again.run_ids()) == list(study.run_ids())
+    with pytest.raises(StudyError, match="must be one of"):
+        Study.known(study.to_dict())
+
+
+def test_a_scene_that_was_changed_in_the_store_is_refused(
+    swept: tuple[Study, Store, xr.Dataset], tmp_path: Path
+) -> None:
+    study, _, _ = swept
+    store = Store(tmp_path)
+    store.save_scene(study.problem)
+    path = tmp_path / "scenes" / study.scene / "scene.json"
+    path.write_text(path.read_text().replace("150.0", "15.0"))
+    with pytest.raises(StudyError, match="its content has changed"):
+        store.scene(study.scene)
+    path.write_text("{")
+    with pytest.raises(StudyError, match="cannot be read"):
+        store.scene(study.scene)
+    assert store.scene("0" * 32) is None
+    assert store.scene("../" + study.scene) is None
+
+
+def test_python_takes_a_scene_of_its_own(tmp_path: Path) -> None:
+    scene = built(blocks())
+    outcome = run_study({"name": "one", "sweep": {"mu": [0.1]}}, Store(tmp_path), scene=scene)
+    assert outcome.ok
+    named = Study.from_dict({"name": "p", "parameters": {"accuracy": "draft"}}, scene=PUNCH)
+    assert isinstance(next(named.cases()).parameters, PunchParameters)
+
+
+def test_the_same_study_has_the_same_ids_on_every_way(tmp_path: Path) -> None:
+    (tmp_path / "blocks.toml").write_text(BLOCKS)
+    (tmp_path / "study.toml").write_text('name="s"\nscene="blocks.toml"\n[sweep]\nmu=[0.1]\n')
+    from_file = Study.from_toml(tmp_path / "study.toml")
+    scene = file_scene(Description("other.toml", json.loads(json.dumps(blocks())), {}))
+    in_python = Study.from_dict({"name": "s", "sweep": {"mu": [0.1]}}, scene=scene)
+    assert from_file.id == in_python.id
+    assert list(from_file.run_ids()) == list(in_python.run_ids())
+
+
+def test_a_study_names_a_file_beside_it_and_nothing_else(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="must be one of"):
+        Study.from_dict({"name": "s", "scene": str(ROOT / "data/scenes/pin.toml")})
+    (tmp_path / "study.toml").write_text('name = "s"\nscene = "lost.toml"\n')
+    with pytest.raises(StudyError, match=r"lost\.toml.*cannot be read"):
+        Study.from_toml(tmp_path / "study.toml")
+
+
+def test_no_scene_of_a_file_takes_a_name_that_is_built_in() -> None:
+    tables = blocks() | {"name": "punch"}
+    with pytest.raises(SceneError, match="a built-in scene"):
+        built(tables)
+
+
+class Entry:
+    """An installed package's scene."""
+
+    def __init__(self, name: str, given: object) -> None:
+        self.name, self.value, self._given = name, f"package:{name}", given
+
+    def load(self) -> object:
+        return self._given
+
+
+def test_installed_packages_bring_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
+    entries = [
+        Entry("lug", ROOT / "data/scenes/pin.toml"),
+        Entry("own", PUNCH),
+        Entry("wrong", 3),
+    ]
+    monkeypatch.setattr(registry, "entry_points", lambda group: entries)
+    assert registry.known_names() == [*SCENES, "lug", "own", "wrong"]
+    lug = scene_named("lug")
+    assert isinstance(lug, FileScene) and lug.name == "pin"
+    assert scene_named("own") is PUNCH
+    with pytest.raises(StudyError, match=r"must be a Scene or the path .* package:wrong"):
+        scene_named("wrong")
+
+
+def test_shared_loading_needs_a_factor_that_stands_alone() -> None:
+    tables = blocks()
+    del tables["stages"]
+    tables["parameters"]["load_ratio"] = {"default": 0.5, "range": [0.1, 2.0]}
+    tables["loading"] = {"factor": "$load_ratio", "step": 0.25}
+    tables["outputs"]["least"]["stage"] = "loaded"
+    shared = built(tables)
+    assert shared.branch == "load_ratio"
+    both = list(shared.path(shared.parameters(), [0.5, 1.0], lambda share: None))
+    alone = [run(shared, load_ratio=load) for load in (0.5, 1.0)]
+    for one, other in zip(both, alone, strict=True):
+        assert one.parameters == other.parameters
+        np.testing.assert_array_equal(one.fields["line_stress"][1], other.fields["line_stress"][1])
+    tables["loads"][0]["value"] = "100*$load_ratio"
+    assert built(tables).branch == ""
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_scene_file_of_the_data_has_no_mistake(path: Path) -> None:
+    scene = read_scene(path)
+    assert scene.name == path.stem
+    assert scene.summary
+    assert all(each.description for each in scene.description.parameters.values())
+
+
+def test_the_files_of_the_data_are_there() -> None:
+    assert {"pin", "fretting"} <= {path.stem for path in FILES}

@@ -1,0 +1,74 @@
+"""The punch and the ball as scene files have the numbers of the built-in scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver import SCENES, Record, Status
+from solver.mesh.ball import cap_area
+from solver.scenes.ball import BallParameters
+from studies.scenes.scene import read_scene
+
+HERE = Path(__file__).parent
+
+
+def one(scene_file: str, **values: object) -> Record:
+    scene = read_scene(HERE / scene_file)
+    parameters = scene.parameters(**values)
+    (record,) = scene.path(parameters, [values.get(scene.branch)], lambda share: None)
+    assert record.status is Status.OK, record.message
+    return record
+
+
+def twin(name: str, load: float, **values: object) -> Record:
+    scene = SCENES[name]
+    parameters = scene.parameters(**values)
+    (record,) = scene.path(parameters, [load], lambda share: None)
+    assert record.status is Status.OK, record.message
+    return record
+
+
+def distance(found: Record, wanted: Record, name: str) -> float:
+    """Return the mean difference of two maps / mean of the second."""
+    a, b = found.fields[name][1], wanted.fields[name][1]
+    assert (np.isnan(a) == np.isnan(b)).all(), name
+    return float(np.nanmean(np.abs(a - b)) / np.nanmean(np.abs(b)))
+
+
+@pytest.mark.parametrize("rule", ["isotropic", "kinematic"])
+def test_the_punch_as_a_file_is_as_far_from_a_finer_one_as_the_built_in_scene(rule: str) -> None:
+    values = {"load_ratio": 0.5714, "friction": 0.3, "hardening": rule}
+    own = one("punch.toml", **values)
+    known, finer = (
+        twin("punch", 0.5714, state="plane_stress", accuracy=accuracy, **values)
+        for accuracy in ("draft", "standard")
+    )
+    for name in ("residual_mises", "plastic_strain", "mises_loaded"):
+        mesh_error = distance(known, finer, name)
+        assert distance(own, finer, name) < 1.2 * mesh_error, name
+        assert distance(own, known, name) < mesh_error, name
+    s, surface = known.coordinates["s"], known.fields["surface_residual"][1][1, 0]
+    at = np.array([25.0, 40.0, 48.0])  # away from the corner, where stress is singular
+    lines = own.fields["line_stress"][1][0, 1, 0], own.fields["line_x"][1][0]
+    found, wanted = np.interp(at, lines[1], lines[0]), np.interp(at, s, surface)
+    assert found == pytest.approx(wanted, abs=0.02 * np.abs(surface[np.isfinite(surface)]).max())
+    peak = known.scalars["peak_contact_pressure"]
+    middle = np.interp(25.0, own.fields["pair_x"][1][0], own.fields["pair_pressure"][1][0, 0])
+    same = np.interp(25.0, s, known.fields["contact_pressure"][1][0])
+    assert middle == pytest.approx(same, abs=0.002 * peak)
+
+
+def test_the_ball_as_a_file() -> None:
+    known = twin("ball", 1, load_ratio=4.0, hardening="isotropic", accuracy="draft")
+    p = known.parameters
+    assert isinstance(p, BallParameters)
+    own = one("ball.toml", traction=-p.force / cap_area(p.radius), a=p.expected_radius)
+    for mine, its in (("strain", "max_plastic_strain"), ("peak", "peak_contact_pressure")):
+        assert own.scalars[mine] == pytest.approx(known.scalars[its], rel=0.01), mine
+    radius, side = known.scalars["contact_half_width"], p.element_size * p.expected_radius
+    assert radius <= own.scalars["touching"] <= radius + side, "one tells the last that touches"
+    force = own.fields["contact_normal_force"][1][0]
+    assert force.max() == pytest.approx(p.force, rel=1e-3)
