@@ -24,7 +24,7 @@ NEEDED = [
         # A browser sends no key with the address of a page; these tell what is no secret.
         (r"(GET|HEAD|OPTIONS) /(health|docs(/.*)?|openapi\.json)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
-        (r"POST /(studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
+        (r"POST /(scenes|studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
         (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),
         (r".*", Scope.ADMIN),
     )
@@ -32,6 +32,7 @@ NEEDED = [
 """The scope that a request needs: the first that fits, so that what is new is for admin."""
 
 HOST = re.compile(r"(?:\[([\da-f:.]+)\]|([^\s:/@\[\]]+))(?::\d*)?", re.IGNORECASE)
+FORM = re.compile(r"multipart/form-data\s*;.*", re.IGNORECASE)
 JSON = re.compile(r"application/(?:[\w.-]+\+)?json\s*(?:;.*)?", re.IGNORECASE)
 
 
@@ -130,11 +131,20 @@ def check_page(request: Request) -> None:
 
 
 def check_content(request: Request) -> None:
-    """Refuse a body that does not say that it is JSON."""
+    """Refuse a body that does not say that it is JSON; of a scene, that it is a form of files."""
     headers = request.headers
+    path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
+    if path.rstrip("/") == "/scenes":
+        wanted, form = FORM, "multipart/form-data"
+    else:
+        wanted, form = JSON, "application/json"
     body = "transfer-encoding" in headers or headers.get("content-length", "0") != "0"
-    if body and request.method not in SAFE and not JSON.fullmatch(headers.get("content-type", "")):
+    if (
+        body
+        and request.method not in SAFE
+        and not wanted.fullmatch(headers.get("content-type", ""))
+    ):
         raise HTTPException(
             HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
-            "the body must be sent with the header content-type: application/json",
+            f"the body must be sent with the header content-type: {form}",
         )

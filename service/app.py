@@ -22,6 +22,7 @@ from service.connections import limited
 from service.errors import QueueLost
 from service.examiner import Examiner
 from service.headers import SecurityHeaders
+from service.inspector import Inspector
 from service.keys import Keys, KeysError
 from service.limits import body_limit
 from service.lock import DirectoryInUse, lock_directory
@@ -101,13 +102,15 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.jobs = jobs
     app.state.runner = runner
     app.state.examiner = examiner
+    app.state.inspector = Inspector()
     app.state.details = Details(jobs, store)
     app.state.keeper = keeper
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
     app.state.probe = Probe()
     # Each is outside of those before it: what the others refuse is measured and logged too.
-    app.add_middleware(body_limit, limit=settings.max_body_bytes)
+    longest = {"/scenes": settings.max_scene_bytes}
+    app.add_middleware(body_limit, limit=settings.max_body_bytes, longest=longest)
     app.add_middleware(Gate, settings=settings, keys=keys)
     app.add_middleware(head_is_get)
     app.add_middleware(SecurityHeaders)

@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 
 from service.errors import NotFound
 from service.examiner import Examiner
+from service.inspector import Inspector
 from service.job import Job
 from service.jobs import Jobs
 from service.keys import Scope
@@ -38,6 +39,7 @@ def held(name: str) -> Any:
 
 TheDetails = Annotated[Details, held("details")]
 TheExaminer = Annotated[Examiner, held("examiner")]
+TheInspector = Annotated[Inspector, held("inspector")]
 TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
 TheMetrics = Annotated[Metrics, held("metrics")]

@@ -18,7 +18,14 @@ from service.headers import HEADERS
 from service.logs import REQUEST
 from service.methods import offered
 from studies import StudyError
-from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, StoreFull, Unusable
+from studies.errors import (
+    CatalogueDamaged,
+    RunUnreadable,
+    SceneError,
+    StoreBusy,
+    StoreFull,
+    Unusable,
+)
 
 log = logging.getLogger(__name__)
 
@@ -156,6 +163,16 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     return errors
 
 
+def on_scene_error(request: Request, exc: SceneError) -> Problem:
+    """Answer a scene file with all its mistakes."""
+    errors = [
+        {"field": shown(each.field), "value": shown(each.value), "allowed": each.allowed}
+        for each in exc.mistakes
+    ]
+    detail = "; ".join(f"{each['field']}: {each['allowed']}" for each in errors)
+    return problem(request, status_of(exc), detail, errors)
+
+
 def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field."""
     error = {"field": shown(exc.field), "value": shown(exc.value), "allowed": exc.allowed}
@@ -205,7 +222,9 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
         if request.method == "OPTIONS":
             return Response(status_code=HTTPStatus.NO_CONTENT, headers=headers)
     if status is HTTPStatus.BAD_REQUEST:  # a body that Python's JSON reader gave up
-        allowed = f"JSON that can be read ({exc.__cause__ or exc.detail})"
+        form = request.headers.get("content-type", "").lower().startswith("multipart")
+        kind = "a form of files" if form else "JSON"
+        allowed = f"{kind} that can be read ({exc.__cause__ or exc.detail})"
         detail, errors = f"body: {allowed}", [{"field": "body", "value": None, "allowed": allowed}]
     return problem(request, status, detail, errors, headers)
 
@@ -220,6 +239,7 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     StudyError: on_field_error,
+    SceneError: on_scene_error,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
         (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged, RunUnreadable),

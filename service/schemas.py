@@ -126,7 +126,18 @@ class SceneSummary(BaseModel):
 
     name: str
     summary: str
-    branch: str = Field(description="the parameter along which one loading path serves many runs")
+    branch: str = Field(
+        description="the parameter along which one loading path serves many runs; empty: none"
+    )
+    id: str | None = Field(default=None, description="of a posted scene: a study names it so")
+
+
+class KeptScene(BaseModel):
+    """A scene file that was accepted."""
+
+    id: str = Field(description="content id: a study names the scene so")
+    name: str
+    summary: str
 
 
 class Health(BaseModel):

@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from service.schemas import RunFilter, Window
-from solver.scenes import SCENES
+from solver.scenes import SCENES, Scene
 from studies import StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
 from studies.scenes.registry import one_of, scene_named
+from studies.storage.shelf import newest
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""
+
+KEPT = 100
+"""Scenes of callers whose parameters may be asked for, the newest."""
 
 PLAIN = ("scene", "status", *Window.model_fields)
 """What may be asked for beside the parameters of the scenes."""
 
 
-def conditions(which: RunFilter) -> dict[str, Any]:
+def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     """Return the arguments of `Catalogue.runs` for a query.
+
+    Parameters
+    ----------
+    which : the query
+    directory : of the store, which may keep scenes of callers
 
     Raises
     ------
@@ -29,7 +39,11 @@ def conditions(which: RunFilter) -> dict[str, Any]:
     """
     if which.status not in (None, *OUTCOMES):
         raise StudyError("status", which.status, one_of(which.status, OUTCOMES))
-    scenes = list(SCENES.values()) if which.scene is None else [scene_named(which.scene)]
+    posted = newest(directory, KEPT)
+    scenes: list[Scene] = [*SCENES.values(), *posted]
+    if which.scene is not None:
+        own = [scene for scene in posted if scene.name == which.scene]
+        scenes = [*own] or [scene_named(which.scene)]
     known: dict[str, list[Parameter]] = {}
     for scene in scenes:
         for name, parameter in parameters_of(scene).items():

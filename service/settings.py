@@ -61,6 +61,9 @@ class Settings(BaseSettings):
         default=None, ge=1, description="worker processes when there is no scheduler"
     )
     max_body_bytes: int = Field(default=1_000_000, ge=1, description="largest request body")
+    max_scene_bytes: int = Field(
+        default=20_000_000, ge=1, description="largest scene file with its meshes"
+    )
     connections: int = Field(default=500, ge=1, description="most connections at a time")
     arrival_seconds: float = Field(
         default=20.0, gt=0, description="time in which a request, head and body, must arrive"

@@ -38,7 +38,7 @@ def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
 
     Beside the queries named below, every parameter of the scenes is one: `?traction=0.75`.
     """
-    rows, total = store.catalogue.runs(**conditions(which))
+    rows, total = store.catalogue.runs(**conditions(which, store.directory))
     return RunPage(total=total, items=[Run(**row) for row in rows])
 
 

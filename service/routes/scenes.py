@@ -1,31 +1,86 @@
-"""What can be computed, and what it takes."""
+"""What can be computed, and what it takes; scenes of the callers' own."""
 
 from __future__ import annotations
 
-from typing import Any
+import asyncio
+from http import HTTPStatus
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, File, Request, Response, UploadFile
 
-from service.errors import NotFound
-from service.schemas import SceneSummary
-from solver.scenes import SCENES
-from studies import scene_schema
+from service.dependencies import TheInspector, TheStore
+from service.errors import REFUSED, NotFound
+from service.schemas import KeptScene, SceneSummary
+from solver.scenes import Scene
+from studies import StudyError, scene_schema
+from studies.definition.identity import is_id
+from studies.scenes.registry import known_names, known_scenes, scene_named
+from studies.storage.shelf import newest
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
+LISTED = 100
+"""Scenes of callers that are listed, the newest first."""
+
 
 @router.get("")
-def list_scenes() -> list[SceneSummary]:
-    """List the scenes."""
+def list_scenes(store: TheStore) -> list[SceneSummary]:
+    """List the scenes: those of the product, of installed packages, then the latest posted ones."""
+    listed: list[tuple[str | None, Scene]] = [(None, scene) for scene in known_scenes()]
+    listed += [(scene.id, scene) for scene in newest(store.directory, LISTED)]
     return [
-        SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch)
-        for scene in SCENES.values()
+        SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch, id=scene_id)
+        for scene_id, scene in listed
     ]
 
 
+@router.post("", status_code=HTTPStatus.CREATED, responses={200: {"model": KeptScene}, **REFUSED})
+async def post_scene(
+    scene: Annotated[UploadFile, File(description="a scene file, in TOML")],
+    inspector: TheInspector,
+    store: TheStore,
+    request: Request,
+    response: Response,
+    meshes: Annotated[
+        list[UploadFile], File(default_factory=list, description="the meshes it names")
+    ],
+) -> KeptScene:
+    """Accept a scene file and its meshes; 200 when it is known already.
+
+    A study names it by its `id`.
+    """
+    files: dict[str, bytes] = {}
+    for each in meshes:
+        if not each.filename or each.filename in files:
+            raise StudyError("meshes", each.filename, "must have file names of their own")
+        files[each.filename] = await each.read()
+    found = await inspector.inspect(await scene.read(), files)
+    known = await asyncio.to_thread(_kept, store, found.id)
+    await asyncio.to_thread(store.save_scene, found)
+    if known:
+        response.status_code = HTTPStatus.OK
+    response.headers["location"] = request.url_for("get_scene", name=found.id).path
+    return KeptScene(id=found.id, name=found.name, summary=found.summary)
+
+
 @router.get("/{name}")
-def get_scene(name: str) -> dict[str, Any]:
-    """Return the JSON Schema of a scene's parameters, with units, ranges and defaults."""
-    if name not in SCENES:
-        raise NotFound(f"no scene has this name; there are {', '.join(SCENES)}")
-    return scene_schema(name)
+def get_scene(name: str, store: TheStore) -> dict[str, Any]:
+    """Return the JSON Schema of a scene's parameters, with units, ranges and defaults.
+
+    `name` is that of a scene, or the id of a posted one.
+    """
+    kept = _kept(store, name) if is_id(name) else None
+    if kept:
+        told = {"id": kept.id, "name": kept.name, "summary": kept.summary}
+        return scene_schema(kept) | told
+    if name not in known_names():
+        raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
+    return scene_schema(scene_named(name))
+
+
+def _kept(store: TheStore, scene_id: str) -> Any:
+    """Return a posted scene; None where it is not kept, or cannot be read any more."""
+    try:
+        return store.scene(scene_id)
+    except StudyError:
+        return None

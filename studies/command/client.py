@@ -39,14 +39,27 @@ class Service:
         self._client.close()
 
     def submit(self, path: Path) -> dict[str, Any]:
-        """Send a study file; the service checks it."""
+        """Send a study file, and before it the scene file it names; the service checks both."""
         try:
             content = tomllib.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise StudyError("file", str(path), f"cannot be read: {error.strerror}") from None
         except ValueError as error:
             raise StudyError("file", str(path), f"must be valid TOML: {error}") from None
+        scene = content.get("scene")
+        if isinstance(scene, str) and scene.endswith(".toml"):
+            content["scene"] = self.post_scene(path.parent / scene)["id"]
         return self._ask("POST", "/studies", json=content).json()
+
+    def post_scene(self, path: Path) -> dict[str, Any]:
+        """Send a scene file and its meshes."""
+        from studies.scenes.description import Description
+
+        known = Description.read(path)
+        files = [("scene", (path.name, path.read_bytes(), "application/toml"))]
+        for name, mesh in (known.meshes or {}).items():
+            files.append(("meshes", (name, mesh.data, "application/octet-stream")))
+        return self._ask("POST", "/scenes", files=files).json()
 
     def status(self, study_id: str) -> dict[str, Any]:
         """Return the state of a study."""

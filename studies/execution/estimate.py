@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -149,7 +150,7 @@ def estimate(study: Study, store: Store) -> Estimate:
     )
 
 
-def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[float]]]:
+def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:
     """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
     branch = study.problem.branch
     paths = study.paths()
@@ -157,7 +158,7 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[flo
         ids = (case.id for path in batch for case in path.cases)
         done = store.catalogue.having(OK, ids)
         for path in batch:
-            if missing := [case.values[branch] for case in path.cases if case.id not in done]:
+            if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing
 
 

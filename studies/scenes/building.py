@@ -91,9 +91,8 @@ class Builder:
         from solver.model.body import Body
 
         where = f"bodies.{name}"
-        as_made = self.tried(
-            where if table.shape is None else f"{where}.shape", lambda: self._mesh(table)
-        )
+        at = where if table.shape is None else f"{where}.shape"
+        as_made = self.tried(at, lambda: _made(table, self.meshes))
         mesh = self.tried(where, lambda: _placed(as_made, table)) if as_made else None
         law = laws.get(table.material)
         if mesh is None or law is None:
@@ -114,15 +113,6 @@ class Builder:
                 loads=loads,
             ),
         )
-
-    def _mesh(self, table: tables.Body) -> Mesh:
-        """Return the mesh of a body as its shape or its file has it."""
-        if table.mesh is None:
-            cells = "tri" if (table.element or "").startswith("tri") else "quad"
-            return mesh_of(table.shape, cells)
-        if self.meshes is None:
-            raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")
-        return self.meshes[table.mesh].mesh(table.part)
 
     def _rigid(self, name: str, table: tables.Rigid) -> RigidBody | None:
         from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc
@@ -245,6 +235,21 @@ def _place(names: list[str]) -> Any:
         return f"stage {names[k]}, {time - k:.4g} of it"
 
     return words
+
+
+def mesh_of_body(table: tables.Body, meshes: Mapping[str, MeshFile] | None) -> Mesh:
+    """Return the mesh of a body where it stands, with the boundaries of its table."""
+    return _placed(_made(table, meshes), table)
+
+
+def _made(table: tables.Body, meshes: Mapping[str, MeshFile] | None) -> Mesh:
+    """Return the mesh of a body as its shape or its file has it."""
+    if table.mesh is None:
+        cells = "tri" if (table.element or "").startswith("tri") else "quad"
+        return mesh_of(table.shape, cells)
+    if meshes is None:
+        raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")
+    return meshes[table.mesh].mesh(table.part)
 
 
 def _placed(mesh: Mesh, table: tables.Body) -> Mesh:

@@ -81,7 +81,7 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
         if body.part is not None and body.mesh is None:
             yield StudyError(f"{where}.part", body.part, "goes with mesh")
         if body.mesh is not None and meshes is not None and body.mesh not in meshes:
-            yield StudyError(f"{where}.mesh", body.mesh, "this file did not come with the scene")
+            yield StudyError(f"{where}.mesh", body.mesh, "there is no such file with the scene")
         for other, span in ((o, s) for o, b in body.boundaries.items() for s in (b.x, b.y)):
             if span is not None and not span[0] < span[1]:
                 allowed = "must be two increasing numbers"

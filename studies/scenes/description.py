@@ -17,6 +17,7 @@ from studies.errors import SceneError, StudyError
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
 from studies.scenes.meshfile import LARGEST, MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
+from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import Parameter, SceneFile
 
 PLAIN = ("name", "summary", "parameters", "derived")
@@ -62,8 +63,8 @@ class Description:
         content = toml_of(path.name, _bytes(path))
         meshes = {}
         for name in mesh_names(content):
-            beside = path.parent / name
-            meshes[name] = MeshFile(beside.name, _bytes(beside))
+            if (path.parent / name).is_file():  # one that is not there is a mistake of the file
+                meshes[name] = MeshFile(name, _bytes(path.parent / name))
         return cls(path.name, content, meshes)
 
     @cached_property
@@ -162,14 +163,15 @@ def toml_of(name: str, data: bytes) -> dict[str, Any]:
 
 
 def mesh_names(content: Mapping[str, Any]) -> list[str]:
-    """Return the names of the mesh files that bodies are read from."""
+    """Return the names of the mesh files that bodies are read from; none that leads elsewhere."""
     bodies = content.get("bodies")
     found = (
         [each.get("mesh") for each in bodies.values() if isinstance(each, Mapping)]
         if isinstance(bodies, Mapping)
         else []
     )
-    return list(dict.fromkeys(name for name in found if isinstance(name, str)))
+    plain = [name for name in found if isinstance(name, str) and FILE_NAME.fullmatch(name)]
+    return list(dict.fromkeys(plain))
 
 
 def _bytes(path: Path) -> bytes:

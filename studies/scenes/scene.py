@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, make_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, make_dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.loading.program import Program, walked
 from solver.results.fields import maps, stress_maps
 from solver.results.figures import cost
 from solver.results.look import Look, Values
+from solver.scenes.effort import Effort
 from solver.scenes.parameters import check, described
 from solver.scenes.scene import Scene
 from studies.errors import SceneError
@@ -21,11 +23,11 @@ from studies.scenes import tables
 from studies.scenes.building import Builder, apart
 from studies.scenes.checking import clashes, declarations
 from studies.scenes.description import Description
+from studies.scenes.effort import effort_of
 from studies.scenes.looking import asked, looked, view_of
 
 if TYPE_CHECKING:
     from solver.contact.state import Converged
-    from solver.loading.program import Program
     from solver.model.model import Model
     from solver.results.samples import Samples
     from solver.results.view import View
@@ -99,6 +101,7 @@ def _made(description: Description) -> FileScene:
         outputs=(*((_maps,) if scene.look.map else ()), partial(_looked, description)),
         costs=(cost,),
         watch=_watched,
+        effort=partial(_effort, description),
         quantities=tuple(q for number in asked(scene) for q in number.quantities),
         source=description.digest,
         description=description,
@@ -151,6 +154,15 @@ def _model(description: Description, parameters: Any) -> Model:
 
 def _program(description: Description, parameters: Any) -> Program:
     return Builder(_tables(description, parameters), description.meshes).program()
+
+
+def _effort(description: Description, parameters: Any, values: Sequence[Any]) -> Effort:
+    scene = _tables(description, parameters)
+    branch = _branch(description)
+    if not branch:
+        return effort_of(description, scene, [_program(description, parameters).count])
+    runs = [replace(parameters, **{branch: value}) for value in sorted(values)]
+    return effort_of(description, scene, [walked([_program(description, r) for r in runs])])
 
 
 def _view(description: Description, parameters: Any) -> View:

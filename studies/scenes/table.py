@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 from annotated_types import Interval
@@ -9,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, StringConstraints
 
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,59}$")]
 """A name that a scene file gives: 1 to 60 of ``A-Z a-z 0-9 _``, beginning with a letter."""
-FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}$")]
+FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
+FileName = Annotated[str, StringConstraints(pattern=f"^{FILE_NAME.pattern}$")]
 """The name of a file beside the scene file."""
 Place = tuple[float, float]
 Span = tuple[float, float]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 
 from solver.scenes import Scene
@@ -59,7 +60,11 @@ def kept(directory: Path, scene_id: str) -> FileScene | None:
     return scene
 
 
-def kept_ids(directory: Path) -> list[str]:
-    """Return the ids of the scenes that are kept, the newest first."""
-    files = list((directory / "scenes").glob(f"*/{_FILE}"))
-    return [each.parent.name for each in sorted(files, key=lambda f: -f.stat().st_mtime_ns)]
+def newest(directory: Path, count: int) -> list[FileScene]:
+    """Return the scenes that were kept last, the newest first; none that cannot be read."""
+    files = sorted((directory / "scenes").glob(f"*/{_FILE}"), key=lambda f: -f.stat().st_mtime_ns)
+    found = []
+    for each in files[:count]:
+        with suppress(StudyError):
+            found.append(kept(directory, each.parent.name))
+    return [scene for scene in found if scene]

@@ -70,6 +70,7 @@ def keyed(tmp_path: Path) -> tuple[Ask, dict[str, dict[str, str]]]:
         ("POST", "/studies", "submit"),
         ("POST", RETRY, "submit"),
         ("POST", "/estimate", "submit"),
+        ("POST", "/scenes", "submit"),
         ("DELETE", f"/studies/{UNKNOWN}", "submit"),
         ("DELETE", f"/studies/{UNKNOWN}?purge=true", "admin"),
         ("DELETE", f"/studies/{UNKNOWN}?%70urge=true", "admin"),

@@ -121,7 +121,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
             or t["bodies"]["upper"].pop("shape")
         ),
         "bodies.upper.mesh",
-        "did not come",
+        "no such file",
     ),
     "mesh elsewhere": (
         put("bodies", "upper", "mesh", "../a.msh"),

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 import studies.scenes.registry as registry
-from solver import SCENES, ModelError, Record, Status
+from solver import SCENES, ModelError, Record, Status, System
 from solver.scenes.punch import PUNCH, PunchParameters
 from studies import Store, Study, StudyError, open_study, run_study, scene_schema
 from studies.errors import SceneError
@@ -270,3 +270,16 @@ def test_every_scene_file_of_the_data_has_no_mistake(path: Path) -> None:
 
 def test_the_files_of_the_data_are_there() -> None:
     assert {"pin", "fretting"} <= {path.stem for path in FILES}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_the_work_of_a_run_is_told_from_its_meshes(path: Path) -> None:
+    scene = read_scene(path)
+    parameters = scene.parameters()
+    assert scene.effort is not None
+    effort = scene.effort(parameters, [getattr(parameters, scene.branch, None)])
+    system = System(scene.model(parameters))
+    assert effort.unknowns == pytest.approx(system.n_unknowns, rel=0.06)
+    assert effort.unknowns >= system.n_unknowns, "supported ones count as well"
+    assert effort.elements == sum(body.mesh.nelements for body in system.model.bodies)
+    assert effort.increments == scene.program(parameters).count

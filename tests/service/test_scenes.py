@@ -1,0 +1,157 @@
+"""Scene files over HTTP: posted, looked at, swept; what is wrong is told, and nothing is run."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies import Store, Study, run_study
+from studies.scenes.scene import read_scene
+from tests.service.servers import Server
+from tests.studies.scenes.conftest import BLOCKS
+
+SCENES = Path(__file__).parents[2] / "data/scenes"
+PIN, MESH = (SCENES / "pin.toml").read_bytes(), (SCENES / "pin.msh").read_bytes()
+SWEEP = {"clearance": [0.01, 0.02], "friction": [0.0]}
+
+
+def post(service: Server, scene: bytes, **meshes: bytes) -> Any:
+    files = [("scene", ("scene.toml", scene))]
+    files += [("meshes", (name.replace("_", "."), data)) for name, data in meshes.items()]
+    return service.client.post("/scenes", files=files)
+
+
+@pytest.fixture(scope="module")
+def pin(service: Server) -> str:
+    """The id of the pin, posted."""
+    answer = post(service, PIN, pin_msh=MESH)
+    assert answer.status_code in (200, 201), answer.text
+    assert answer.headers["location"] == f"/scenes/{answer.json()['id']}"
+    return str(answer.json()["id"])
+
+
+def test_a_scene_has_the_id_of_its_content(service: Server, pin: str) -> None:
+    assert pin == read_scene(SCENES / "pin.toml").id
+    again = post(service, PIN + b"\n# the same\n", pin_msh=MESH)
+    assert (again.status_code, again.json()["id"]) == (200, pin)
+    assert again.json()["name"] == "pin"
+
+
+def test_a_posted_scene_is_listed_and_described(service: Server, pin: str) -> None:
+    listed = {each["id"]: each for each in service.client.get("/scenes").json()}
+    assert listed[pin]["name"] == "pin"
+    assert listed[pin]["branch"] == "load_ratio"
+    schema = service.client.get(f"/scenes/{pin}").json()
+    assert (schema["id"], schema["name"]) == (pin, "pin")
+    known = schema["properties"]["clearance"]
+    assert (known["unit"], known["minimum"], known["maximum"]) == ("mm", 1e-4, 0.2)
+    assert service.client.get(f"/scenes/{'0' * 32}").status_code == 404
+
+
+def test_a_study_of_a_posted_scene_has_the_ids_and_numbers_of_the_file(
+    service: Server, pin: str, tmp_path: Path
+) -> None:
+    done = service.finished(service.post({"name": "pins", "scene": pin, "sweep": SWEEP}))
+    assert (done["status"], done["counts"]) == ("successful", {"ok": 2})
+    study = Study.from_dict({"name": "pins", "sweep": SWEEP}, scene=read_scene(SCENES / "pin.toml"))
+    assert done["id"] == study.id
+    assert [run["id"] for run in done["runs"]] == list(study.run_ids())
+    outcome = run_study(study, Store(tmp_path), workers=1)
+    content = service.client.get(f"/studies/{study.id}/dataset.nc").content
+    ours = xr.load_dataset(outcome.dataset, engine="h5netcdf")
+    theirs = xr.load_dataset(io.BytesIO(content), engine="h5netcdf")
+    for name in set(ours.data_vars) - {"cpu_seconds"}:
+        np.testing.assert_array_equal(ours[name], theirs[name], err_msg=str(name))
+    found = service.client.get("/runs", params={"scene": "pin", "clearance": 0.02}).json()
+    assert [run["id"] for run in found["items"]] == [done["runs"][1]["id"]]
+    picture = service.client.get(f"/runs/{done['runs'][0]['id']}/map.png")
+    assert picture.status_code == 200, picture.text
+
+
+def test_all_mistakes_are_in_the_answer(service: Server) -> None:
+    text = BLOCKS.replace('friction = "$mu"', "frictoin = 0.1")
+    text = text.replace("value = 150.0", 'value = "much"')
+    answer = post(service, text.encode())
+    assert answer.status_code == 422
+    told = {each["field"]: each["allowed"] for each in answer.json()["errors"]}
+    assert "did you mean friction?" in told["contacts[0].frictoin"]
+    assert told["loads[0].value"] == "must be a number"
+    assert "has no effect" in told["parameters.mu"]
+
+
+def test_bodies_are_built_before_a_scene_is_kept(service: Server) -> None:
+    before = service.client.get("/scenes").json()
+    answer = post(service, BLOCKS.replace('boundary = "top"', 'boundary = "up"').encode())
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "bodies.upper.pressure"
+    assert service.client.get("/scenes").json() == before
+
+
+@pytest.mark.parametrize(
+    ("scene", "meshes", "field", "words"),
+    [
+        (b"name = ", {}, "scene", "valid TOML"),
+        (b"\xff\xfe", {}, "scene", "valid TOML"),
+        (PIN, {}, "bodies.plate.mesh", "no such file"),
+        (PIN, {"pin_msh": b"$MeshFormat"}, "bodies.plate.mesh", "cannot be read"),
+        (PIN, {"pin_msh": MESH, "other_msh": MESH}, "meshes", "no body of the scene"),
+        (PIN.replace(b"pin.msh", b"pin.xdmf"), {"pin_xdmf": MESH}, "meshes", "must end in"),
+        (PIN.replace(b'"pin.msh"', b'"../pin.msh"'), {}, "bodies.plate.mesh", "must match"),
+        (PIN.replace(b'"pin.msh"', b'"/etc/passwd"'), {}, "bodies.plate.mesh", "must match"),
+    ],
+)
+def test_what_is_no_scene_is_refused_by_its_entry(
+    service: Server, scene: bytes, meshes: dict[str, bytes], field: str, words: str
+) -> None:
+    answer = post(service, scene, **meshes)
+    assert answer.status_code == 422, answer.text
+    told = [each for each in answer.json()["errors"] if each["field"] == field]
+    assert told and words in told[0]["allowed"], answer.json()["errors"]
+    assert "/tmp" not in answer.text
+
+
+def test_a_form_without_a_scene_and_other_bodies_are_refused(service: Server) -> None:
+    lost = service.client.post("/scenes", files=[("meshes", ("pin.msh", MESH))])
+    assert lost.status_code == 422
+    assert lost.json()["errors"][0]["field"] == "scene"
+    assert service.client.post("/scenes", json={}).status_code == 415
+    headers = {"content-type": "multipart/form-data; boundary=x"}
+    broken = service.client.post("/scenes", content=b"--y\r\n", headers=headers)
+    assert broken.status_code == 400
+    assert "form of files" in broken.json()["detail"]
+
+
+def test_a_scene_larger_than_the_limit_is_refused(service: Server) -> None:
+    answer = post(service, PIN, pin_msh=b"\n" * 21_000_000)
+    assert answer.status_code == 413
+
+
+def test_a_scene_that_takes_too_much_is_refused(service: Server, tmp_path: Path) -> None:
+    """Two bodies of the most elements a shape may have take more memory than there is for one."""
+    many = "[[" + "x" * 200_000
+    assert post(service, many.encode()).status_code == 422
+    deep = "a = " + "[" * 100_000
+    assert post(service, deep.encode()).status_code == 422
+
+
+def test_the_command_submits_a_study_with_its_scene_file(service: Server, tmp_path: Path) -> None:
+    (tmp_path / "blocks.toml").write_text(BLOCKS)
+    (tmp_path / "study.toml").write_text('name = "b"\nscene = "blocks.toml"\n[sweep]\nmu = [0.1]\n')
+    command = [sys.executable, "-m", "studies.command.cli", "submit", str(tmp_path / "study.toml"),
+               "--url", str(service.client.base_url)]  # fmt: skip
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    study = Study.from_toml(tmp_path / "study.toml")
+    assert answer.stdout.strip() == study.id
+    done = service.finished(study.id)
+    assert done["status"] == "successful"
+    assert done["scene"] == study.problem.id
+    assert tomllib.loads(BLOCKS)["name"] == "blocks"
