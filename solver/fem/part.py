@@ -172,6 +172,11 @@ class Part(ABC):
         del before, after
         return 0.0
 
+    def turn(self, before: float, after: float) -> float:
+        """Return by how much it is turned between two times, where that is prescribed [rad]."""
+        del before, after
+        return 0.0
+
     def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
         """Return the way of a load over this part [mm], as its unknowns were and are."""
         del before, after

@@ -132,6 +132,12 @@ class RigidPart(Part):
         """Return ``u`` with prescribed motions at their values for a time."""
         return np.where(self._held, self._driven.at(time), u)
 
+    def turn(self, before: float, after: float) -> float:
+        """Return by how much it is turned between two times [rad], 0 where it is free to turn."""
+        if not self._held[2]:
+            return 0.0
+        return float(abs(self._driven.at(after)[2] - self._driven.at(before)[2])) / self.arm
+
     def start(self) -> Array:
         """Return the unknowns (3,) before any load."""
         return self.moved(np.zeros(3), 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
 
     Report = Callable[[], None]
     Watch = Callable[[Converged], Any]
+
+
+_TURN = 0.1
+"""Largest rotation of a rigid body in an increment [rad]."""
 
 
 class Stepper:
@@ -121,8 +126,14 @@ class Stepper:
         return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
-        """Return the point at time ``target`` or raise `PathEnded`."""
-        step = target - point.now.state.time
+        """Return the point at time ``target`` or raise `PathEnded`.
+
+        An increment in which a rigid body turns too far is divided: a friction force that turns
+        with its surface would be missed.
+        """
+        begin = point.now.state.time
+        turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
+        step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
         least = abs(step) / 2**self.control.max_cuts
         while point.now.state.time != target:
             state = point.now.state

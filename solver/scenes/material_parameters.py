@@ -41,6 +41,16 @@ LINEAR = ("none", "isotropic", "kinematic", "mixed")
 """Rules of the closed-form law, which steady passes know."""
 _ISOTROPIC = ("none", "isotropic", "voce", "table")
 """Rules that go with Tresca's condition."""
+_USED: Mapping[HardeningRule, frozenset[str]] = {
+    "isotropic": frozenset({"hardening_ratio"}),
+    "kinematic": frozenset({"hardening_ratio"}),
+    "mixed": frozenset({"hardening_ratio", "isotropic_fraction"}),
+    "voce": frozenset({"saturation", "saturation_rate"}),
+    "table": frozenset({"curve"}),
+    "chaboche": frozenset({"saturation", "saturation_rate", "back_stresses"}),
+    "layered": frozenset({"curve"}),
+}
+"""Parameters of hardening that a rule uses."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +107,12 @@ class MaterialParameters(ElasticParameters):
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ElasticParameters.__post_init__(self)
         self.material()  # refuses what does not go together
+
+    @property
+    def idle(self) -> frozenset[str]:
+        """Parameters that no number depends on with this hardening rule."""
+        used = _USED.get(self.hardening, frozenset())
+        return frozenset().union(*_USED.values()) - used
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:
         """Return the law of the material, with ``stiffness`` times Young's modulus."""

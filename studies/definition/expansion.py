@@ -83,13 +83,18 @@ class Expansion:
         Raises
         ------
         StudyError
-            when the scene refuses a combination of parameters
+            when the scene refuses a combination of parameters, or one that is swept changes nothing
         """
+        idle = {name for name, axis in self._axes.items() if not isinstance(axis, dict)}
+        idle = {name for name in idle if len(self._axes[name]) > 1}
         for index in self._indices():
             try:
-                self._parameters(index)
+                idle &= getattr(self._parameters(index), "idle", frozenset())
             except ModelError as error:
                 raise self._located(error, index) from error
+        for name in idle:
+            allowed = "changes nothing in any run of this study: choose another hardening"
+            raise StudyError(f"sweep.{name}", self._axes[name], allowed)
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, the last axis running fastest."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Material, Model, ModelError, solve
+from solver import Amplitude, Body, ContactPair, Material, Model, ModelError, Stage, solve
 from solver.loading.control import PathControl
 from solver.mesh import graded, grid
 from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc, line
@@ -155,6 +155,33 @@ def test_a_rotation_larger_than_small_moves_points_on_circles() -> None:
     at = chain.X + part.motion(chain, u)
     angle = 0.5
     assert at[:, 0] == pytest.approx([5 * np.cos(angle), 5 * np.sin(angle) - 0.5])
+
+
+@pytest.mark.parametrize("turn", [0.6, 2.5, -2.5])
+def test_a_turn_in_one_increment_is_divided(turn: float) -> None:
+    """A roller turned on a block drags it: as much in one increment of the program as in many."""
+    block = Body(name="block", mesh=grid(np.linspace(-2.0, 2.0, 17), np.linspace(-2.0, 0.0, 9)),
+                 material=Material(youngs_modulus=E, poisson_ratio=NU),
+                 supports={"bottom": "xy"})  # fmt: skip
+    first, then = Amplitude([0, 1], [0, 1]), Amplitude([1, 2], [0, 1])
+    roller = RigidBody(
+        name="roller",
+        surfaces={"rim": arc((0.0, 5.0), 5.0, (-np.pi / 2 - 3.0, -np.pi / 2 + 3.0), 300)},
+        centre=(0.0, 5.0),
+        y=Moved(value=-0.02, amplitude=first),
+        rotation=Moved(value=turn, amplitude=then),
+    )
+    pair = ContactPair(slave=("block", "top"), master=("roller", "rim"), friction=0.3)
+    drags = []
+    for steps in (1, 80):
+        stages = (Stage(name="pressed", target=1.0, steps=4),
+                  Stage(name="turned", target=2.0, steps=steps))  # fmt: skip
+        found = solve(Model(bodies=(block,), rigid=(roller,), contacts=(pair,)), stages=stages)
+        contact = found.stages["turned"].state.contacts[0]
+        drags.append(contact.tangential.sum() / contact.normal.sum())
+        assert len(found.tally.iterations) >= 4 + abs(turn) / 0.1
+    assert abs(drags[0]) == pytest.approx(0.3, rel=1e-3), "it slides all over"
+    assert drags[0] == pytest.approx(drags[1], rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -368,3 +368,29 @@ def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray_nor_scip
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )
     assert answer.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("rule", "name", "values"),
+    [
+        ("none", "hardening_ratio", [0.01, 0.02]),
+        ("isotropic", "isotropic_fraction", [0.2, 0.8]),
+        ("kinematic", "saturation", [10.0, 20.0]),
+        ("voce", "hardening_ratio", [0.01, 0.02]),
+    ],
+)
+def test_a_swept_parameter_that_changes_nothing_is_refused(
+    rule: str, name: str, values: list[float]
+) -> None:
+    content: dict[str, Any] = {"name": "idle", "scene": "punch", "sweep": {name: values}}
+    content["parameters"] = {"hardening": rule, "saturation": 100.0}
+    content["parameters"].pop(name, None)
+    with pytest.raises(StudyError, match=f"sweep.{name} = .*changes nothing in any run"):
+        Study.from_dict(content)
+
+
+def test_a_swept_parameter_that_changes_some_runs_is_taken() -> None:
+    sweep = {"hardening": ["none", "isotropic"], "hardening_ratio": [0.01, 0.02]}
+    assert Study.from_dict({"name": "some", "scene": "punch", "sweep": sweep}).size == 4
+    one = {"hardening_ratio": [0.05]}
+    assert Study.from_dict({"name": "one", "scene": "punch", "sweep": one}).size == 1

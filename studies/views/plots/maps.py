@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.markers import CARETDOWN
 
 from studies.views.plots.captions import capitalised, label, setting, wrapped
 from studies.views.plots.fields import (
@@ -24,6 +25,9 @@ _OUTSIDE = "0.86"
 _PERCENT, _WORTHWHILE = 99.8, 1.5
 """Next to a sharp corner stress grows without bound: colours end at this percentile of the map,
 where its largest value is that many times larger."""
+
+_NOTHING = 1e-3
+"""Stress that is rounding [MPa]."""
 
 _AREA, _LONGEST = 26.0, 8.0
 """Area of a map and its longest side [in]."""
@@ -71,12 +75,11 @@ def map_figure(
         cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
     )  # fmt: skip
     left, right = axes.get_xlim()
-    axes.axhline(0.0, color="0.3", linewidth=0.6)
-    start = max(left, -edge if left < 0.0 else 0.0)
-    if edge > 0.0:
+    ends = [end for end in (-edge, edge) if edge > 0.0 and left <= end <= right]
+    if ends:  # from above: a line would hide the stress at the surface
         axes.plot(
-            [start, min(edge, right)], [0.0, 0.0], color="k", linewidth=1.4,
-            solid_capstyle="butt", label="contact under load",
+            ends, [0.0] * len(ends), linestyle="none", marker=CARETDOWN, color="k",
+            label="edge of contact under load",
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
     axes.set(xlim=(left, right), xlabel=_symbol(run["x"]), ylabel=_symbol(run["y"]))
@@ -120,6 +123,8 @@ def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
     size = np.abs(there) if signed else there
     if not size.size or not size.max() > 0.0:
         return 1.0, ""
+    if values.attrs.get("units") == "MPa" and size.max() < _NOTHING:
+        return 1.0, f"No value is larger than {_NOTHING:g} MPa."
     high = float(np.percentile(size[size > 0.0], _PERCENT))
     if size.max() <= _WORTHWHILE * high:
         return float(size.max()), ""
@@ -153,15 +158,19 @@ def _fit(sheet: Figure, axes: Axes) -> None:
 def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
     """Set the title, and below it what tells the run from others, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
-    of = f", {values['component'].item()}" if "component" in values.coords else ""
+    component = str(values["component"].item()) if "component" in values.coords else ""
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
     below = axes.set_title(
         wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
         loc="left", fontsize=8, color="0.3", pad=5.0,
     )  # fmt: skip
-    axes.annotate(
-        f"{capitalised(quantity)}{of}", (0.0, 1.0), xycoords=below,
+    title = axes.annotate(
+        capitalised(quantity) + (" σ" if component else ""), (0.0, 1.0), xycoords=below,
         xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
+    )  # fmt: skip
+    axes.annotate(
+        component, (1.0, 0.0), xycoords=title,
+        xytext=(0.5, 0.0), textcoords="offset points", weight="bold", fontsize=8,
     )  # fmt: skip
 
 

@@ -65,7 +65,7 @@ def test_a_stress_map_has_zero_in_the_middle_of_its_colours(computed: ComputedSt
     assert axes.get_aspect() == 1.0
     assert axes.child_axes[0].get_ylabel() == "residual stress [MPa]"
     words = texts_of(sheet)
-    assert "Residual stress, xx" in words
+    assert "Residual stress σ xx" in words
     assert "load ratio 0.9" in words
     assert "friction 0.4" in words
 
