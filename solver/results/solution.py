@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,18 +21,23 @@ from solver.loading.walker import Walker
 from solver.model.loads import InitialStress
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
+from solver.results.places import Fields, Places
 from solver.results.samples import Nodal
+from solver.results.slave import Slave, on_slave
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from solver.contact.state import Converged
     from solver.fem.rigid import RigidMotion
     from solver.loading.program import Stage
     from solver.model.model import Model
+
+
+_LOG = logging.getLogger("solver")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +106,30 @@ class Solution:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
         return Nodal(self.system).plastic_strain(body, self._at(stage))
 
+    def at(
+        self, body: str, places: ArrayLike, stage: str = "unloaded"
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return fields at places (2, n) of a body [mm], NaN outside of it.
+
+        They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa], components xx, yy, zz, xy,
+        ``von_mises`` (n,) [MPa] and ``plastic_strain`` (n,).
+        """
+        X = np.asarray(places, dtype=float)
+        if X.ndim != 2 or len(X) != 2:
+            raise ModelError("places", X.shape, "must be positions (2, n) [mm]")
+        if body not in self.system.names:
+            raise ModelError("body", body, f"must be one of {', '.join(self.system.names)}")
+        self._at(stage)
+        return Fields(self.system, self.stages).at(Places(body, X), stage)
+
+    def surface(self, pair: int = 0, stage: str = "loaded") -> Slave:
+        """Return what acts on the slave of a pair: pressure, shear, gap and slip at its vertices.
+
+        ``s`` is the distance from its start, ``X`` the position before loading, ``length`` the
+        length of contact.
+        """
+        return on_slave(self.system, self._at(stage), pair)
+
     def contact(
         self, pair: int = 0, stage: str = "loaded"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -153,6 +183,7 @@ def solve(
     stages: Sequence[Stage] = (),
     control: PathControl | None = None,
     linear_solver: str = "auto",
+    progress: Callable[[float], None] | None = None,
 ) -> Solution:
     """Load a model to a multiple of its loads, take the bodies apart, and return both states.
 
@@ -163,6 +194,9 @@ def solve(
         functions of time; the solution then has these states
     control : increments and tolerances; twenty increments of loading when absent
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
+    progress : called after each increment with the fraction of the increments that is done, up to
+        1; an exception that it raises stops the work. The logger ``solver`` tells each increment
+        at level INFO
 
     Raises
     ------
@@ -182,7 +216,8 @@ def solve(
             allowed = "must be absent where no stages are given: solve raises a load factor"
             raise ModelError("amplitude", body.name, allowed)
     system = System(model, linear_solver)
-    walker = Walker(system, control, watch=partial(observe, system))
+    follow = _Following(program, progress)
+    walker = Walker(system, control, watch=partial(observe, system), report=follow)
     (outcome,) = walker.walk([program])
     if outcome.error is not None:
         raise outcome.error
@@ -192,3 +227,17 @@ def solve(
         tally=outcome.tally,
         history=outcome.history,
     )
+
+
+class _Following:
+    """Counts increments, and tells how many of the program's are done; those that are cut more."""
+
+    def __init__(self, program: Program, progress: Callable[[float], None] | None) -> None:
+        self._planned, self._done = program.count, 0
+        self._progress = progress
+
+    def __call__(self) -> None:
+        self._done += 1
+        _LOG.info("increment %d, %d planned", self._done, self._planned)
+        if self._progress is not None:
+            self._progress(min(self._done / self._planned, 1.0))

@@ -16,7 +16,6 @@ when its length or time of change is not what the catalogue noted.
 
 from __future__ import annotations
 
-import fcntl
 import itertools
 import json
 import logging
@@ -32,11 +31,12 @@ from solver.scenes import Scene
 from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.definition.vocabulary import STATUSES
-from studies.errors import CatalogueDamaged, RunUnreadable, StoreBusy, Unusable
+from studies.errors import CatalogueDamaged, RunUnreadable, Unusable
 from studies.storage import dataset as layout
 from studies.storage import runfile, shelf
 from studies.storage.appearing import appearing
 from studies.storage.catalogue import Catalogue, Row
+from studies.storage.lock import locked
 from studies.storage.room import needs_room
 
 if TYPE_CHECKING:
@@ -240,15 +240,8 @@ class Store:
                 (self.directory / name).mkdir(parents=True, exist_ok=True)
                 with tempfile.TemporaryFile(dir=self.directory / name):
                     pass  # a directory may be there and yet refuse files
-            holding = (self.directory / ".lock").open("w")
-        with holding as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise StoreBusy(
-                    f"{self.directory}: another process computes here; "
-                    "wait until it has ended, or name another directory"
-                ) from None
+            file = (self.directory / ".lock").open("a+", encoding="ascii")
+        with locked(self.directory, file):
             parts = self.directory.glob("*/**/*.part") if tidy else ()  # keys are next to them
             for part in parts:
                 part.unlink(missing_ok=True)

@@ -12,6 +12,7 @@ import xarray as xr
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
+from studies.storage.frame import FRACTION
 from studies.storage.store import ENGINE, Store
 
 
@@ -51,11 +52,19 @@ def _name(dataset: Path) -> str:
 
 
 def open_netcdf(path: Path | str) -> xr.Dataset:
-    """Open the file of a run or of a study; arrays are read when they are used."""
+    """Open the file of a run or of a study; arrays are read when they are used.
+
+    Where runs have grids of different length, ``depth`` is a coordinate over the sweep, and
+    ``depth_fraction`` the index: ``dataset.sel(depth_fraction=0.1, method="nearest")``.
+    """
     try:
-        return xr.open_dataset(path, engine=ENGINE)
+        dataset = xr.open_dataset(path, engine=ENGINE)
     except OSError as error:
         raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
+    for name in [str(name) for name in dataset.dims]:
+        if (fraction := f"{name}{FRACTION}") in dataset.variables:
+            dataset = dataset.set_coords(fraction).set_xindex(fraction)
+    return dataset
 
 
 def find_datasets(path: Path | str) -> list[Path]:
@@ -203,5 +212,6 @@ def _own_grid(run: xr.Dataset) -> xr.Dataset:
     for name in [str(name) for name in run.dims]:
         if name in run.coords and name not in run.indexes:
             there = run[name].notnull().to_numpy()
+            run = run.drop_vars(f"{name}{FRACTION}", errors="ignore")
             run = run.isel({name: there}).set_xindex(name)
     return run

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -213,7 +214,9 @@ def test_a_busy_directory_is_one_line_and_returns_1(
 ) -> None:
     with store.writing():
         assert main(["run", str(study_file()), "--out", str(store.directory)]) == 1
-    assert "another process computes here" in capsys.readouterr().err
+    printed = capsys.readouterr().err
+    assert f"another process (id {os.getpid()}) computes here" in printed
+    assert printed.count("\n") == 1
 
 
 def test_scenes_tells_ranges_units_and_defaults(capsys: pytest.CaptureFixture[str]) -> None:

@@ -227,3 +227,29 @@ def test_one_run_prefers_what_succeeded_with_most_load_and_friction(store: Store
             one_run(together, {"friction": "0.3"})
         with pytest.raises(StudyError, match=r"one of load_ratio, friction, hardening"):
             one_run(together, {"speed": "1"})
+
+
+def test_grids_that_differ_in_scale_have_a_fraction_as_their_index(tmp_path: Path) -> None:
+    """Runs of other lengths are compared at the same share of it, never at unlike places unsaid."""
+    study, store = fake_study(sweep={"half_width": [10.0, 50.0]}), Store(tmp_path)
+    compute_here(study, store)
+    together = open_study(store.directory)
+    assert "x" not in together.indexes and together["x"].dims[0] != "x"
+    assert {"x_fraction"} <= set(together.indexes)
+    assert together["x_fraction"].attrs["units"] == "1"
+    narrow, wide = (together.sel(half_width=a).squeeze() for a in (10.0, 50.0))
+    difference = wide["residual_stress"] - narrow["residual_stress"]
+    assert difference.sizes["x"] == together.sizes["x"]
+    assert "x" not in difference.coords, "the positions differ: none is told"
+    there = together["x"].sel(x_fraction=1.0, method="nearest").squeeze()
+    ratio = there.sel(half_width=50.0) / there.sel(half_width=10.0)
+    assert ratio.item() == pytest.approx(5.0)
+    alone = one_run(together.sel(half_width=[10.0]))
+    assert "x" in alone.indexes and "x_fraction" not in alone.variables
+
+
+def test_grids_that_differ_otherwise_have_no_index(tmp_path: Path) -> None:
+    study = fake_study(sweep={"half_width": [10.0, 50.0], "points": [4, 6]})
+    compute_here(study, Store(tmp_path))
+    together = open_study(tmp_path)
+    assert "x_fraction" not in together.variables

@@ -1,0 +1,246 @@
+"""The shape of a combined data set: axes, grids, variables, and where a run is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, partial
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+
+from solver.scenes import Scene
+from studies.definition.parameters import parameters_of
+from studies.definition.vocabulary import MISSING, STATUSES
+from studies.storage import dataset as layout
+from studies.storage.runfile import variables
+
+SAME = 1e-9
+"""Relative difference below which two runs are taken to have the same grid."""
+FRACTION = "_fraction"
+"""Ends the name of the index of grids that differ from run to run but in scale."""
+_PIECE = 32
+"""Values along a dimension that are compressed together at least, where lengths differ."""
+_NO_COORDINATE = "_nc4_non_coord_"
+"""Before the name HDF5 has for a variable called like a dimension whose coordinate it is not."""
+
+
+@dataclass(slots=True, kw_only=True)
+class Frame:
+    """Shape of the combined data set, learnt from the runs, and what is small enough to hold.
+
+    Attributes
+    ----------
+    scene, axes, usual : all sweep dimensions with their values; those that a run's file has
+    linked : parameter set by a linked axis -> the axis, the values over it
+    labels : labelled dimension -> union of the labels
+    grids, sizes, shortest : numeric dimension -> the grid found, of several alike the longest;
+        the greatest length; the smallest
+    ragged : numeric dimensions whose grid differs from run to run
+    shares : numeric dimension -> its grid / the largest position on it, None where these differ
+    fields : variable -> (dimensions after the sweep's, attributes)
+    small : variable -> its values over the sweep: scalars, flags, texts
+    """
+
+    scene: Scene
+    axes: Mapping[str, Sequence[Any]]
+    usual: Sequence[str]
+    linked: dict[str, tuple[str, list[Any]]]
+    labels: dict[str, list[str]] = field(default_factory=dict)
+    grids: dict[str, np.ndarray] = field(default_factory=dict)
+    sizes: dict[str, int] = field(default_factory=dict)
+    shortest: dict[str, int] = field(default_factory=dict)
+    ragged: set[str] = field(default_factory=set)
+    shares: dict[str, np.ndarray | None] = field(default_factory=dict)
+    fields: dict[str, tuple[list[str], dict[str, Any]]] = field(default_factory=dict)
+    small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("status", np.dtype(np.int8)), ("message", np.dtype(object))):
+            self._hold(name, kind)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values on each sweep dimension."""
+        return tuple(len(values) for values in self.axes.values())
+
+    @property
+    def auxiliary(self) -> dict[str, str]:
+        """CF attribute of a variable over the sweep: its coordinates that are no dimensions."""
+        return {"coordinates": " ".join(self.linked)} if self.linked else {}
+
+    def learn(self, run: h5py.File, at: tuple[int, ...]) -> None:
+        """Take in the grids and variables of one run, and its values that are small."""
+        for name in variables(run):
+            if name in self.usual or name in self.fields:
+                continue
+            variable = run[name]
+            if variable.is_scale:
+                self._learn_coordinate(name, _values(variable))
+            elif variable.ndim > len(self.usual):
+                inner = [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]
+                self.fields[name] = (inner, layout.attributes_of(name, self.scene))
+            else:
+                if name not in self.small:
+                    self._hold(name, variable.dtype)
+                self.small[name][0][at] = _values(variable).item()
+
+    def _hold(self, name: str, kind: np.dtype[Any]) -> None:
+        empty = np.full(self.shape, _absent(name, kind), dtype=kind)
+        self.small[name] = (empty, layout.attributes_of(name, self.scene))
+
+    def _learn_coordinate(self, name: str, values: np.ndarray) -> None:
+        if values.dtype.kind not in "fi":
+            known = self.labels.setdefault(name, [])
+            known.extend(label for label in values if label not in known)
+            return
+        self._learn_share(name, values)
+        grid = self.grids.setdefault(name, values)
+        self.sizes[name] = max(self.sizes.get(name, 0), len(values))
+        self.shortest[name] = min(self.shortest.get(name, len(values)), len(values))
+        both = min(len(grid), len(values))
+        tolerance = SAME * np.abs(grid).max(initial=0.0)
+        if not np.allclose(grid[:both], values[:both], rtol=0.0, atol=tolerance):
+            self.ragged.add(name)
+        elif len(values) > len(grid):
+            self.grids[name] = values
+
+    def _learn_share(self, name: str, values: np.ndarray) -> None:
+        most = np.abs(values).max(initial=0.0)
+        share = values / most if most > 0 else None
+        known = self.shares.setdefault(name, share)
+        if (
+            known is None
+            or share is None
+            or len(known) != len(share)
+            or not np.allclose(known, share, rtol=0.0, atol=SAME)
+        ):
+            self.shares[name] = None
+
+    @property
+    def fractions(self) -> dict[str, np.ndarray]:
+        """Grids that differ from run to run in scale alone, as fractions of their largest value."""
+        found = {name: self.shares[name] for name in sorted(self.ragged)}
+        return {name: share for name, share in found.items() if share is not None}
+
+    def create_axes(self, file: h5netcdf.File) -> None:
+        """Make the dimensions and their coordinates."""
+        lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
+        file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
+        own = {name: (name, values) for name, values in self.axes.items()}
+        for name, (axis, values) in (own | self.linked).items():
+            attributes = _axis_attributes(self.scene, name)
+            _write(file, name, (axis,), _axis_array(values), attributes, complete=True)
+        for name, labels in self.labels.items():
+            texts = np.array(labels, dtype=object)
+            _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
+        for name, grid in self.grids.items():
+            if name in self.ragged:
+                self.fields[name] = ([name], layout.attributes_of(name))
+            else:
+                _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
+        for name, share in self.fractions.items():
+            words = f"{name} / the largest {name} of the run"
+            told = {"long_name": words, "units": "1"}
+            _write(file, f"{name}{FRACTION}", (name,), share, told, complete=True)
+
+    def create_fields(self, file: h5netcdf.File) -> None:
+        """Make the variables that are written run by run.
+
+        A run has one compressed chunk, or several along a dimension that is longer in other runs:
+        the length that it lacks is not written.
+        """
+        for name, (inner, attributes) in self.fields.items():
+            sizes = [self.sizes.get(each) or len(self.labels[each]) for each in inner]
+            pieces = [max(self.shortest.get(each, _PIECE), _PIECE) for each in inner]
+            variable = file.create_variable(
+                name,
+                (*self.axes, *inner),
+                dtype="f8",
+                fillvalue=np.nan,
+                chunks=(*(1,) * len(self.axes), *map(min, sizes, pieces)),
+                compression="gzip",
+                compression_opts=1,
+                shuffle=True,
+                fletcher32=True,
+            )
+            variable.attrs.update(attributes | self.auxiliary)
+
+    def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
+        """Write the fields of one run in their place."""
+        places = cache(partial(self._places, run))
+        for name, (inner, _) in self.fields.items():
+            if name in run:
+                values = _values(run[name])
+                values = values.reshape(values.shape[values.ndim - len(inner) :])
+                whole = np.full(tuple(map(self._extent, inner, values.shape)), np.nan)
+                whole[np.ix_(*map(places, inner))] = values
+                target = file[_NO_COORDINATE + name if name in self.ragged else name]
+                target[(*at, *map(slice, whole.shape))] = whole
+
+    def write_small(self, file: h5netcdf.File) -> None:
+        """Write what was held in memory."""
+        for name, (values, attributes) in self.small.items():
+            held = attributes | self.auxiliary
+            _write(file, name, tuple(self.axes), values, held, complete=name == "status")
+
+    def _extent(self, dimension: str, length: int) -> int:
+        """Return up to where a run that has this length writes along a dimension."""
+        return len(self.labels[dimension]) if dimension in self.labels else length
+
+    def _places(self, run: h5py.File, dimension: str) -> list[int]:
+        """Return where a run's points along a dimension lie in the combined one."""
+        if dimension in self.labels:
+            return [self.labels[dimension].index(label) for label in _values(run[dimension])]
+        return list(range(len(run[dimension])))
+
+
+def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:
+    """Return the attributes of a parameter of the scene, or of a linked axis."""
+    known = name in parameters_of(scene)
+    return layout.axis_attributes(scene, name) if known else layout.attributes_of(name)
+
+
+def _values(variable: h5py.Dataset) -> np.ndarray:
+    """Return all values; texts as str."""
+    return variable.asstr()[...] if variable.dtype.kind == "O" else variable[...]
+
+
+def _write(
+    file: h5netcdf.File,
+    name: str,
+    dimensions: Sequence[str],
+    values: np.ndarray,
+    attributes: Mapping[str, Any],
+    *,
+    complete: bool = False,
+) -> None:
+    """Write a variable; one that is not complete gets a fill value."""
+    text = values.dtype.kind == "O"
+    variable = file.create_variable(
+        name,
+        tuple(dimensions),
+        dtype=h5py.string_dtype() if text else values.dtype,
+        fillvalue=None if text or complete else _absent(name, values.dtype),
+        fletcher32=bool(dimensions) and not text,
+    )
+    variable[...] = values
+    variable.attrs.update(attributes)
+
+
+def _absent(name: str, kind: np.dtype[Any]) -> Any:
+    """Return what stands for a run that has not given this variable."""
+    if name == "status":
+        return STATUSES.index(MISSING)
+    return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
+
+
+def _axis_array(values: Sequence[Any]) -> np.ndarray:
+    """Return numbers as numbers, left-out ones as NaN, and anything else as text."""
+    values = [np.nan if value is None else value for value in values]
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.asarray(values)
+    return np.array([v if isinstance(v, str) else json.dumps(v) for v in values], dtype=object)
