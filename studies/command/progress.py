@@ -29,12 +29,14 @@ class Progress:
         self._stream = stream or sys.stderr
         self._bar = self._stream.isatty()
         cases = () if self._bar else study.cases()  # a bar names no runs
+        self._size = study.size
         self._names = {case.id: _place(study, case) for case in cases}
         self._started = time.monotonic()
         self._begun: float | None = None
         self._progress = 0.0
         self._drawn = 0.0
         self._seen = 0
+        self._reused = 0
         self._failed = 0
         self._waits: set[str] = set()
 
@@ -42,6 +44,11 @@ class Progress:
         """Take in an event."""
         if self._begun is None:
             self._begun = event.progress
+            if event.kind == "path" and event.fraction == 0.0:  # nothing is done yet
+                self._reused = round(event.progress * self._size)
+            if self._reused and not self._bar:
+                told = f"{self._reused} of {self._size} runs are there already"
+                print(told, file=self._stream, flush=True)
         if event.kind == "waiting" and event.message and event.message not in self._waits:
             self._waits.add(event.message)
             left = "\n" if self._bar and self._drawn else ""
@@ -70,9 +77,10 @@ class Progress:
         filled = round(_WIDTH * progress)
         failed = f", {self._failed} failed" if self._failed else ""
         bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
-        text = (
-            f"{bar} {100 * progress:3.0f} %  {self._seen} runs{failed}{self._remaining(progress)}"
-        )
+        reused = f" ({self._reused} were there)" if self._reused else ""
+        runs = f"{self._reused + self._seen} of {self._size} runs{reused}{failed}"
+        left = "  putting the data set together" if progress >= 1.0 else self._remaining(progress)
+        text = f"{bar} {100 * progress:3.0f} %  {runs}{left}"
         print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)
 
     def _remaining(self, progress: float) -> str:

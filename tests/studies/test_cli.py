@@ -298,7 +298,19 @@ def test_the_bar_stays_on_one_line_and_counts_failures() -> None:
     bar.close()
     drawn = screen.getvalue()
     assert drawn.count("\n") == 1
-    assert "100 %  4 runs, 1 failed" in drawn.split("\r")[-1]
+    assert "100 %  4 of 4 runs, 1 failed" in drawn.split("\r")[-1]
+
+
+@pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
+def test_runs_that_were_there_are_told(screen: io.StringIO) -> None:
+    study = fake_study()
+    bar = Progress(study, screen)
+    bar(StudyEvent(kind="path", progress=0.5, path="a"))
+    for number, case in enumerate(list(study.cases())[2:], start=3):
+        bar(StudyEvent(kind="run", progress=number / 4, path="a", run=case.id, status="ok"))
+    bar.close()
+    told = "4 of 4 runs (2 were there)" if screen.isatty() else "2 of 4 runs are there already"
+    assert told in screen.getvalue()
 
 
 @pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
