@@ -112,13 +112,25 @@ class Description:
 
     def used(self) -> set[str]:
         """Return the parameters that some entry names, through derived numbers too."""
-        derived = dict(self.content.get("derived", {}))
+        derived = self._derived
         rest = {key: value for key, value in self.content.items() if key not in PLAIN}
         found = set().union(*(names(text) for _, text in _expressions(rest)))
-        for name in reversed(derived):
+        for name in reversed(list(derived)):
             if name in found and is_expression(derived[name]):
                 found |= names(derived[name])
         return found
+
+    @property
+    def declared(self) -> dict[str, Any]:
+        """The defaults as they are written, where a declaration may be wrong."""
+        given = self.content.get("parameters")
+        tables = given.items() if isinstance(given, Mapping) else ()
+        return {str(k): v.get("default") for k, v in tables if isinstance(v, Mapping)}
+
+    @property
+    def _derived(self) -> dict[str, Any]:
+        given = self.content.get("derived")
+        return {str(k): v for k, v in given.items()} if isinstance(given, Mapping) else {}
 
     def _bare(self) -> dict[str, Any]:
         """Return the least that a scene file has: to check a part of one."""
@@ -128,19 +140,12 @@ class Description:
     def _evaluated(self, values: Mapping[str, Any]) -> _Evaluated:
         mistakes: list[tuple[Where, StudyError]] = []
         known = dict(values)
-        derived = self.content.get("derived", {})
-        for name, text in derived.items() if isinstance(derived, Mapping) else ():
-            where = ("derived", str(name))
+        for name, text in self._derived.items():
+            where = ("derived", name)
             if name in values:
-                mistakes.append(
-                    (
-                        where,
-                        StudyError(
-                            f"derived.{name}", text, "is a parameter too: give it another name"
-                        ),
-                    )
-                )
-            known[str(name)] = _value(where, text, known, mistakes)
+                allowed = "is a parameter too: give it another name"
+                mistakes.append((where, StudyError(f"derived.{name}", text, allowed)))
+            known[name] = _value(where, text, known, mistakes)
         tree: dict[str, Any] = {
             key: value if key in PLAIN else _replaced((key,), value, known, mistakes)
             for key, value in self.content.items()

@@ -18,7 +18,7 @@ from solver.results.look import Look, Values
 from solver.scenes.effort import Effort
 from solver.scenes.parameters import check, described
 from solver.scenes.scene import Scene
-from studies.errors import SceneError
+from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder, apart
 from studies.scenes.checking import clashes, declarations
@@ -78,14 +78,18 @@ _MOST = 64
 
 
 def _made(description: Description) -> FileScene:
-    parameters = description.parameters
-    mistakes = list(declarations(parameters, description.used()))
-    usual = {name: each.default for name, each in parameters.items()}
-    scene = None
+    parameters, scene = {}, None
+    mistakes: list[StudyError] = []
     try:
-        scene = description.tables(usual)
+        parameters = description.parameters
+        mistakes += declarations(parameters, description.used())
     except SceneError as error:
         mistakes += error.mistakes
+    try:
+        scene = description.tables(description.declared)
+    except SceneError as error:  # it tells wrong declarations too
+        told = {each.field for each in mistakes}
+        mistakes += [each for each in error.mistakes if each.field not in told]
     if scene is not None:
         mistakes += clashes(scene, description.meshes)
     if mistakes or scene is None:
@@ -235,7 +239,7 @@ def _parameters(description: Description, declared: Mapping[str, tables.Paramete
     return make_dataclass(
         "Parameters",
         [
-            (name, _kind(each), described(each.default, each.description))
+            (name, _kind(each), described(_default(each), each.description))
             for name, each in declared.items()
         ],
         frozen=True,
@@ -254,9 +258,15 @@ def _again(description: Description, values: Mapping[str, Any]) -> Any:
     return file_scene(description).parameters(**values)
 
 
+def _default(declared: tables.Parameter) -> Any:
+    """Return a default; a whole number with a unit is a length or the like, not a count."""
+    whole = isinstance(declared.default, int) and not isinstance(declared.default, bool)
+    return float(declared.default) if whole and declared.unit != "1" else declared.default
+
+
 def _kind(declared: tables.Parameter) -> Any:
     """Return the annotated type of a parameter."""
-    default = declared.default
+    default = _default(declared)
     if isinstance(default, bool):
         return bool
     if isinstance(default, str):
@@ -265,5 +275,5 @@ def _kind(declared: tables.Parameter) -> Any:
     if declared.range is not None:
         low, high = declared.range
         marks.append(Interval(ge=low, le=high))
-    kind = int if isinstance(default, int) and not isinstance(default, bool) else float
+    kind = int if isinstance(default, int) else float
     return Annotated[(kind, *marks)]

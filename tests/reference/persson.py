@@ -14,7 +14,6 @@ contact. I. The case of elastic similarity, Int. J. Solids Structures 38 (2001) 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from math import atan, log, pi, sqrt
 
 import numpy as np
@@ -36,7 +35,7 @@ class DiscInHole:
     clearance: float
     modulus: float
 
-    @cached_property
+    @property
     def _b(self) -> float:
         """Tangent of half the angle from the middle of the contact to its end."""
         wanted = self.modulus * self.clearance / self.force
