@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,13 +16,17 @@ from studies.errors import StudyError
 from studies.storage.frame import FRACTION
 from studies.storage.store import ENGINE, Store
 
+_WAIT = 60.0
+"""Seconds to wait for a service."""
+
 
 def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
     """Open the combined data set of a study; arrays are read when they are used.
 
     Parameters
     ----------
-    path : a ``dataset.nc``, the directory of a study, or an output directory
+    path : a ``dataset.nc``, the directory of a study, an output directory, or the URL of a study
+        of a service that asks for no key, such as ``http://localhost:8000/studies/<id>``
     name : of the study, where the directory holds several; of those with this name the last
         computed is opened
 
@@ -30,6 +35,8 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
     StudyError
         when there is no data set (of this name), or studies of several names
     """
+    if isinstance(path, str) and path.startswith(("http://", "https://")):
+        return _fetched(path)
     found = find_datasets(path)
     names = {each: _name(each) for each in found}
     known = ", ".join(sorted(set(names.values())))
@@ -40,6 +47,19 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
     elif len(set(names.values())) > 1:
         raise StudyError("path", str(path), f"holds several studies; give the name of one: {known}")
     return open_netcdf(max(found, key=lambda each: each.stat().st_mtime))
+
+
+def _fetched(url: str) -> xr.Dataset:
+    """Return the data set of a study on a service, read whole."""
+    import httpx
+
+    whole = url if url.endswith(".nc") else f"{url.rstrip('/')}/dataset.nc"
+    try:
+        answer = httpx.get(whole, timeout=_WAIT, follow_redirects=True).raise_for_status()
+        dataset = xr.load_dataset(io.BytesIO(answer.content), engine=ENGINE)
+    except (httpx.HTTPError, httpx.InvalidURL, OSError, ValueError) as error:
+        raise StudyError("path", url, f"must be a study of a service: {error}") from None
+    return _indexed(dataset)
 
 
 def _name(dataset: Path) -> str:
@@ -61,6 +81,11 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ENGINE)
     except OSError as error:
         raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
+    return _indexed(dataset)
+
+
+def _indexed(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a data set with the fractions of grids that differ as its indexes."""
     for name in [str(name) for name in dataset.dims]:
         if (fraction := f"{name}{FRACTION}") in dataset.variables:
             dataset = dataset.set_coords(fraction).set_xindex(fraction)

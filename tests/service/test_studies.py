@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studies import StudyError, open_study
 from tests.service.servers import Server, fake_study, wait_until
 
 
@@ -49,6 +50,18 @@ def test_a_finished_study_counts_its_runs_and_names_their_place(
     for run in done["runs"]:
         parameters = service.client.get(f"/runs/{run['id']}").json()["parameters"]
         assert run["at"].items() <= parameters.items()
+
+
+def test_python_opens_a_study_by_its_url(service: Server, done: dict[str, Any]) -> None:
+    url = f"{service.client.base_url}/studies/{done['id']}"
+    dataset = open_study(url)
+    assert dataset.sizes["load_ratio"] == 2
+    assert dataset.attrs["id"] == done["id"]
+    assert open_study(f"{url}/dataset.nc").identical(dataset)
+    with pytest.raises(StudyError, match=r"must be a study of a service: .*404"):
+        open_study(f"{service.client.base_url}/studies/{'0' * 32}")
+    with pytest.raises(StudyError, match="must be a study of a service"):
+        open_study("http://127.0.0.1:9/studies")
 
 
 def test_runs_of_a_study_come_in_pages(service: Server, done: dict[str, Any]) -> None:
