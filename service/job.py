@@ -76,6 +76,15 @@ def job_of(row: sqlite3.Row) -> Job | None:
     return Job(**found)
 
 
+def wanted(state: State | None = None, tag: str | None = None) -> tuple[str, list[str]]:
+    """Return the condition, in SQL, for jobs in a state and of studies with a tag."""
+    tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
+    asked = {"state = ?": state, tagged: tag}
+    clauses = [clause for clause, value in asked.items() if value is not None]
+    values = [str(value) for value in asked.values() if value is not None]
+    return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
+
+
 def verdict(counts: Mapping[str, int]) -> tuple[State, str]:
     """Return the final state of a study whose runs ended as counted, and the reason."""
     others = {status: count for status, count in counts.items() if count and status != "ok"}

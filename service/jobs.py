@@ -19,7 +19,7 @@ from typing import Any
 
 from service import schema
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.job import COLUMNS, UNREADABLE, Job, State, job_of
+from service.job import COLUMNS, UNREADABLE, Job, State, job_of, wanted
 from studies.errors import StoreFull
 
 NEXT_TURN = "(SELECT COALESCE(MAX(turn), 0) + 1 FROM job)"
@@ -110,9 +110,9 @@ class Jobs:
             )
             return [row["run"] for row in rows]
 
-    def page(self, *, limit: int, offset: int, state: State | None = None) -> tuple[list[Job], int]:
-        """Return jobs, the latest first, and how many there are altogether."""
-        where, values = ("WHERE state = ?", (state,)) if state else ("", ())
+    def page(self, *, limit: int, offset: int, **which: Any) -> tuple[list[Job], int]:
+        """Return jobs, the latest first, and how many there are altogether; see `wanted`."""
+        where, values = wanted(**which)
         with self.transaction("BEGIN") as connection:
             (total,) = connection.execute(f"SELECT COUNT(*) FROM job {where}", values).fetchone()
             rows = connection.execute(

@@ -87,6 +87,7 @@ class Details:
             **_columns(job),
             parameters=study["parameters"],
             sweep=study["sweep"],
+            **{"note": "", "tags": [], "keep": "", **_own_words(study)},
             counts=counts,
             runs=[
                 StudyRun(
@@ -107,6 +108,10 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
         position, index = divmod(position, len(axis))
         values[name] = axis[index]
     return dict(reversed(values.items()))
+
+
+def _own_words(study: dict[str, Any]) -> dict[str, Any]:
+    return {name: study[name] for name in ("note", "tags", "keep") if name in study}
 
 
 def _columns(job: Job) -> dict[str, Any]:

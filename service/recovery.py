@@ -1,4 +1,4 @@
-"""The queue made anew from what the directory holds, when its file is gone or damaged."""
+"""The queue as the service starts: all studies of the directory; made anew where it is lost."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import shutil
 from collections.abc import Collection
 from pathlib import Path
 
-from service.errors import QueueLost
+from service.errors import NotFound, QueueLost
 from service.job import State, verdict
 from service.jobs import Jobs
 from studies import Store, Study
+from studies.definition.identity import is_id
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +28,9 @@ def open_queue(
     """
     try:
         if path.exists():
-            return Jobs(path, longest)
+            jobs = Jobs(path, longest)
+            _adopt(jobs, store)
+            return jobs
     except QueueLost as error:
         damaged = path.with_name(f"{path.name}.damaged")
         log.error("%s: kept as %s, and made anew from the studies", error, damaged.name)
@@ -45,6 +48,17 @@ def open_queue(
     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
     part.replace(path)  # at once: until then the queue is lost, not empty
     return Jobs(path, longest)
+
+
+def _adopt(jobs: Jobs, store: Store) -> None:
+    """Put studies into the queue that ``residua run`` has computed in this directory."""
+    for file in sorted(store.directory.glob("studies/*/study.json")):
+        study_id = file.parent.name
+        try:
+            jobs.get(study_id)
+        except NotFound:
+            if is_id(study_id) and store.outcomes(study_id):
+                _find(file, jobs, store)
 
 
 def _find(file: Path, jobs: Jobs, store: Store) -> None:

@@ -28,6 +28,7 @@ class StudyFilter(Window):
     """Which studies are asked for."""
 
     status: State | None = None
+    tag: str | None = Field(default=None, description="one of the tags of the study")
 
 
 class RunFilter(Window):
@@ -90,6 +91,9 @@ class StudyDetail(StudySummary):
 
     parameters: dict[str, Any]
     sweep: Axes
+    note: str = Field(description="what its author wrote of it")
+    tags: list[str]
+    keep: str = Field(description="``fields`` where the runs keep the fields at the nodes")
     counts: dict[str, int] = Field(description="runs by status")
     runs: list[StudyRun] = Field(description="a page of its runs")
 
@@ -105,6 +109,7 @@ class Run(BaseModel):
     scalars: dict[str, int | float | None] = Field(description="the figures of the run")
     created: str
     cpu_seconds: float | None
+    keep: str = Field(description="``fields`` where its file has the fields at the nodes")
 
 
 class StudyPage(BaseModel):

@@ -18,7 +18,12 @@ from service.errors import REFUSED
 from service.files import NETCDF, TAGS, UNCHANGED, netcdf
 from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
+from solver.results.export import vtu_of
+from studies import StudyError, open_netcdf
 from studies.storage.runfile import verify
+from studies.storage.ugrid import read
+
+VTU = "application/xml"
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
@@ -47,6 +52,23 @@ def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     """Return the data set of a run."""
     verify(store.run_path(run["id"]))
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
+
+
+@router.get("/{run_id}.vtu", responses={200: {"content": {VTU: {}}}, **REFUSED})
+def fetch_mesh(run: TheRun, store: TheStore, stage: str | None = None) -> Response:
+    """Return the fields at the nodes at a stage, the last one by default, as ParaView reads them.
+
+    The study must say `"keep": "fields"`.
+    """
+    path = store.run_path(run["id"])
+    verify(path)
+    with open_netcdf(path) as dataset:
+        fields = read(dataset)
+    if stage is not None and stage not in fields.stages:
+        raise StudyError("stage", stage, f"must be one of {', '.join(fields.stages)}")
+    content = vtu_of(fields, stage or list(fields.stages)[-1])
+    named = {"content-disposition": f'attachment; filename="{run["id"]}.vtu"'}
+    return Response(content, media_type=VTU, headers=named)
 
 
 @router.get("/{run_id:stem}")

@@ -83,7 +83,9 @@ async def submit(
 @router.get("")
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
-    page, total = jobs.page(limit=which.limit, offset=which.offset, state=which.status)
+    page, total = jobs.page(
+        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag
+    )
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 

@@ -1,7 +1,8 @@
-"""States as files of other programs: VTU for ParaView."""
+"""Fields at the nodes as files of other programs: VTU for ParaView."""
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -9,19 +10,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from solver.errors import ModelError
-from solver.results.nodal import nodal_fields
 from solver.tensors import COMPONENTS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import meshio
-    from numpy.typing import NDArray
 
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-
-    Array = NDArray[np.float64]
+    from solver.results.mesh_fields import MeshFields
 
 _CELLS = {
     "quad4": "quad",
@@ -33,22 +27,17 @@ _CELLS = {
 """Element -> cell of meshio. Corners, mid-sides and the middle have the same order in both."""
 
 
-def write_vtu(system: System, states: Mapping[str, Converged], folder: Path) -> Path:
-    """Write a .vtu for each stage and the .pvd that holds them together; return the latter.
-
-    All bodies are in one mesh, told apart by the cell field ``body`` (their number). Displacement
-    has three components for ParaView's *Warp By Vector*; the names of the components of stress are
-    in its own fields ``stress_xx`` and so on. Numbers are in N, mm, MPa.
-    """
+def write_vtu(fields: MeshFields, folder: Path) -> Path:
+    """Write a .vtu for each stage and the .pvd that holds them together; return the latter."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
+    except (FileExistsError, NotADirectoryError):
         raise ModelError("folder", str(folder), "must be a folder, or not exist yet") from None
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     stages = ElementTree.SubElement(root, "Collection")
-    for number, (name, at) in enumerate(states.items()):
+    for number, name in enumerate(fields.stages):
         file = folder / f"{number}-{''.join(c if c.isalnum() else '-' for c in name)}.vtu"
-        _mesh(system, at).write(file)
+        to_meshio(fields, name).write(file)
         ElementTree.SubElement(
             stages, "DataSet", timestep=repr(float(number)), name=name, file=file.name
         )
@@ -57,39 +46,32 @@ def write_vtu(system: System, states: Mapping[str, Converged], folder: Path) -> 
     return path
 
 
-def _mesh(system: System, at: Converged) -> meshio.Mesh:
+def vtu_of(fields: MeshFields, stage: str) -> bytes:
+    """Return the content of the .vtu of a stage."""
+    with tempfile.TemporaryDirectory() as folder:  # meshio writes to a path only
+        path = Path(folder) / "stage.vtu"
+        to_meshio(fields, stage).write(path)
+        return path.read_bytes()
+
+
+def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
+    """Return a stage as a mesh of meshio, all bodies in one.
+
+    The cell field ``body`` has their number. Displacement has three components for ParaView's
+    *Warp By Vector*; stress is in the fields ``stress_xx`` and so on. Numbers are in N, mm, MPa.
+    """
     import meshio  # only who writes needs it
 
-    points, cells, numbers, fields = [], [], [], []
-    first = 0
-    for number, name in enumerate(system.names):
-        whole = system.full(name)
-        points.append(np.pad(whole.X.T, ((0, 0), (0, 1))))
-        connected = _turned_left(whole.basis.element_dofs.T, whole.X)
-        cells.append((_CELLS[whole.body.element], first + connected))
-        numbers.append(np.full(len(connected), number))
-        fields.append(nodal_fields(system, name, at))
-        first += whole.X.shape[1]
-    together = {name: np.hstack([each[name] for each in fields]) for name in fields[0]}
-    moved, stress = together.pop("displacement"), together.pop("stress")
+    values = dict(fields.stages[stage])
+    moved, stress = values.pop("displacement"), values.pop("stress")
+    every = list(fields.bodies.values())
     return meshio.Mesh(
-        np.vstack(points),
-        cells,
+        np.pad(fields.X.T, ((0, 0), (0, 1))),
+        [(_CELLS[element], cells) for element, cells in every],
         point_data={
             "displacement": np.pad(moved.T, ((0, 0), (0, 1))),
-            **{f"stress_{c}": values for c, values in zip(COMPONENTS, stress, strict=True)},
-            **together,
+            **{f"stress_{c}": each for c, each in zip(COMPONENTS, stress, strict=True)},
+            **values,
         },
-        cell_data={"body": numbers},
+        cell_data={"body": [np.full(len(cells), k) for k, (_, cells) in enumerate(every)]},
     )
-
-
-def _turned_left(cells: NDArray[np.int64], X: Array) -> NDArray[np.int64]:
-    """Return the nodes of cells (n, k) counterclockwise, as VTK has them."""
-    corners = 4 if cells.shape[1] in (4, 8, 9) else 3
-    (x, y), ahead = X[:, cells[:, :corners]], np.roll(X[:, cells[:, :corners]], -1, axis=2)
-    right = (x * ahead[1] - y * ahead[0]).sum(axis=1) < 0
-    order = np.arange(cells.shape[1])
-    order[1:corners] = order[1:corners][::-1]
-    order[corners : 2 * corners] = order[corners : 2 * corners][::-1]
-    return np.where(right[:, None], cells[:, order], cells)

@@ -12,13 +12,12 @@ from solver.tensors import to_tensor, von_mises
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.contact.state import Converged
-    from solver.contact.system import System
+    from solver.results.samples import Bodies, Solved
 
     Array = NDArray[np.float64]
 
 
-def nodal_fields(system: System, body: str, at: Converged) -> dict[str, Array]:
+def nodal_fields(system: Bodies, body: str, at: Solved) -> dict[str, Array]:
     """Return fields at the nodes of a body, components first.
 
     They are displacement (2, n) [mm], stress (4, n) [MPa], von Mises stress (n,) [MPa] and

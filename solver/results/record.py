@@ -7,9 +7,11 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import numpy as np
+
+    from solver.results.mesh_fields import MeshFields
 
 
 class Status(Enum):
@@ -39,6 +41,8 @@ class Record:
     fields : variable name -> (dimension names, values); NaN outside the bodies
     scalars : variable name -> number, audit figures included
     symmetric : whether the bodies are one half of what is symmetric about x = 0
+    mesh : () -> fields at the nodes of the bodies, of a complete run; asked for before the next
+        run is computed
     """
 
     parameters: object
@@ -48,3 +52,4 @@ class Record:
     fields: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = field(default_factory=dict)
     scalars: Mapping[str, float] = field(default_factory=dict)
     symmetric: bool = False
+    mesh: Callable[[], MeshFields] | None = field(default=None, compare=False)

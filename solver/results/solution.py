@@ -21,6 +21,7 @@ from solver.loading.walker import Walker
 from solver.model.loads import InitialStress
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
+from solver.results.mesh_fields import MeshFields, mesh_fields
 from solver.results.places import Fields, Places
 from solver.results.samples import Nodal
 from solver.results.slave import Slave, on_slave
@@ -161,11 +162,16 @@ class Solution:
     def to_vtu(self, folder: str | Path) -> Path:
         """Write a .vtu for each stage into a folder, with fields at the nodes, for ParaView.
 
-        Returns the .pvd file that holds them together; see `solver.results.export.write_vtu`.
+        Returns the .pvd file that holds them together; see `solver.results.export.to_meshio` for
+        the names of the fields.
         """
         from solver.results.export import write_vtu
 
-        return write_vtu(self.system, self.stages, Path(folder))
+        return write_vtu(self.mesh_fields(), Path(folder))
+
+    def mesh_fields(self) -> MeshFields:
+        """Return the fields at the nodes of all bodies at all stages."""
+        return mesh_fields(self.system, self.stages)
 
     def audit(self, stage: str = "loaded") -> Audit:
         """Return the audit: figures of a state, violated conditions and warnings.

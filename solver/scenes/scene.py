@@ -15,6 +15,7 @@ from solver.loading.settling import Settling
 from solver.model.model import Model
 from solver.results.audit.figures import AUDIT
 from solver.results.look import Look, Output, Values
+from solver.results.mesh_fields import mesh_fields
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from solver.results.view import View
@@ -111,14 +112,16 @@ class Scene:
             messages = (*look.notes, str(look.outcome.error))
             return self._labelled(look, status, messages, cost)
         check = look.check()
+        states = {stage: look.outcome.points[stage] for stage in look.view.stages}
         own = self.warnings(look) if self.warnings else ()
         figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
-        return self._labelled(
+        found = self._labelled(
             look,
             Status.OK if check.passed else Status.AUDIT_FAILED,
             check.violations + look.notes + check.warnings + own,
             {**cost, **figures, **_merged(look, self.outputs)},
         )
+        return replace(found, mesh=partial(mesh_fields, look.system, states))
 
     def _labelled(
         self, look: Look, status: Status, messages: tuple[str, ...], values: Values

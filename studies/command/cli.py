@@ -99,6 +99,11 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     one.add_argument("--out", type=Path, required=True, metavar="PNG")
 
+    one = add("export", commands.export)
+    one.add_argument("path", type=Path, metavar="RUN|DIR")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument("--vtu", type=Path, required=True, metavar="FOLDER", help="where they go")
+
     one = add("compare", commands.compare)
     one.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="data set, study or DIR")
     one.add_argument("--reference", type=Path, metavar="CSV", help="published numbers of your own")

@@ -110,6 +110,25 @@ def plot(options: argparse.Namespace) -> int:
     return OK
 
 
+def export(options: argparse.Namespace) -> int:
+    """Write the fields at the nodes of a run, which its study keeps, as files for ParaView."""
+    from solver.errors import ModelError
+    from solver.results.export import write_vtu
+    from studies.storage.ugrid import read
+    from studies.views.reading import open_netcdf, run_file
+
+    with open_netcdf(run_file(options.path, _selection(options.select))) as run:
+        fields = read(run)
+    try:
+        print(f"wrote {write_vtu(fields, options.vtu)}")
+    except ModelError as error:
+        raise StudyError("--vtu", str(options.vtu), error.allowed) from None
+    except OSError as error:
+        allowed = f"cannot be written: {error.strerror}"
+        raise StudyError("--vtu", str(options.vtu), allowed) from None
+    return OK
+
+
 def compare(options: argparse.Namespace) -> int:
     """Set computed residual stress beside published numbers."""
     from studies.views.comparison.compare import compare as compared_with

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -22,6 +22,7 @@ from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
 from studies.definition.identity import content_id
+from studies.definition.labels import checked_labels
 from studies.definition.parameters import parameters_of
 from studies.definition.sweep import (
     Axes,
@@ -47,6 +48,8 @@ class Study(BaseModel):
     parameters : fixed parameters; the rest are the scene's defaults
     sweep : axes: lists of values by parameter, and linked axes, which have names of their own
         and set several parameters by label; see `checked_axes` for their order
+    note, tags : words of the user's own, shown with the study; studies can be found by a tag
+    keep : ``fields`` keeps the fields at all nodes in the file of each run
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -55,6 +58,9 @@ class Study(BaseModel):
     scene: str
     parameters: dict[str, Any] = Field(default_factory=dict)
     sweep: Axes = Field(default_factory=dict)
+    note: str = ""
+    tags: list[str] = Field(default_factory=list)
+    keep: Literal["", "fields"] = ""
     _problem: Scene = PrivateAttr()
 
     @classmethod
@@ -138,7 +144,9 @@ class Study(BaseModel):
         parameters = {
             key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
         }
-        return {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
+        labels = checked_labels(content)
+        own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
+        return own | labels
 
     def model_post_init(self, context: Any) -> None:
         """Keep the scene that was found."""
@@ -159,7 +167,8 @@ class Study(BaseModel):
         """Content id of the study.
 
         The name counts, because it is the title of what the study writes: a copy under
-        another name is another data set. That costs nothing, since the two share every run.
+        another name is another data set. That costs nothing, since the two share every run. So do
+        note, tags and what is kept, where there are any.
         The order of values counts, and so does that of labels.
         """
         axes = {
@@ -167,7 +176,9 @@ class Study(BaseModel):
             for name, axis in self.sweep.items()
         }
         source = self.expansion.source
-        return content_id("study", self.name, self.scene, self.fixed, axes, source)
+        labels = checked_labels(self.model_dump(include={"note", "tags", "keep"}))
+        beside = [labels] if labels else []
+        return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
     def fixed(self) -> dict[str, Any]:
@@ -211,4 +222,6 @@ class Study(BaseModel):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""
-        return self.model_dump()
+        return self.model_dump(exclude_defaults=True) | self.model_dump(
+            include={"parameters", "sweep"}
+        )

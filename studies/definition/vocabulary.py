@@ -16,6 +16,11 @@ OK = STATUSES[Status.OK.code]
 ERROR = "error"
 MISSING = "missing"
 
+KEEP = "keep"
+"""Attribute of a run's file, and entry of a study: what is kept beyond the scene's results."""
+FIELDS = "fields"
+"""Its value for the fields at the nodes of the bodies."""
+
 SYMMETRIC = "symmetric"
 """Attribute of a file: 1 where the bodies are one half of what is symmetric about x = 0, else 0."""
 

@@ -156,7 +156,7 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
         ids = (case.id for path in batch for case in path.cases)
-        done = store.catalogue.having(OK, ids)
+        done = store.catalogue.having(OK, ids, study.keep)
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing

@@ -16,7 +16,7 @@ from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
-from studies.definition.vocabulary import OK
+from studies.definition.vocabulary import KEEP, OK
 from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
@@ -157,7 +157,9 @@ def run_study(
         while some := list(islice(ids, _BATCH)):
             wanted.update(some)
             for run_id, row in store.sound(some).items():
-                if row["status"] == OK or (resume and row["modified"] >= since):
+                ok = row["status"] == OK
+                kept = study.keep in ("", row[KEEP])
+                if (ok and kept) or (not ok and resume and row["modified"] >= since):
                     wanted.discard(run_id)
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
@@ -237,7 +239,7 @@ class _Work:
             if path.cases:
                 self._walking[path.id] = (len(path.cases), 0.0)
                 stale = self.store.modified(case.id for case in path.cases)
-                yield PathTask(scene, path, directory, solver_hash(), proof, stale)
+                yield PathTask(scene, path, directory, solver_hash(), self.study.keep, proof, stale)
 
     def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)

@@ -39,6 +39,7 @@ class PathTask:
     directory : of the store
     source : `solver_hash` of the process that started the study; a worker whose own differs
         refuses the task, and the study waits for another one
+    keep : what is kept beyond the results of the scene
     proof : that the worker sees the directory; None where this is known
     stale : by id, the time of change [ns] of the files that the study replaces; a file that has
         another one was written by a worker that died on this task, and is kept
@@ -48,6 +49,7 @@ class PathTask:
     path: LoadingPath
     directory: Path
     source: str
+    keep: str = ""
     proof: Proof | None = None
     stale: Mapping[str, int] = field(default_factory=dict)
 
@@ -117,7 +119,7 @@ def walk(
             monitor(0.0)
             for record in task.scene.path(task.path.parameters, list(owed), monitor):
                 value = getattr(record.parameters, branch, None)
-                row = _written(store, task.scene, owed[value], record)
+                row = _written(store, task, owed[value], record)
                 del owed[value]
                 keep(row)
     except StopAsked:
@@ -130,14 +132,14 @@ def walk(
         keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
 
 
-def _written(store: Store, scene: Scene, case: Case, record: Record) -> dict[str, Any]:
+def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:
     """Write the run a record tells of, as broken when the record cannot be written."""
     try:
-        return store.write_run(layout.run_dataset(scene, case, record))
+        return store.write_run(layout.run_dataset(task.scene, case, record, task.keep))
     except (StoreFull, StudyError):
         raise
     except Exception as error:
-        return store.write_run(layout.broken_dataset(scene, case, _reason(error)))
+        return store.write_run(layout.broken_dataset(task.scene, case, _reason(error)))
 
 
 def _reason(error: Exception) -> str:

@@ -22,7 +22,7 @@ from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
 
 _COLUMNS = (
     "id", "scene", "status", "message", "parameters", "scalars", "path", "created",
-    "cpu_seconds", "solver_source", "size", "modified",
+    "cpu_seconds", "solver_source", "keep", "size", "modified",
 )  # fmt: skip
 _ALL = ", ".join((*_COLUMNS, "checksum"))
 _JSON = ("parameters", "scalars")
@@ -32,8 +32,8 @@ _WAIT = 30.0
 _TABLE = """runs (
     id TEXT PRIMARY KEY, scene TEXT NOT NULL, status TEXT NOT NULL, message TEXT NOT NULL,
     parameters TEXT NOT NULL, scalars TEXT NOT NULL, path TEXT NOT NULL, created TEXT NOT NULL,
-    cpu_seconds REAL, solver_source TEXT NOT NULL, size INTEGER, modified INTEGER,
-    checksum INTEGER NOT NULL
+    cpu_seconds REAL, solver_source TEXT NOT NULL, keep TEXT NOT NULL, size INTEGER,
+    modified INTEGER, checksum INTEGER NOT NULL
 )"""
 _INDICES = {"runs_by_time": "created, id", "runs_by_scene": "scene, status"}
 
@@ -110,13 +110,14 @@ class Catalogue:
             )
             return dict(found.fetchall())
 
-    def having(self, status: str, run_ids: Iterable[str]) -> set[str]:
-        """Return those of `run_ids` that have this status."""
+    def having(self, status: str, run_ids: Iterable[str], keep: str = "") -> set[str]:
+        """Return those of `run_ids` that have this status, and keep what is to be kept."""
         wanted = json.dumps(list(run_ids))
         with self._reading() as connection:
             found = connection.execute(
-                "SELECT id FROM runs WHERE id IN (SELECT value FROM json_each(?)) AND status = ?",
-                [wanted, status],
+                "SELECT id FROM runs WHERE id IN (SELECT value FROM json_each(?)) AND status = ? "
+                "AND ? IN ('', keep)",
+                [wanted, status, keep],
             )
             return {row[0] for row in found}
 

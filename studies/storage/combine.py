@@ -66,7 +66,7 @@ def _combined(
             ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    told = provenance(study.name, scene, study.fixed) | together(ran)
+    told = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
     store.clear_directory(target)
     with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
         with h5netcdf.File(disk, "w") as file:
@@ -89,6 +89,12 @@ def _combined(
         missing=missing,
         anew=True,
     )
+
+
+def _words(study: Study) -> dict[str, str]:
+    """Return the study's own words as attributes, where it has any."""
+    words = {"note": study.note, "tags": " ".join(study.tags)}
+    return {name: text for name, text in words.items() if text}
 
 
 def _axes(study: Study, scene: Scene) -> dict[str, list[Any]]:

@@ -13,7 +13,8 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import USUAL_AXES, Case
 from studies.definition.parameters import completed, parameters_of
-from studies.definition.vocabulary import ERROR, LABEL_ATTRIBUTES, STATUSES, SYMMETRIC
+from studies.definition.vocabulary import ERROR, KEEP, LABEL_ATTRIBUTES, STATUSES, SYMMETRIC
+from studies.storage import ugrid
 from studies.storage.provenance import provenance
 
 if TYPE_CHECKING:
@@ -46,8 +47,12 @@ def usual_dimensions(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in USUAL_AXES if name in known)
 
 
-def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
-    """Return the data set of a run; it does not depend on the study that asked for it."""
+def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.Dataset:
+    """Return the data set of a run.
+
+    Of the study that asked for it nothing is in it but what it wants kept: with ``keep`` the fields
+    at the nodes, where the run is complete.
+    """
     sweep = usual_dimensions(scene)
     ones = (1,) * len(sweep)
     status = STATUSES[record.status.code]
@@ -63,6 +68,9 @@ def run_dataset(scene: Scene, case: Case, record: Record) -> xr.Dataset:
     for name, number in record.scalars.items():
         variables[name] = sweep, _scalar(name, number).reshape(ones), attributes_of(name, scene)
     frame = _frame(scene, case, sweep, status, record.message)
+    if keep and record.mesh is not None:
+        variables |= ugrid.variables(record.mesh())
+        frame = frame.assign_attrs({KEEP: keep})
     return frame.assign(variables).assign_attrs({SYMMETRIC: int(record.symmetric)})
 
 
@@ -87,7 +95,11 @@ def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
 def singles(run: xr.Dataset) -> dict[str, Any]:
     """Return the variables of a run that have one value."""
     rank = run["status"].ndim
-    return {str(name): each.item() for name, each in run.data_vars.items() if each.ndim == rank}
+    return {
+        str(name): each.item()
+        for name, each in run.data_vars.items()
+        if each.ndim == rank and not ugrid.owns(str(name), each.dims)
+    }
 
 
 def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -114,6 +126,7 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
         "created": attributes["created"],
         "cpu_seconds": scalars.get("cpu_seconds"),
         "solver_source": attributes["solver_source"],
+        KEEP: attributes.get(KEEP, ""),
     }
 
 

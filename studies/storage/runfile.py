@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from studies.errors import RunUnreadable, StoreFull
 from studies.storage import dataset as layout
+from studies.storage import ugrid
 
 if TYPE_CHECKING:
     import h5py
@@ -32,7 +33,8 @@ _DIGEST = 65
 _FIRST_BYTES = 1 << 16
 """Size with which a file in memory begins; it grows."""
 _ORDER = "variables"
-"""Attribute with the names of the variables in their order, which netCDF loses in memory."""
+"""Attribute with the names of the variables in their order, which netCDF loses in memory; without
+those of the mesh."""
 _NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
 
 
@@ -52,7 +54,8 @@ def _packed(run: xr.Dataset) -> bytes:
     for name, variable in run.variables.items():
         if variable.ndim and variable.dtype.kind in "fi":
             stored.setdefault(str(name), {})["fletcher32"] = True
-    order = {_ORDER: " ".join(map(str, run.variables))}
+    combined = (n for n, each in run.variables.items() if not ugrid.owns(str(n), each.dims))
+    order = {_ORDER: " ".join(map(str, combined))}
     with NETCDF4_PYTHON_LOCK:
         file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
         try:
@@ -117,7 +120,7 @@ def global_attributes(run: h5py.File) -> dict[str, Any]:
 
 
 def variables(run: h5py.File) -> list[str]:
-    """Return the names of the variables in the order in which they were given."""
+    """Return the names of the variables in the order in which they were given, the mesh's not."""
     return _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else list(run)
 
 

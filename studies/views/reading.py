@@ -37,6 +37,11 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
     """
     if isinstance(path, str) and path.startswith(("http://", "https://")):
         return _fetched(path)
+    return open_netcdf(find_study(path, name))
+
+
+def find_study(path: Path | str, name: str | None = None) -> Path:
+    """Return the data set that `open_study` opens."""
     found = find_datasets(path)
     names = {each: _name(each) for each in found}
     known = ", ".join(sorted(set(names.values())))
@@ -46,7 +51,7 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
             raise StudyError("name", name, f"must be one of {known}")
     elif len(set(names.values())) > 1:
         raise StudyError("path", str(path), f"holds several studies; give the name of one: {known}")
-    return open_netcdf(max(found, key=lambda each: each.stat().st_mtime))
+    return max(found, key=lambda each: each.stat().st_mtime)
 
 
 def _fetched(url: str) -> xr.Dataset:
@@ -213,6 +218,26 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
         ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
     )
     return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
+
+
+def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
+    """Return the file of a run: `path` itself, or that of the run `one_run` takes of a study.
+
+    Raises
+    ------
+    StudyError
+        when there is no such run
+    """
+    found = find_study(path)
+    beside = found.with_name("study.json")
+    if found.name != "dataset.nc" or not beside.is_file():
+        return found
+    store = Store(found.resolve().parents[2])
+    study = Study.known(json.loads(beside.read_text(encoding="utf-8")), store.scene)
+    with open_netcdf(found) as dataset:
+        run = one_run(dataset, selection)
+        index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
+    return store.run_path(next(case.id for case in study.cases() if case.index == index))
 
 
 def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:

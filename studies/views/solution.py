@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from solver.results.nodal import nodal_fields
 from solver.tensors import COMPONENTS
 
 if TYPE_CHECKING:
@@ -28,28 +27,21 @@ def to_xarray(solution: Solution) -> xr.Dataset:
     Variables: ``displacement`` (stage, axis, node) [mm], ``stress`` (stage, component, node) [MPa],
     ``von_mises`` [MPa] and ``plastic_strain`` (stage, node).
     """
-    names = list(solution.system.names)
-    x, y = np.hstack([solution.nodes(name) for name in names])
+    fields = solution.mesh_fields()
+    names = list(fields.bodies)
     of = np.repeat(names, [solution.nodes(name).shape[1] for name in names])
-    found = [
-        [nodal_fields(solution.system, name, at) for name in names]
-        for at in solution.stages.values()
-    ]
+    stages = fields.stages.values()
     return xr.Dataset(
         {
-            name: (
-                ("stage", *own),
-                np.stack([np.concatenate([b[name] for b in at], axis=-1) for at in found]),
-                {"units": _UNITS[name]},
-            )
+            name: (("stage", *own), np.stack([at[name] for at in stages]), {"units": _UNITS[name]})
             for name, own in _DIMS.items()
         },
         coords={
-            "stage": list(solution.stages),
+            "stage": list(fields.stages),
             "axis": ["x", "y"],
             "component": list(COMPONENTS),
             "body": ("node", of),
-            "x": ("node", x, {"units": "mm"}),
-            "y": ("node", y, {"units": "mm"}),
+            "x": ("node", fields.X[0], {"units": "mm"}),
+            "y": ("node", fields.X[1], {"units": "mm"}),
         },
     )

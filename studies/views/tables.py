@@ -14,6 +14,7 @@ import xarray as xr
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.vocabulary import OK, STATUSES
 from studies.scenes.registry import beside, known_scenes, scene_named
+from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked
 from studies.views.reading import flags, sweep_axes, sweep_coordinates
 
@@ -114,7 +115,9 @@ def run_details(dataset: xr.Dataset) -> str:
     lines += [
         [str(name), f"{_figure(each)} {_unit(each)}".rstrip()]
         for name, each in dataset.data_vars.items()
-        if each.ndim == rank and name not in {"status", "message"}
+        if each.ndim == rank
+        and name not in {"status", "message"}
+        and not owns(str(name), each.dims)
     ]
     return aligned(lines)
 

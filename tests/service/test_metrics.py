@@ -46,7 +46,14 @@ def test_queue_and_runs_are_counted(client: TestClient) -> None:
     client.delete(client.post("/studies", json=STUDY | {"name": "c"}).headers["location"])
     store: Store = client.app.state.store
     row = {"id": "0" * 32, "scene": "punch", "status": "ok", "message": "", "parameters": {}}
-    row |= {"scalars": {}, "path": "", "created": "", "cpu_seconds": 1.0, "solver_source": ""}
+    row |= {
+        "scalars": {},
+        "path": "",
+        "created": "",
+        "cpu_seconds": 1.0,
+        "solver_source": "",
+        "keep": "",
+    }
     store.catalogue.put([row])
     found = figures(client)
     assert found[named("residua_studies", status="accepted")] == 2

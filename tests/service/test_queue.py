@@ -10,6 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
 from service.errors import Busy, Conflict, NotFound, QueueLost
@@ -18,6 +20,7 @@ from service.jobs import Jobs
 from service.lock import DirectoryInUse, lock_directory
 from service.recovery import open_queue
 from studies import Store, Study, StudyError
+from studies.definition.vocabulary import STATUSES
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
 
@@ -165,6 +168,9 @@ def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
     assert (tmp_path / "jobs.sqlite.damaged").read_bytes() == content
 
 
+STEPS = {"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}}
+
+
 @pytest.mark.parametrize("damage", ["deleted", "overwritten", "emptied", "directory"])
 def test_a_queue_that_is_lost_is_made_anew(tmp_path: Path, damage: str) -> None:
     path = tmp_path / "jobs.sqlite"
@@ -182,6 +188,25 @@ def test_a_queue_that_is_lost_is_made_anew(tmp_path: Path, damage: str) -> None:
     (job,), _ = open_queue(path, store, None).page(limit=9, offset=0)
     assert (job.id, job.state) == (study.id, State.ACCEPTED)
     assert (tmp_path / "jobs.sqlite.damaged").exists() == (damage != "deleted")
+
+
+def test_a_study_computed_without_the_service_is_found_when_it_starts(tmp_path: Path) -> None:
+    path, store = tmp_path / "jobs.sqlite", Store(tmp_path)
+    known = Study.from_dict(STEPS)
+    Jobs(path).accept(known.id, known.to_dict(), known.run_ids())
+    ended = Study.from_dict(STEPS | {"name": "by-hand", "tags": ["own"]})
+    begun = Study.from_dict(STEPS | {"name": "begun"})
+    for study in (known, ended, begun):
+        store.save_study(study)
+    with h5py.File(store.dataset_path(ended.id), "w") as file:
+        file["status"] = np.array([STATUSES.index("ok")])
+    for _ in range(2):
+        jobs, total = open_queue(path, store, None).page(limit=9, offset=0)
+        assert total == 2
+        states = {job.id: job.state for job in jobs}
+        assert states == {known.id: State.ACCEPTED, ended.id: State.SUCCESSFUL}
+    (job,), _ = open_queue(path, store, None).page(limit=9, offset=0, tag="own")
+    assert job.name == "by-hand"
 
 
 def test_in_a_queue_made_anew_what_is_computed_is_running(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
@@ -74,6 +75,36 @@ def test_a_study_of_a_posted_scene_has_the_ids_and_numbers_of_the_file(
     assert [run["id"] for run in found["items"]] == [done["runs"][1]["id"]]
     picture = service.client.get(f"/runs/{done['runs'][0]['id']}/map.png")
     assert picture.status_code == 200, picture.text
+
+
+def test_a_run_that_keeps_its_fields_is_sent_for_paraview(
+    service: Server, pin: str, tmp_path: Path
+) -> None:
+    study = {"name": "kept", "scene": pin, "keep": "fields", "sweep": {"clearance": [0.05]}}
+    (run,) = service.finished(service.post(study))["runs"]
+    assert service.client.get(f"/runs/{run['id']}").json()["keep"] == "fields"
+    stages = {}
+    for stage in ("loaded", "unloaded"):
+        answer = service.client.get(f"/runs/{run['id']}.vtu", params={"stage": stage})
+        assert answer.status_code == 200, answer.text
+        (tmp_path / "run.vtu").write_bytes(answer.content)
+        stages[stage] = meshio.read(tmp_path / "run.vtu")
+    assert stages["loaded"].point_data["stress_yy"].min() < -100.0
+    assert abs(stages["unloaded"].point_data["stress_yy"]).max() < 1.0  # all was elastic
+    last = service.client.get(f"/runs/{run['id']}.vtu").content
+    assert last == answer.content
+    refused = service.client.get(f"/runs/{run['id']}.vtu", params={"stage": "later"})
+    assert refused.status_code == 422
+    assert "must be one of loaded, unloaded" in refused.text
+
+
+def test_a_run_without_fields_says_how_to_keep_them(service: Server, pin: str) -> None:
+    study = {"name": "bare", "scene": pin, "sweep": {"clearance": [0.03]}}
+    (run,) = service.finished(service.post(study))["runs"]
+    assert service.client.get(f"/runs/{run['id']}").json()["keep"] == ""
+    refused = service.client.get(f"/runs/{run['id']}.vtu")
+    assert refused.status_code == 422
+    assert "keeps no fields" in refused.text
 
 
 def test_all_mistakes_are_in_the_answer(service: Server) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -231,3 +232,18 @@ def test_a_linked_axis_is_answered_by_its_labels(service: Server, tmp_path: Path
         assert together["hardening"].dims == ("case",)
     study["sweep"]["case"] = dict(reversed(study["sweep"]["case"].items()))
     assert service.post(study) != found["id"], "the order of labels is that of the data set"
+
+
+def test_studies_are_found_by_a_tag(service: Server) -> None:
+    own = {"note": "of the day", "tags": ["today", "rail"]}
+    told = service.post(fake_study("tagged") | own)
+    service.post(fake_study("untagged"))
+    found = service.client.get("/studies", params={"tag": "rail"}).json()
+    assert [each["id"] for each in found["items"]] == [told]
+    assert found["total"] == 1
+    detail = service.finished(told)
+    assert (detail["note"], detail["tags"], detail["keep"]) == (*own.values(), "")
+    assert service.client.get("/studies", params={"tag": "road"}).json()["total"] == 0
+    whole = io.BytesIO(service.client.get(f"/studies/{told}/dataset.nc").content)
+    attributes = xr.load_dataset(whole, engine="h5netcdf").attrs
+    assert (attributes["note"], attributes["tags"]) == ("of the day", "today rail")

@@ -23,8 +23,8 @@ connection = sqlite3.connect(sys.argv[1])
 connection.execute("PRAGMA cache_size = 1")
 connection.execute("BEGIN")
 for number in range(1000):
-    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, "", 0, 0, 0]
-    connection.execute(f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 13)})", row)
+    row = [str(number), "fake", "ok", "x" * 500, "{}", "{}", "", "", 0.0, "", "", 0, 0, 0]
+    connection.execute(f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 14)})", row)
 os.kill(os.getpid(), 9)
 """
 """Fills so many pages that some reach the file before the transaction has ended."""
@@ -34,7 +34,7 @@ def row(run_id: str) -> dict[str, Any]:
     return {
         "id": run_id, "scene": "fake", "status": "ok", "message": "", "parameters": {},
         "scalars": {"increments": 7}, "path": "", "created": "", "cpu_seconds": 0.0,
-        "solver_source": "", "size": 1, "modified": 2,
+        "solver_source": "", "keep": "", "size": 1, "modified": 2,
     }  # fmt: skip
 
 

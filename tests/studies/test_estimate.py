@@ -31,6 +31,7 @@ def remember(store: Store, ids: list[str], figures: list[tuple[int, int, float]]
             "id": run_id, "scene": "punch", "status": "ok", "message": "", "parameters": {},
             "scalars": dict(zip(names, each, strict=True)), "path": f"runs/{run_id}.nc",
             "created": "2026-01-01T00:00:00+00:00", "cpu_seconds": each[2], "solver_source": "",
+            "keep": "",
         }
         for run_id, each in zip(ids, figures, strict=True)
     ]  # fmt: skip

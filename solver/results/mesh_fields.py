@@ -1,0 +1,97 @@
+"""Fields of all bodies at the nodes of their meshes: what other programs draw and evaluate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from solver.results.samples import Bodies, Solved
+
+    Array = NDArray[np.float64]
+    Nodes = NDArray[np.int64]
+
+NO_NODE = -1
+"""Fills the rows of faces and cells that have fewer nodes than others."""
+
+_FACES: Mapping[str, tuple[tuple[int, ...], ...]] = {
+    "quad4": ((0, 1, 2, 3),),
+    "quad8": ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
+    "quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+    "tri3": ((0, 1, 2),),
+    "tri6": ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
+}
+"""Element -> triangles and quadrilaterals that use each of its nodes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshFields:
+    """Fields at the nodes of all bodies, body after body, in N, mm, MPa.
+
+    Attributes
+    ----------
+    X : positions of the nodes before loading (2, n_nodes)
+    bodies : body -> its element, the nodes of its cells (n_cells, k) counterclockwise: corners,
+        mid-sides, middle
+    stages : stage -> displacement (2, n_nodes), stress (4, n_nodes) with components xx, yy, zz,
+        xy, von_mises (n_nodes,) and plastic_strain (n_nodes,)
+    """
+
+    X: Array
+    bodies: Mapping[str, tuple[str, Nodes]]
+    stages: Mapping[str, Mapping[str, Array]]
+
+    @property
+    def faces(self) -> tuple[Nodes, Nodes]:
+        """Triangles and quadrilaterals through all nodes, and the number of the body of each.
+
+        Elements with nodes between their corners are divided. A triangle ends with `NO_NODE`.
+        """
+        faces, numbers = [], []
+        for number, (element, cells) in enumerate(self.bodies.values()):
+            for corners in _FACES[element]:
+                nodes = cells[:, corners]
+                lacking = ((0, 0), (0, 4 - len(corners)))
+                faces.append(np.pad(nodes, lacking, constant_values=NO_NODE))
+                numbers.append(np.full(len(nodes), number))
+        return np.vstack(faces), np.concatenate(numbers)
+
+
+def mesh_fields(system: Bodies, states: Mapping[str, Solved]) -> MeshFields:
+    """Return the fields of all bodies in the given states.
+
+    Parameters
+    ----------
+    states : the state at each stage
+    """
+    from solver.results.nodal import nodal_fields  # only who computes needs scipy
+
+    wholes = {name: system.full(name) for name in system.names}
+    bodies, first = {}, 0
+    for name, whole in wholes.items():
+        cells = _turned_left(whole.basis.element_dofs.T, whole.X)
+        bodies[name] = (whole.body.element, first + cells)
+        first += whole.X.shape[1]
+    stages = {}
+    for stage, at in states.items():
+        each = [nodal_fields(system, name, at) for name in wholes]
+        stages[stage] = {name: np.concatenate([f[name] for f in each], axis=-1) for name in each[0]}
+    X = np.hstack([whole.X for whole in wholes.values()])
+    return MeshFields(X=X, bodies=bodies, stages=stages)
+
+
+def _turned_left(cells: Nodes, X: Array) -> Nodes:
+    """Return the nodes of cells (n, k) counterclockwise, as other programs have them."""
+    corners = 4 if cells.shape[1] in (4, 8, 9) else 3
+    (x, y), ahead = X[:, cells[:, :corners]], np.roll(X[:, cells[:, :corners]], -1, axis=2)
+    right = (x * ahead[1] - y * ahead[0]).sum(axis=1) < 0
+    order = np.arange(cells.shape[1])
+    order[1:corners] = order[1:corners][::-1]
+    order[corners : 2 * corners] = order[corners : 2 * corners][::-1]
+    return np.where(right[:, None], cells[:, order], cells)

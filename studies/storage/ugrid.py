@@ -1,0 +1,153 @@
+"""Fields at the nodes of a run in its netCDF file, as the UGRID conventions have them.
+
+xugrid opens the file, and so does ParaView's reader for UGRID, which takes a dimension ``time`` and
+faces with three or four nodes: elements with nodes between their corners are divided into such
+faces, and stages stand for time. ``mesh_cell_nodes`` has the elements themselves.
+
+https://ugrid-conventions.github.io/ugrid-conventions/, version 1.0.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.results.mesh_fields import NO_NODE, MeshFields
+from solver.tensors import COMPONENTS
+from studies.definition.vocabulary import FIELDS, KEEP
+from studies.errors import StudyError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_MESH = "mesh"
+_TIME, _NODE, _FACE, _CELL = "time", "mesh_node", "mesh_face", "mesh_cell"
+_AXES = ("x", "y")
+
+
+def variables(fields: MeshFields) -> dict[str, Any]:
+    """Return the variables that a run's data set gets: dimensions, values, attributes."""
+    faces, of = fields.faces
+    every = list(fields.bodies.items())
+    widest = max(cells.shape[1] for _, (_, cells) in every)
+    cells = np.vstack([
+        np.pad(c, ((0, 0), (0, widest - c.shape[1])), constant_values=NO_NODE)
+        for _, (_, c) in every
+    ])  # fmt: skip
+    elements = {name: element for name, (element, _) in every}
+    counts = [len(c) for _, (_, c) in every]
+    flags = {
+        "flag_values": np.arange(len(every), dtype=np.int32),
+        "flag_meanings": " ".join(name.replace(" ", "_") for name in elements),
+    }
+    topology = {
+        "cf_role": "mesh_topology",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "mesh_node_x mesh_node_y",
+        "face_node_connectivity": "mesh_face_nodes",
+        "face_dimension": _FACE,
+        "long_name": "faces through all nodes of the bodies",
+    }
+    corners = {
+        "cf_role": "face_node_connectivity",
+        "start_index": np.int32(0),
+        "long_name": "nodes of a face, counterclockwise",
+    }
+    on_face = {"mesh": _MESH, "location": "face", "long_name": "body", **flags}
+    on_cell = {"long_name": "body", **flags, "elements": json.dumps(elements)}
+    out: dict[str, Any] = {
+        _MESH: ((), np.int32(0), topology),
+        "mesh_face_nodes": ((_FACE, "mesh_corner"), _whole(faces), corners),
+        "mesh_body": (_FACE, _whole(of), on_face),
+        "mesh_cell_nodes": (
+            (_CELL, "mesh_cell_node"),
+            _whole(cells),
+            {"start_index": np.int32(0), "long_name": "nodes of an element: corners, mid-sides"},
+        ),
+        "mesh_cell_body": (_CELL, _whole(np.repeat(np.arange(len(every)), counts)), on_cell),
+        _TIME: (
+            _TIME,
+            np.arange(len(fields.stages), dtype=float),
+            {"long_name": "number of the stage"},
+        ),
+        "mesh_stage": (_TIME, np.array(list(fields.stages), dtype=object), {"long_name": "stage"}),
+    }
+    for axis, values in zip(_AXES, fields.X, strict=True):
+        words = {"long_name": f"position of the node along {axis}", "units": "mm"}
+        out[f"mesh_node_{axis}"] = (_NODE, values, words)
+    for name, values in _parts(fields).items():
+        words = {"long_name": name.replace("_", " "), "units": _unit(name)}
+        out[f"mesh_{name}"] = ((_TIME, _NODE), values, words | {"mesh": _MESH, "location": "node"})
+    return out
+
+
+def owns(name: str, dims: Iterable[Hashable]) -> bool:
+    """Tell whether a variable of a run's file is one of the mesh: no study combines these."""
+    return name == _MESH or not {_TIME, _NODE, _FACE, _CELL}.isdisjoint(dims)
+
+
+def read(run: xr.Dataset) -> MeshFields:
+    """Return the fields that the data set of a run keeps.
+
+    Raises
+    ------
+    StudyError
+        where it keeps none
+    """
+    if run.attrs.get(KEEP) != FIELDS or _MESH not in run.variables:
+        allowed = 'keeps no fields: its study must say keep = "fields", and the run must succeed'
+        raise StudyError("run", run.attrs.get("id", ""), allowed)
+    cells, of = (_nodes(run[name]) for name in ("mesh_cell_nodes", "mesh_cell_body"))
+    elements = json.loads(run["mesh_cell_body"].attrs["elements"])
+    bodies = {}
+    for number, (name, element) in enumerate(elements.items()):
+        own = cells[of == number]
+        bodies[name] = (element, own[:, (own != NO_NODE).all(axis=0)])
+    stages = [
+        {
+            "displacement": np.stack([_at(run, f"displacement_{a}", k) for a in _AXES]),
+            "stress": np.stack([_at(run, f"stress_{c}", k) for c in COMPONENTS]),
+            "von_mises": _at(run, "von_mises", k),
+            "plastic_strain": _at(run, "plastic_strain", k),
+        }
+        for k in range(run.sizes[_TIME])
+    ]
+    names = [str(name) for name in run["mesh_stage"].to_numpy()]
+    X = np.stack([run[f"mesh_node_{a}"].to_numpy() for a in _AXES])
+    return MeshFields(X=X, bodies=bodies, stages=dict(zip(names, stages, strict=True)))
+
+
+def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
+    """Return fields of one component each over stages and nodes, as ParaView's reader has them."""
+    stacked = {
+        name: np.stack([at[name] for at in fields.stages.values()])
+        for name in next(iter(fields.stages.values()))
+    }
+    moved, stress = stacked.pop("displacement"), stacked.pop("stress")
+    return {
+        **{f"displacement_{a}": moved[:, k] for k, a in enumerate(_AXES)},
+        **{f"stress_{c}": stress[:, k] for k, c in enumerate(COMPONENTS)},
+        **stacked,
+    }
+
+
+def _unit(name: str) -> str:
+    if name.startswith("displacement"):
+        return "mm"
+    return "1" if name == "plastic_strain" else "MPa"
+
+
+def _whole(values: np.ndarray) -> np.ndarray:
+    return values.astype(np.int32)
+
+
+def _nodes(variable: xr.DataArray) -> np.ndarray:
+    """Return numbers of nodes; a reader has made those that are absent NaN."""
+    return np.nan_to_num(variable.to_numpy(), nan=NO_NODE).astype(np.int64)
+
+
+def _at(run: xr.Dataset, name: str, stage: int) -> np.ndarray:
+    return run[f"mesh_{name}"].isel({_TIME: stage}).to_numpy()

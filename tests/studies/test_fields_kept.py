@@ -1,0 +1,176 @@
+"""Runs that keep the fields at their nodes: UGRID in the file of the run, VTU for ParaView."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver import Body, ContactPair, Material, Model, Solution, solve
+from solver.mesh import grid
+from studies import Store, Study, StudyError, run_study
+from studies.command.cli import main
+from studies.scenes.scene import read_scene
+from studies.storage import ugrid
+from studies.views.reading import open_netcdf
+
+PIN = read_scene(Path(__file__).parents[2] / "data/scenes/pin.toml")
+CONTENT: dict[str, Any] = {
+    "name": "pins", "parameters": {"clearance": 0.02}, "sweep": {"load_ratio": [0.2, 0.5]},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pressed() -> Solution:
+    """Two blocks with different elements, pressed together."""
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+    x = np.linspace(0.0, 2.0, 3)
+    upper = Body(name="upper", mesh=grid(x, x, "tri"), material=steel, element="tri6",
+                 supports={"left": "x"}, pressure={"top": 200.0})  # fmt: skip
+    lower = Body(name="lower", mesh=grid(2 * x, x - 2), material=steel, element="quad8",
+                 supports={"left": "x", "bottom": "y"})  # fmt: skip
+    pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"))
+    return solve(Model(bodies=(upper, lower), contacts=(pair,)))
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Store]:
+    """A study that keeps fields, computed where its runs had been computed without them."""
+    store = Store(tmp_path_factory.mktemp("kept"))
+    plain = run_study(CONTENT, store, scene=PIN, workers=1)
+    study = Study.from_dict(CONTENT | {"keep": "fields"}, scene=PIN)
+    first = run_study(study, store, workers=1)
+    again = run_study(study, store, workers=1)
+    bare = run_study(CONTENT, store, scene=PIN, workers=1)
+    counts = [len(each.computed) for each in (plain, first, again, bare)]
+    assert counts == [2, 2, 0, 0]  # computed anew for the fields, and never again
+    assert first.study_id != plain.study_id
+    with open_netcdf(plain.dataset) as one, open_netcdf(first.dataset) as other:
+        assert set(one.variables) == set(other.variables)
+        xr.testing.assert_identical(one["residual_stress"], other["residual_stress"])
+    return study, store
+
+
+def run_of(kept: tuple[Study, Store], index: int = 1) -> Path:
+    study, store = kept
+    return store.run_path(list(study.run_ids())[index])
+
+
+def corners(run: xr.Dataset) -> np.ndarray:
+    """Return the nodes of the faces, triangles with their last corner twice."""
+    nodes = run["mesh_face_nodes"].to_numpy()
+    nodes = np.where(np.isnan(nodes), nodes[:, [2]], nodes)
+    return nodes.astype(int)
+
+
+def test_faces_cover_the_bodies_once(kept: tuple[Study, Store]) -> None:
+    with open_netcdf(run_of(kept)) as run:
+        topology = run["mesh"].attrs
+        assert topology["cf_role"] == "mesh_topology"
+        assert topology["node_coordinates"].split() == ["mesh_node_x", "mesh_node_y"]
+        assert run[topology["face_node_connectivity"]].attrs["start_index"] == 0
+        x, y = (run[name].to_numpy()[corners(run)] for name in topology["node_coordinates"].split())
+        twice = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+        assert (twice > 0).all()  # counterclockwise
+        names = run["mesh_body"].attrs["flag_meanings"].split()
+        assert names == ["plate", "pin"]
+        area = twice[run["mesh_body"].to_numpy() == names.index("pin")].sum() / 2
+        # half of a ring of radii 0.5 and 9.98 mm, its circles polygons
+        assert area == pytest.approx(np.pi / 2 * (9.98**2 - 0.5**2), rel=0.01)
+        used = np.unique(corners(run))
+        np.testing.assert_array_equal(used, np.arange(run.sizes["mesh_node"]))
+        for name in ("mesh_von_mises", "mesh_stress_xx", "mesh_displacement_y"):
+            each = run[name]
+            assert (each.attrs["mesh"], each.attrs["location"]) == ("mesh", "node")
+            assert each.dims == ("time", "mesh_node")
+
+
+def test_the_fields_are_those_of_the_solution(pressed: Solution) -> None:
+    fields = pressed.mesh_fields()
+    made = xr.Dataset(ugrid.variables(fields), attrs={"keep": "fields", "id": "x"})
+    again = ugrid.read(made)
+    assert list(again.stages) == ["loaded", "unloaded"]
+    np.testing.assert_array_equal(again.X, fields.X)
+    for name, (element, cells) in fields.bodies.items():
+        assert again.bodies[name][0] == element
+        np.testing.assert_array_equal(again.bodies[name][1], cells)
+    for stage, values in fields.stages.items():
+        for name, value in values.items():
+            np.testing.assert_array_equal(again.stages[stage][name], value)
+
+
+def test_a_run_is_written_for_paraview(kept: tuple[Study, Store], tmp_path: Path) -> None:
+    folder = tmp_path / "vtu"
+    assert main(["export", str(run_of(kept)), "--vtu", str(folder)]) == 0
+    sets = ElementTree.parse(folder / "stages.pvd").getroot().findall("Collection/DataSet")
+    assert [each.get("name") for each in sets] == ["loaded", "unloaded"]
+    mesh = meshio.read(folder / str(sets[0].get("file")))
+    with open_netcdf(run_of(kept)) as run:
+        loaded = run["mesh_stress_yy"].isel(time=0)
+        np.testing.assert_array_equal(mesh.point_data["stress_yy"], loaded)
+        assert float(loaded.min()) < -100.0
+
+
+def test_a_run_of_a_study_is_found_by_its_place(kept: tuple[Study, Store], tmp_path: Path) -> None:
+    study, store = kept
+    where = str(store.study_directory(study.id))
+    for k, load in enumerate(("0.2", "0.5")):
+        folder = tmp_path / load
+        assert main(["export", where, "--select", f"load_ratio={load}", "--vtu", str(folder)]) == 0
+        mesh = meshio.read(folder / "0-loaded.vtu")
+        with open_netcdf(run_of(kept, k)) as run:
+            np.testing.assert_array_equal(
+                mesh.point_data["von_mises"], run["mesh_von_mises"].isel(time=0)
+            )
+
+
+def test_a_run_without_fields_is_refused(
+    computed: tuple[Study, Store], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, store = computed
+    run = store.run_path(next(study.run_ids()))
+    assert main(["export", str(run), "--vtu", str(tmp_path / "vtu")]) == 2
+    assert 'keep = "fields"' in capsys.readouterr().err
+    assert not (tmp_path / "vtu").exists()
+
+
+def test_a_file_in_the_place_of_the_folder_is_refused(
+    kept: tuple[Study, Store], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "vtu").write_text("")
+    assert main(["export", str(run_of(kept)), "--vtu", str(tmp_path / "vtu")]) == 2
+    assert "must be a folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("own", "text"),
+    [
+        ({"keep": "all"}, r'keep.*must be "fields", or absent'),
+        ({"keep": True}, r'keep.*must be "fields", or absent'),
+        ({"keep": ["fields"]}, r'keep.*must be "fields", or absent'),
+        ({"note": 5}, "note.*must be text of at most 4000"),
+        ({"note": "x" * 4001}, "note.*must be text of at most 4000"),
+        ({"note": "a\x00b"}, "note.*none of them a control"),
+        ({"tags": "rail"}, "tags.*must be a list of at most 20 texts"),
+        ({"tags": ["a b"]}, r"tags\[0\].*must be 1 to 80 of"),
+        ({"tags": ["rail", "rail"]}, r"tags\[1\].*is there already"),
+    ],
+)
+def test_labels_of_a_study_are_checked(own: dict[str, Any], text: str) -> None:
+    with pytest.raises(StudyError, match=text):
+        Study.from_dict(CONTENT | own, scene=PIN)
+
+
+def test_labels_make_another_study_of_the_same_runs() -> None:
+    plain = Study.from_dict(CONTENT, scene=PIN)
+    told = Study.from_dict(CONTENT | {"note": "π\nand more", "tags": ["rail", "a1"]}, scene=PIN)
+    assert told.id != plain.id
+    assert list(told.run_ids()) == list(plain.run_ids())
+    assert "note" not in plain.to_dict()
+    again = Study.from_dict(told.to_dict(), scene=PIN)
+    assert (again.id, again.note, again.tags) == (told.id, told.note, told.tags)
