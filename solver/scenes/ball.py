@@ -30,6 +30,7 @@ from solver.model.loads import Traction
 from solver.model.model import Model
 from solver.model.rigid import RigidBody, line
 from solver.results.contact import contact
+from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, profiles
 from solver.results.figures import cost, extremes
 from solver.results.indentation import crater, follow, history, indentation
@@ -211,7 +212,7 @@ BALL = Scene(
     model=model,
     program=program,
     view=view,
-    outputs=(maps, profiles, contact, extremes, indentation, crater, history),
+    outputs=(maps, profiles, contact, extremes, residual_extremes, indentation, crater, history),
     costs=(cost,),
     watch=follow,
     effort=effort,

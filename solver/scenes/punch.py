@@ -24,6 +24,7 @@ from annotated_types import Interval, Unit
 from solver.loading.program import Program, load_and_release, walked
 from solver.model.model import Model
 from solver.results.contact import contact
+from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, profiles, surfaces
 from solver.results.figures import cost, extremes
 from solver.results.look import Look, Values
@@ -227,7 +228,7 @@ PUNCH = Scene(
     model=model,
     program=program,
     view=view,
-    outputs=(maps, profiles, surfaces, contact, extremes, figures),
+    outputs=(maps, profiles, surfaces, contact, extremes, residual_extremes, figures),
     costs=(cost,),
     effort=effort,
     advice={

@@ -20,6 +20,7 @@ import numpy as np
 
 from solver.loading.settling import Settling
 from solver.results.contact import contact
+from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, surfaces
 from solver.results.figures import cost, extremes
 from solver.results.free_surface import FreeSurface
@@ -228,6 +229,8 @@ def warnings(look: Look) -> tuple[str, ...]:
     )
 
 
+_STRESS = (maps, surfaces, residual_extremes, profile_figures, surface)
+
 ROLLING = Scene(
     name="rolling",
     summary="elastic cylinder rolling on an elastic-plastic half-space, pass after pass",
@@ -243,7 +246,7 @@ ROLLING = Scene(
     model=model,
     program=program,
     view=view,
-    outputs=(maps, surfaces, contact, extremes, profile_figures, surface, wheel, cycles),
+    outputs=(*_STRESS, contact, extremes, wheel, cycles),
     costs=(cost, progress),
     trace=Trace.of,
     settling=settling,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,7 @@ from studies.views.columns import aligned, in_blocks, stacked
 from studies.views.reading import flags, sweep_axes, sweep_coordinates
 
 FIGURES: Mapping[str, str] = {
-    "residual_x_half_plane": "residual x half plane",
-    "residual_x_punch": "residual x punch",
+    "surface_residual_max": "largest residual {component} surface {body}",
     "surface_residual_x": "surface residual x",
     "first_row_residual_x": "first row residual x",
     "free_surface_residual_x": "free surface residual x",
@@ -39,14 +38,15 @@ FIGURES: Mapping[str, str] = {
     "singular_power_error": "its error",
     "singular_intensity": "singular intensity",
     "apparent_power": "apparent power",
-    "peak_contact_pressure": "contact pressure",
-    "max_plastic_strain": "plastic strain",
+    "peak_contact_pressure": "peak contact pressure",
+    "max_plastic_strain": "largest plastic strain",
     "increments": "increments",
     "cut_increments": "cut",
     "median_iterations": "median iterations",
     "cpu_seconds": "cpu",
 }
-"""Variables a table of runs shows, where the scene gives them, and their headings."""
+"""Variables a table of runs shows, where the scene gives them, and their headings. One over bodies
+and components has a column for the first component of each body."""
 
 
 NAMED = 4
@@ -62,18 +62,32 @@ def runs_table(dataset: xr.Dataset) -> str:
     """
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
     keys = sum(name == axis for name, axis in places.items())
-    columns = [*places, "status", *(name for name in FIGURES if name in dataset)]
-    headings = [FIGURES.get(name, name.replace("_", " ")) for name in columns]
-    units = [_unit(dataset[name]) for name in columns]
-    values = {name: dataset[name].to_numpy() for name in columns}
+    figures = dict(_figures(dataset))
+    headings = [*(name.replace("_", " ") for name in places), "status", *figures]
+    units = [*(_unit(dataset[name]) for name in places), "", *map(_unit, figures.values())]
+    values = {name: dataset[name].to_numpy() for name in (*places, "status")}
+    numbers = [each.to_numpy() for each in figures.values()]
     rows = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
-        where = [_text(values[name][place[places[name]]]) for name in columns[: len(places)]]
+        where = [_text(values[name][place[axis]]) for name, axis in places.items()]
         status = STATUSES[values["status"][at]]
-        figures = [_text(values[name][at]) for name in columns[len(places) + 1 :]]
-        rows.append([*where, status, *figures])
+        rows.append([*where, status, *(_text(each[at]) for each in numbers)])
     return in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
+
+
+def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
+    """Yield the heading of each figure that the runs have, and its values over the sweep."""
+    for name, heading in FIGURES.items():
+        if name not in dataset:
+            continue
+        values = dataset[name]
+        if "component" in values.dims:
+            values = values.isel(component=0)
+        for k in range(values.sizes.get("body", 1)):
+            each = values.isel(body=k) if "body" in values.dims else values
+            words = {c: str(each[c].item()) for c in ("body", "component") if c in each.coords}
+            yield heading.format(**words).replace("_", " "), each
 
 
 def messages(dataset: xr.Dataset) -> str:

@@ -33,10 +33,11 @@ def test_run_prints_a_table_and_writes_data_and_picture(
     assert main(["run", str(study_file()), "--out", str(out), "--workers", "1"]) == 0
     printed = capsys.readouterr()
     lines = printed.out.splitlines()
-    assert lines[0].split() == ["load", "contact"]
-    assert lines[1].split() == ["ratio", "friction", "status", "pressure", "increments", "cpu"]
-    assert lines[2].split() == ["[MPa]", "[s]"]
-    assert [line.split()[:3] for line in lines[3:7]] == [
+    assert lines[0].split() == ["peak"]
+    assert lines[1].split() == ["load", "contact"]
+    assert lines[2].split() == ["ratio", "friction", "status", "pressure", "increments", "cpu"]
+    assert lines[3].split() == ["[MPa]", "[s]"]
+    assert [line.split()[:3] for line in lines[4:8]] == [
         ["0.3", "0", "ok"], ["0.3", "0.4", "ok"], ["0.9", "0", "ok"], ["0.9", "0.4", "ok"],
     ]  # fmt: skip
     written = [Path(line.split()[1]) for line in lines if line.startswith("wrote")]
