@@ -88,5 +88,6 @@ def draw(path: Path, query: MapQuery) -> bytes:
     picture = io.BytesIO()
     verify(path)
     with open_netcdf(path) as run:
-        map_figure(run, **query.model_dump()).savefig(picture, format="png")
+        figure = map_figure(run, **query.model_dump(exclude={"resolution"}))
+        figure.savefig(picture, format="png", dpi=query.resolution)
     return picture.getvalue()

@@ -57,6 +57,12 @@ class MapQuery(BaseModel):
         description="only what lies within this distance of the contact's centre, or of its edge "
         "where half of the bodies was computed [mm]",
     )
+    window: list[Annotated[float, Field(allow_inf_nan=False)]] | None = Field(
+        default=None, min_length=4, max_length=4,
+        description="only x0 <= x <= x1, y0 <= y <= y1 [mm]: "
+        "`window=x0&window=x1&window=y0&window=y1`",
+    )  # fmt: skip
+    resolution: int = Field(default=150, ge=50, le=600, description="dots per inch")
 
 
 class StudySummary(BaseModel):

@@ -46,6 +46,12 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> NDAr
     return np.asarray(nodes * (length / nodes[-1]))
 
 
+def cells(length: float, smallest: float, ratio: float, largest: float) -> NDArray[np.float64]:
+    """Return the middles of what `graded` divides ``length`` into, which no boundary meets."""
+    nodes = graded(length, smallest, ratio, largest)
+    return (nodes[1:] + nodes[:-1]) / 2
+
+
 def refined(
     points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
 ) -> NDArray[np.float64]:

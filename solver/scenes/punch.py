@@ -22,6 +22,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.loading.program import Program, load_and_release, walked
+from solver.mesh.grids import cells
 from solver.model.model import Model
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
@@ -45,6 +46,8 @@ from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
 _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "draft": {"smallest_element": 5e-3, "growth": 1.6, "load_step": 0.1},
@@ -145,13 +148,13 @@ def view(parameters: PunchParameters) -> View:
     """Return where the results are taken: a function of dimensions, not of the mesh."""
     a = parameters.half_width
     height = min(0.6, parameters.punch_height) * a
+    within = _pixels(a, a)
     inside = np.unique(np.concatenate([[0.005, 0.01, 0.028, 0.05, 0.1],
                                        np.geomspace(5e-4, 1.0, 67)]))  # fmt: skip
     outside = np.geomspace(5e-4, 0.98, 40)
     return View(
-        # centres of cells, so that no row or column lies on a boundary of the bodies
-        x=a * (np.arange(160) + 0.5) / 100,
-        y=a * (np.arange(-100, round(100 * height / a)) + 0.5) / 100,
+        x=np.concatenate([a - within[::-1], a + _pixels(0.6 * a, a)]),
+        y=np.concatenate([-within[::-1], _pixels(height, a)]),
         depth=np.concatenate([[0.0], a * np.geomspace(1e-3, 1.9, 80)]),
         station=a * np.array([0.0, 0.5, 0.9, 0.972, 0.995, 1.0]),
         s=a * np.concatenate([1.0 - inside[::-1], [1.0], 1.0 + outside]),
@@ -159,6 +162,11 @@ def view(parameters: PunchParameters) -> View:
         surfaces={"punch": "bottom", "half_plane": "top"},
         symmetric=True,
     )
+
+
+def _pixels(length: float, a: float) -> NDArray[np.float64]:
+    """Return positions of the map away from the corner: as fine as the elements of ``standard``."""
+    return cells(length, smallest=5e-4 * a, ratio=1.1, largest=0.0125 * a)
 
 
 RESIDUAL_X = {

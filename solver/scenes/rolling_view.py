@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.mesh.grids import cells
 from solver.results.view import View
 from solver.scenes.rolling_grids import recorded_step
 
@@ -23,12 +24,11 @@ def view(parameters: RollingParameters) -> View:
     if parameters.endless:
         return _around_the_load(parameters.widest.half_width)
     half, a = parameters.length / 2, parameters.half_width
-    depth = 5 * a
     edge = math.ceil(half + max(2 * a, parameters.spread))
     places = round(edge / recorded_step(a))
     return View(
         x=np.linspace(-edge, edge, places + 1),
-        y=-(np.arange(120) + 0.5) * depth / 120,
+        y=-_pixels(a),
         depth=_depths(a),
         station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.length / 50.0),
         s=np.linspace(-edge, edge, 2 * places + 1),
@@ -44,7 +44,7 @@ def _around_the_load(a: float) -> View:
     """Return where the results of a track without ends are taken, for the half-width a [mm]."""
     return View(
         x=a * np.linspace(-_SEEN, _SEEN, 161),
-        y=-(np.arange(120) + 0.5) * 5 * a / 120,
+        y=-_pixels(a),
         depth=_depths(a),
         station=np.array([0.0]),
         s=a * np.linspace(-_SEEN, _SEEN, 641),
@@ -52,6 +52,11 @@ def _around_the_load(a: float) -> View:
         surfaces={"half_space": "top"},
         stages=("loaded", "unloaded"),
     )
+
+
+def _pixels(a: float) -> NDArray[np.float64]:
+    """Return the depths of the rows of the map for the half-width a [mm]."""
+    return cells(5 * a, smallest=a / 64, ratio=1.05, largest=a / 16)
 
 
 def _depths(a: float) -> NDArray[np.float64]:

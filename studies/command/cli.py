@@ -97,6 +97,12 @@ def _parser() -> argparse.ArgumentParser:
         help="only this close to the contact's centre, or to its edge where half of the bodies "
         "was computed",
     )  # fmt: skip
+    one.add_argument(
+        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
+        help="of a map, only this part [mm]",
+    )  # fmt: skip
+    one.add_argument("--over", metavar="AXIS", help="of lines, one for each value of this axis")
+    one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=Path, required=True, metavar="PNG")
 
     one = add("export", commands.export)

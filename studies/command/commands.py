@@ -104,7 +104,11 @@ def plot(options: argparse.Namespace) -> int:
 
     selection = _selection(options.select)
     with open_study(options.path) as dataset:
-        drawn = picture(dataset, options.field, options.component, options.zoom, selection)
+        drawn = picture(
+            dataset, options.field, options.component, options.zoom, selection,
+            window=options.window, over=options.over,
+            resolution=options.resolution,
+        )  # fmt: skip
         _save(drawn, options.out)
     print(f"wrote {options.out}")
     return OK

@@ -220,6 +220,25 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
 
 
+def runs_over(dataset: xr.Dataset, axis: str, selection: Mapping[str, str | float]) -> xr.Dataset:
+    """Return for each value of an axis the run that `one_run` takes; failed ones are left out.
+
+    Raises
+    ------
+    StudyError
+        when there is no such axis or value, no run succeeded, or the runs have different grids
+    """
+    if axis not in sweep_axes(dataset):
+        raise StudyError("over", axis, f"must be one of {', '.join(sweep_axes(dataset))}")
+    others = [name for name in sweep_axes(dataset) if name != axis]
+    best = one_run(dataset, selection)
+    chosen = select(dataset, selection).sel({name: best[name].item() for name in others})
+    if unlike := [name for name in map(str, chosen.dims) if f"{name}{FRACTION}" in chosen.coords]:
+        allowed = f"changes {', '.join(unlike)}: these runs have no place in common"
+        raise StudyError("over", axis, allowed)
+    return chosen.isel({axis: np.flatnonzero(chosen["status"] == STATUSES.index(OK))})
+
+
 def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
     """Return the file of a run: `path` itself, or that of the run `one_run` takes of a study.
 

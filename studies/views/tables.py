@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -49,6 +50,8 @@ FIGURES: Mapping[str, str] = {
 and components has a column for the first component of each body."""
 
 
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
+"""A number in a message, not the digits of a name."""
 NAMED = 4
 """Most runs that are named for a message; the rest are counted."""
 
@@ -91,21 +94,36 @@ def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
 
 
 def messages(dataset: xr.Dataset) -> str:
-    """Return each message of the runs once: outcome, text, how many runs have it, and which."""
+    """Return each kind of message once: outcome, text, how many runs have it, and which.
+
+    Messages that differ in their numbers alone are of one kind, which tells their range.
+    """
     axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     status, text = (dataset[name].to_numpy() for name in ("status", "message"))
-    found: dict[tuple[str, str], list[str]] = defaultdict(list)
+    found: dict[tuple[str, str], list[tuple[list[str], str]]] = defaultdict(list)
     for at in np.ndindex(status.shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
         where = (f"{axis} = {_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
         if text[at]:
             outcome = STATUSES[status[at]]
             kind = "warning" if outcome == OK else outcome
-            found[kind, str(text[at])].append(", ".join(where))
+            words = _NUMBER.sub("\0", str(text[at]))
+            found[kind, words].append((_NUMBER.findall(str(text[at])), ", ".join(where)))
     return "".join(
-        f"\n{kind}: {message}\n    {_listed(places)}\n"
-        for (kind, message), places in sorted(found.items())
+        f"\n{kind}: {_ranged(words, [numbers for numbers, _ in runs])}\n"
+        f"    {_listed([where for _, where in runs])}\n"
+        for (kind, words), runs in sorted(found.items())
     )
+
+
+def _ranged(words: str, numbers: Sequence[Sequence[str]]) -> str:
+    """Return the words with their numbers, or the range of these over the runs."""
+    every = []
+    for column in zip(*numbers, strict=True):
+        least, most = min(column, key=float), max(column, key=float)
+        every.append(least if least == most else f"{least} to {most}")
+    pieces = words.split("\0")
+    return "".join(map("".join, zip(pieces, [*every, ""], strict=True)))
 
 
 def _listed(places: Sequence[str]) -> str:

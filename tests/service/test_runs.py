@@ -6,6 +6,7 @@ import io
 from typing import Any
 
 import matplotlib.image
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -86,6 +87,8 @@ def test_a_map_is_a_picture_that_need_not_be_sent_twice(
         ({"field": "nonsense"}, "field", "residual_stress"),
         ({"field": "max_plastic_strain"}, "field", "residual_stress"),
         ({"zoom": -1}, "zoom", "greater than 0"),
+        ({"window": [5.0, 4.0, 0.0, 1.0]}, "window", "must be x0 x1 y0 y1"),
+        ({"resolution": 10}, "resolution", "greater than or equal to 50"),
         ({"field": "residual_stress", "component": "rr"}, "component", "xx, yy, zz, xy"),
         ({"field": "plastic_strain", "component": "xx"}, "component", "leave it out"),
     ],
@@ -98,6 +101,23 @@ def test_a_map_that_cannot_be_drawn_is_refused_by_field(
     (error,) = answer.json()["errors"]
     assert error["field"] == field and str(error["value"]) == str(query[field])
     assert allowed in error["allowed"]
+
+
+def test_a_map_has_the_window_and_the_resolution_that_are_asked_for(
+    service: Server, runs: list[dict[str, Any]]
+) -> None:
+    url = f"/runs/{runs[0]['id']}/map.png"
+    sizes = []
+    for resolution in (100, 200):
+        query = {"window": [-100.0, 100.0, -100.0, 50.0], "resolution": resolution}
+        answer = service.client.get(url, params=query)
+        assert answer.status_code == 200, answer.text
+        sizes.append(matplotlib.image.imread(io.BytesIO(answer.content), format="png").shape[:2])
+    assert sizes[1] == pytest.approx(np.multiply(2.0, sizes[0]), abs=2)
+    for window in ([0.0, 1.0], [0.0, 1.0, 2.0, "x"]):
+        answer = service.client.get(url, params={"window": window})
+        assert answer.status_code == 422
+        assert answer.json()["errors"][0]["field"].startswith("window")
 
 
 def test_a_scene_describes_its_parameters(service: Server) -> None:

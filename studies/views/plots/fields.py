@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import xarray as xr
 
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError
 from studies.scenes.registry import one_of
+
+Window = Sequence[float]
+"""Part of a map: x0, x1, y0, y1 [mm]."""
 
 MAP = ("y", "x")
 ALONG = ("s", "depth", "increment")
@@ -76,6 +80,12 @@ def focus(run: xr.Dataset, zoom: float) -> float:
         missing = "is about the edge of the contact, but this run has no contact_half_width"
         raise StudyError("zoom", zoom, f"{missing}: leave it out")
     return edge
+
+
+def empty_window(window: Window) -> StudyError:
+    """Return what is wrong with a window that shows nothing."""
+    allowed = "must be x0 x1 y0 y1 [mm] with x0 < x1, y0 < y1, and hold two points or more"
+    return StudyError("window", list(window), allowed)
 
 
 def too_close(zoom: float) -> StudyError:

@@ -37,6 +37,7 @@ def line_figure(
     field: str,
     component: str | None = None,
     zoom: float | None = None,
+    over: str | None = None,
 ) -> Figure:
     """Return `field` along the surface, depth or increments: a line for each of the rest.
 
@@ -47,9 +48,10 @@ def line_figure(
 
     `zoom` shows only that length on either side of the contact's centre (of its edge, where half
     of the bodies was computed), or below the surface [mm]. Without it, depth ends where the values
-    have decayed.
+    have decayed. With `over`, the axis of the sweep that `run` still has, each of its values has
+    lines.
     """
-    run = one_run(run)
+    run = run if over else one_run(run)
     check_field(field, line_fields(run))
     values = component_of(run[field], component)
     along = next(name for name in ALONG if name in values.dims)
@@ -72,8 +74,10 @@ def line_figure(
     axes = sheet.add_subplot()
     entitle(axes, run, values, _SIZE[0] - 0.8)
     shape = [values.sizes[name] for name in others] or [1]
+    alone = len(others) == 1 and values[others[0]].dtype.kind not in "fiu"
     for first, colour in enumerate(_colours(values, others)):
-        for style, rest in zip(cycle(_STYLES), np.ndindex(*shape[1:]), strict=False):
+        styles = cycle(_STYLES[first % len(_STYLES) :] if alone else _STYLES)
+        for style, rest in zip(styles, np.ndindex(*shape[1:]), strict=False):
             line = values.isel(dict(zip(others, (first, *rest), strict=False))).dropna(along)
             if line.size:
                 name = ", ".join(value_text(line[each]) for each in others)

@@ -8,10 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.markers import CARETDOWN
 
+from studies.errors import StudyError
 from studies.views.plots.captions import capitalised, label, setting, wrapped
 from studies.views.plots.fields import (
+    Window,
     check_field,
     component_of,
+    empty_window,
     focus,
     is_half,
     map_fields,
@@ -40,6 +43,7 @@ def map_figure(
     field: str = "residual_stress",
     component: str | None = None,
     zoom: float | None = None,
+    window: Window | None = None,
 ) -> Figure:
     """Return a map of `field` over the bodies, whole where half of them was computed.
 
@@ -50,20 +54,24 @@ def map_figure(
     component : of a stress tensor; the first one by default
     zoom : show only what lies within this distance of the contact's centre, or of its edge where
         half of the bodies was computed [mm]
+    window : show only x0 <= x <= x1, y0 <= y <= y1: (x0, x1, y0, y1) [mm]
 
     Raises
     ------
     StudyError
-        when the data set has no such field or component, or the zoom holds no points
+        when the data set has no such field or component, or there are no points in what is shown
     """
     run = one_run(run)
     check_field(field, map_fields(run))
     values = component_of(run[field], component).transpose("y", "x")
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     if zoom is not None:
-        values = _near(values, focus(run, zoom), zoom)
+        middle = focus(run, zoom)
+        values = _inside(values, (middle - zoom, middle + zoom, -zoom, zoom), too_close(zoom))
     elif is_half(run):
         values = whole(values)
+    if window is not None:
+        values = _inside(values, window, empty_window(window))
     signed = "component" in values.coords
     high, note = _limit(values, signed)
     width, height = _size(values)
@@ -110,31 +118,48 @@ def whole(values: xr.DataArray) -> xr.DataArray:
     return xr.concat([other.assign_coords(x=-other["x"]), values], "x").assign_attrs(values.attrs)
 
 
-def _near(values: xr.DataArray, middle: float, zoom: float) -> xr.DataArray:
-    near = values.where((abs(values["x"] - middle) <= zoom) & (abs(values["y"]) <= zoom), drop=True)
-    if min(near.shape) < 2:
-        raise too_close(zoom)
-    return near
+def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.DataArray:
+    """Return the part of a map in a window, or raise the error for one that shows nothing."""
+    x, y = values["x"], values["y"]
+    x0, x1, y0, y1 = window
+    part = values.isel(x=np.flatnonzero((x0 <= x) & (x <= x1)), y=(y0 <= y) & (y <= y1))
+    if min(part.shape) < 2 or not part.notnull().any():
+        raise nothing
+    return part
 
 
 def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
     """Return where colours end, and a note on the values beyond."""
-    there = values.to_numpy()[np.isfinite(values)]
+    known = np.isfinite(values.to_numpy())
+    there, area = values.to_numpy()[known], _areas(values)[known]
     size = np.abs(there) if signed else there
     if not size.size or not size.max() > 0.0:
         return 1.0, ""
     if values.attrs.get("units") == "MPa" and size.max() < _NOTHING:
         return 1.0, f"No value is larger than {_NOTHING:g} MPa."
-    high = float(np.percentile(size[size > 0.0], _PERCENT))
+    high = _percentile(size[size > 0.0], area[size > 0.0])
     if size.max() <= _WORTHWHILE * high:
         return float(size.max()), ""
     unit = values.attrs.get("units", "1")
     note = (
         f"Colours end at {'±' if signed else ''}{high:.3g}{'' if unit == '1' else f' {unit}'}: "
-        f"{np.mean(size > high):.1%} of the map lies beyond. "
+        f"{area[size > high].sum() / area.sum():.1%} of the map lies beyond. "
         f"Values go from {there.min():.3g} to {there.max():.3g}."
     )
     return high, note.replace("-", "\N{MINUS SIGN}")
+
+
+def _areas(values: xr.DataArray) -> np.ndarray:
+    """Return the area of each point of a map, whose points lie closer where stress is steep."""
+    dx, dy = (np.gradient(values[name].to_numpy()) for name in ("x", "y"))
+    return np.abs(np.multiply.outer(dy, dx))
+
+
+def _percentile(values: np.ndarray, area: np.ndarray) -> float:
+    """Return what `_PERCENT` of the area does not exceed."""
+    order = np.argsort(values)
+    share = np.cumsum(area[order]) / area.sum()
+    return float(values[order][np.searchsorted(share, _PERCENT / 100.0)])
 
 
 def _size(values: xr.DataArray) -> tuple[float, float]:

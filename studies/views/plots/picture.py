@@ -12,6 +12,7 @@ from studies.scenes.registry import one_of
 from studies.views.plots.fields import (
     ALONG,
     MAP,
+    Window,
     check_field,
     line_fields,
     map_fields,
@@ -20,7 +21,10 @@ from studies.views.plots.fields import (
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.sweep import sweep_figure
-from studies.views.reading import one_run, positions, select, sweep_coordinates
+from studies.views.reading import one_run, positions, runs_over, select, sweep_coordinates
+
+_COARSEST, _FINEST = 50, 600
+"""Dots per inch."""
 
 
 def picture(
@@ -29,6 +33,10 @@ def picture(
     component: str | None = None,
     zoom: float | None = None,
     selection: Mapping[str, str | float] | None = None,
+    *,
+    window: Window | None = None,
+    over: str | None = None,
+    resolution: float | None = None,
 ) -> Figure:
     """Return a figure of `field`.
 
@@ -41,6 +49,9 @@ def picture(
         surface [mm]
     selection : axis of the sweep, parameter set by a linked axis, or dimension of the field, such
         as ``pass`` -> wanted value
+    window : of a map, show only this part
+    over : of lines, the axis of the sweep of which each value has a line
+    resolution : dots per inch; that of the screen by default
 
     Raises
     ------
@@ -48,19 +59,43 @@ def picture(
         when there is no such field, component, axis or value, or nothing to show
     """
     maps, lines, singles = map_fields(dataset), line_fields(dataset), sweep_fields(dataset)
+    given = {"component": component, "zoom": zoom, "window": window, "over": over}
     if field in singles:
-        for name, given in {"component": component, "zoom": zoom}.items():
-            if given is not None:
-                raise StudyError(name, given, f"{field} has one value a run: leave it out")
-        return sweep_figure(select(dataset, selection or {}), field)
-    one_run(dataset)  # where no run succeeded there are no fields: say why
-    check_field(field, [*maps, *lines, *singles])
-    make = map_figure if field in maps else line_figure
-    return make(_part(dataset, field, selection or {}), field, component, zoom)
+        _refuse(given, f"{field} has one value a run: leave it out")
+        figure = sweep_figure(select(dataset, selection or {}), field)
+    else:
+        one_run(dataset)  # where no run succeeded there are no fields: say why
+        check_field(field, [*maps, *lines, *singles])
+        if field in maps:
+            _refuse({"over": over}, f"{field} is a map of one run: leave it out")
+            part = _part(dataset, field, selection or {})
+            figure = map_figure(part, field, component, zoom, window)
+        else:
+            _refuse({"window": window}, f"{field} is no map: leave it out")
+            part = _part(dataset, field, selection or {}, over)
+            figure = line_figure(part, field, component, zoom, over)
+    if resolution is not None:
+        if not _COARSEST <= resolution <= _FINEST:
+            allowed = f"must be {_COARSEST} to {_FINEST} dots per inch"
+            raise StudyError("resolution", resolution, allowed)
+        figure.set_dpi(resolution)
+    return figure
 
 
-def _part(dataset: xr.Dataset, field: str, selection: Mapping[str, str | float]) -> xr.Dataset:
-    """Return one run of those selected, cut along the field's own dimensions."""
+def _refuse(given: Mapping[str, object], allowed: str) -> None:
+    """Refuse what makes no sense for a field."""
+    for name, value in given.items():
+        if value is not None:
+            raise StudyError(name, value, allowed)
+
+
+def _part(
+    dataset: xr.Dataset, field: str, selection: Mapping[str, str | float], over: str | None = None
+) -> xr.Dataset:
+    """Return one run of those selected, or one for each value of the axis `over`.
+
+    It is cut along the field's own dimensions.
+    """
     swept = sweep_coordinates(dataset)
     drawn = {*swept.values(), *MAP, *ALONG, "component"}
     own = [str(name) for name in dataset[field].dims if name not in drawn]
@@ -68,7 +103,8 @@ def _part(dataset: xr.Dataset, field: str, selection: Mapping[str, str | float])
     for name, value in selection.items():
         if name not in known:
             raise StudyError(name, value, one_of(name, known))
-    run = one_run(dataset, {name: selection[name] for name in swept if name in selection})
+    chosen = {name: selection[name] for name in swept if name in selection}
+    run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen)
     return run.isel(
         {name: positions(run[name], selection[name]) for name in own if name in selection}
     )

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from studies.definition.cases import USUAL_AXES
-from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
+from studies.views.plots.curves import curve_figure
 from studies.views.plots.limits import draw_shakedown_limits
-from studies.views.plots.maps import SIGNED
-from studies.views.reading import flags, sweep_axes, sweep_coordinates
+from studies.views.plots.runs import POINTS, Look, absent, known_values, look_of, standing
+from studies.views.reading import sweep_axes
 
 MOST_PANELS = 6
 
@@ -31,55 +28,18 @@ OVERLAYS: Mapping[tuple[str, str, str], Callable[[Axes, xr.Dataset, bool], Seque
 """What theory adds to a field with one number going up and one across: draws on a panel, the last
 of its row or not, and returns its lines."""
 
-_CATEGORIES = (
-    ("o", "#56B4E9"), ("s", "#0072B2"), ("D", "#E69F00"), ("^", "#D55E00"),
-    ("P", "#999999"), ("v", "#CC79A7"), ("h", "#009E73"), ("*", "#000000"),
-)  # fmt: skip
-"""Marker and colour by flag value: colours told apart by every kind of eye (Okabe and Ito)."""
-_POINTS = 8.0
 _PANEL = (3.4, 3.1)
 """Width and height of a panel [in]."""
+_DENSE, _CONTOURS = 6, 12
+"""Values of both numbers from which on contours are drawn, and how many."""
 _LEGEND = 3.2
 """Width of the legend, with the axis beside it [in]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Kind:
-    """Runs that are drawn alike."""
-
-    name: str
-    marker: str
-    colour: str = "0.15"
-    filled: bool = True
-
-    def draw(self, axes: Axes, x: np.ndarray, y: np.ndarray) -> Line2D:
-        face = self.colour if self.filled else "none"
-        (line,) = axes.plot(
-            x, y, linestyle="", marker=self.marker, markersize=_POINTS, color=self.colour,
-            markerfacecolor=face, label=self.name, zorder=3.0,
-        )  # fmt: skip
-        return line
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Look:
-    """How values are drawn: flags by kind; other numbers, where there are no flags, by colour."""
-
-    flags: Mapping[int, _Kind]
-    norm: Normalize
-    colours: str
-
-
-_FAILED = _Kind(name="failed or missing", marker="x")
-_ABSENT = {
-    OK: _Kind(name="no value", marker="."),
-    "limit_load": _Kind(name="no equilibrium", marker="s", filled=False),
-}
-"""Runs without a value by status; others are `_FAILED`."""
-
-
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     """Return `field` over two swept numbers, in a panel for each combination of the other axes.
+
+    Over one number, or over labels alone, it is drawn as curves: see `curve_figure`.
 
     A number stands for an axis where it tells its values apart: the axis itself, or a parameter
     that a linked axis sets. The first number goes up and the second across, load ratio and
@@ -94,9 +54,11 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     Raises
     ------
     StudyError
-        when fewer than two numbers are swept, more than `MOST_PANELS` panels would be drawn, or no
+        when nothing is swept, more than `MOST_PANELS` panels would be drawn, or no
         run has a value
     """
+    if len(standing(dataset)[0]) < 2:
+        return curve_figure(dataset, field)
     up, across, *others = _arrangement(dataset, field)
     columns = others[-1].size if others else 1
     rows = math.prod(each.size for each in others) // columns
@@ -106,7 +68,7 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     for number, axis in ((across, grid[0, 0].xaxis), (up, grid[0, 0].yaxis)):
         if number.dtype.kind in "iu":
             axis.set_major_locator(MaxNLocator(integer=True))
-    look = _look(dataset, field)
+    look = look_of(dataset, field)
     overlay = OVERLAYS.get((field, str(up.name), str(across.name)))
     legend: dict[object, Line2D] = {}
     for axes, at in zip(grid.flat, np.ndindex(*(each.size for each in others)), strict=True):
@@ -139,15 +101,10 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
 
 
 def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
-    """Return what stands for each axis: the number going up, that across, then the others."""
-    several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
-    standing = [_standing(dataset, axis) for axis in several]
-    numbers = sorted((each for each in standing if each.dtype.kind in "fiu"), key=_rank)[:2]
-    if len(numbers) < 2:
-        free = f"only {numbers[0].name} varies" if numbers else "no number varies"
-        allowed = f"has one value a run, which is drawn over two swept numbers, but {free} here"
-        raise StudyError("field", field, allowed)
+    """Return the number going up, that across, then the axes of which each value has a panel."""
+    numbers = standing(dataset)[0][:2]
     used = {each.dims for each in numbers}
+    several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     others = [dataset[axis] for axis in several if (axis,) not in used]
     panels = math.prod(each.size for each in others)
     if panels > MOST_PANELS:
@@ -160,65 +117,37 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
     return [*numbers, *others]
 
 
-def _standing(dataset: xr.Dataset, axis: str) -> xr.DataArray:
-    """Return the first number that has another value at each point of an axis, or the axis."""
-    known = [dataset[name] for name, over in sweep_coordinates(dataset).items() if over == axis]
-    apart = [
-        each
-        for each in known
-        if each.dtype.kind in "fiu" and len(np.unique(each)) == dataset.sizes[axis]
-    ]
-    return min(apart, key=_rank, default=dataset[axis])
-
-
-def _rank(quantity: xr.DataArray) -> int:
-    name = str(quantity.name)
-    return USUAL_AXES.index(name) if name in USUAL_AXES else len(USUAL_AXES)
-
-
-def _known(dataset: xr.Dataset, field: str) -> xr.DataArray:
-    """Return a field where runs succeeded, NaN elsewhere; the status of every run."""
-    ok = dataset["status"] == STATUSES.index(OK)
-    return dataset[field].astype(float).where(ok | (field == "status"))
-
-
-def _look(dataset: xr.Dataset, field: str) -> _Look:
-    """Return how a field is drawn; numbers that change sign have zero in the middle."""
-    known = _known(dataset, field).to_numpy()
-    known = known[np.isfinite(known)]
-    if not known.size:
-        raise StudyError("field", field, "has no value in the runs selected")
-    low, high = float(known.min()), float(known.max())
-    kinds = {
-        value: _Kind(name=words(name), marker=marker, colour=colour)
-        for (value, name), (marker, colour) in zip(
-            flags(dataset[field]).items(), _CATEGORIES, strict=False
-        )
-    }
-    if low < 0.0 < high:
-        low, high = min(low, -high), max(high, -low)
-        return _Look(flags=kinds, norm=Normalize(low, high), colours=SIGNED)
-    return _Look(flags=kinds, norm=Normalize(low, high), colours="viridis")
-
-
 def _draw(
-    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: _Look
+    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Look
 ) -> list[Line2D]:
-    """Draw the runs of a panel; return marks to explain: of all flags, and of what is absent."""
+    """Draw the runs of a panel; return marks to explain: of flags, and of what is absent."""
     up, across = places
-    values, status, y, x = (
-        each.to_numpy().ravel()
-        for each in xr.broadcast(_known(panel, field), panel["status"], panel[up], panel[across])
-    )
+    every = known_values(panel, field), panel["status"], panel[up], panel[across]
+    values, status, y, x = (each.to_numpy().ravel() for each in xr.broadcast(*every))
     known = np.isfinite(values)
     kinds = [(kind, values == value) for value, kind in look.flags.items()]
-    absent = {_ABSENT.get(name, _FAILED): np.zeros_like(known) for name in STATUSES}
-    for value, name in enumerate(STATUSES):
-        absent[_ABSENT.get(name, _FAILED)] |= ~known & (status == value)
-    kinds += [(kind, there) for kind, there in absent.items() if there.any()]
+    kinds += absent(known, status).items()
     if not look.flags:
+        dense = _contours(axes, panel, field, places, look)
         axes.scatter(
-            x[known], y[known], c=values[known], s=_POINTS**2, cmap=look.colours, norm=look.norm,
-            edgecolor="0.3", linewidth=0.5, zorder=3.0,
+            x[known], y[known], c=values[known], s=2.0 if dense else POINTS**2, cmap=look.colours,
+            norm=look.norm, edgecolor="0.3", linewidth=0.5, zorder=3.0,
         )  # fmt: skip
-    return [kind.draw(axes, x[there], y[there]) for kind, there in kinds]
+    return [kind.draw(axes, x[there], y[there]) for kind, there in kinds if there.any()]
+
+
+def _contours(
+    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Look
+) -> bool:
+    """Fill between contours where the sweep is dense, not where runs have no value; tell if so."""
+    up, across = (panel[name] for name in places)
+    low, high = look.norm.vmin, look.norm.vmax
+    if min(up.size, across.size) < _DENSE or low is None or high is None or low == high:
+        return False
+    order = {str(each.dims[0]): np.argsort(panel[each.name].to_numpy()) for each in (up, across)}
+    values = known_values(panel, field).isel(order).squeeze().transpose(*order).to_numpy()
+    x, y = np.sort(panel[places[1]].to_numpy()), np.sort(panel[places[0]].to_numpy())
+    levels = MaxNLocator(_CONTOURS).tick_values(low, high)
+    axes.contourf(x, y, values, levels, cmap=look.colours, norm=look.norm)
+    axes.contour(x, y, values, levels, colors="0.25", linewidths=0.4)
+    return True

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
+from solver.scenes import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.views.plots.captions import setting
 from studies.views.plots.maps import map_figure, whole
@@ -150,6 +151,42 @@ def test_colours_that_leave_values_out_say_so() -> None:
     assert mesh_of(sheet)[1].get_clim()[1] < 1000.0
     assert "0.2% of the map lies beyond" in texts_of(sheet)
     assert "\N{MINUS SIGN}1e+06 to 1e+03" in texts_of(sheet)
+
+
+def test_what_lies_beyond_the_colours_is_told_as_an_area() -> None:
+    y = np.concatenate([np.linspace(-50.0, -1.0, 50), np.linspace(-0.01, -0.001, 10)])
+    run = grid_map(np.arange(1.0, 101.0), y)
+    run["quantity"][:] = 1.0
+    run["quantity"][-10:] = 1000.0  # a sixth of the points, in 2 % of the area
+    sheet = map_figure(run, "quantity")
+    assert mesh_of(sheet)[1].get_clim()[1] == 1000.0
+    run["quantity"][-10:-1] = 1.0  # 1e-5 of it
+    sheet = map_figure(run, "quantity")
+    assert mesh_of(sheet)[1].get_clim()[1] == 1.0
+    assert "0.0% of the map lies beyond" in texts_of(sheet)
+
+
+def test_a_window_shows_that_part_of_both_halves() -> None:
+    run = grid_map(np.arange(20.0) + 0.5, np.arange(-20.0, 0.0), symmetric=True)
+    axes, mesh = mesh_of(map_figure(run, "quantity", window=(-3.0, 5.0, -8.0, -2.0)))
+    assert axes.get_xlim() == (-3.0, 5.0)
+    assert axes.get_ylim() == (-8.5, -1.5)
+    assert np.shape(mesh.get_array()) == (7, 8)
+    for wrong in [(5.0, -3.0, -8.0, -2.0), (30.0, 40.0, -8.0, -2.0), (0.0, 1.0, -8.0, -2.0)]:
+        with pytest.raises(StudyError, match=r"window = .* must be x0 x1 y0 y1"):
+            map_figure(run, "quantity", window=wrong)
+
+
+@pytest.mark.parametrize(("name", "side"), [("punch", 5e-4 * 50.0), ("rolling", 8.2918 / 64)])
+def test_maps_are_as_fine_as_the_elements_near_the_contact(name: str, side: float) -> None:
+    scene = SCENES[name]
+    view = scene.view(scene.parameters())
+    rows = np.abs(view.y)
+    assert rows.min() < 0.51 * side
+    assert np.diff(np.sort(rows[view.y < 0])).max() < 60 * side
+    if name == "punch":
+        assert np.abs(view.x - 50.0).min() < 0.51 * side
+        assert (view.y > 0).any()
 
 
 def test_zoom_shows_the_neighbourhood_of_the_edge(computed: ComputedStudy) -> None:

@@ -1,0 +1,112 @@
+"""One value a run, drawn over one swept number, or over labels: a curve for each of the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import cycle
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from studies.errors import StudyError
+from studies.views.plots.captions import (
+    capitalised,
+    setting,
+    short_label,
+    value_text,
+    words,
+    wrapped,
+)
+from studies.views.plots.runs import Kind, absent, known_values, look_of, standing
+from studies.views.reading import flags, sweep_axes
+
+MOST_CURVES = 12
+
+_MARKS = "osD^vPh*"
+_SIZE = (8.0, 4.6)
+_FOOT = 0.03
+"""Height of the marks of runs without a value / height of the figure."""
+
+
+def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
+    """Return `field` over the number that is swept, with a curve for each combination of the rest.
+
+    Where only labels are swept they stand side by side. Runs without a value are marked below, by
+    their status.
+
+    Parameters
+    ----------
+    dataset : of a study
+    field : one of its variables with one value a run
+
+    Raises
+    ------
+    StudyError
+        when nothing varies, or more than `MOST_CURVES` curves would be drawn
+    """
+    numbers, labels = standing(dataset)
+    if not numbers and not labels:
+        allowed = "has one value a run, which is drawn over what is swept, but nothing varies here"
+        raise StudyError("field", field, allowed)
+    across, *others = [*numbers, *labels]
+    curves = math.prod(each.size for each in others)
+    if curves > MOST_CURVES:
+        rest = ", ".join(str(each.name) for each in others)
+        raise StudyError(
+            "field",
+            field,
+            f"would take {curves} curves, at most {MOST_CURVES} are drawn: select values of {rest}",
+        )
+    look_of(dataset, field)  # where no run has a value: say so
+    sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
+    axes = sheet.add_subplot()
+    numeric = across.dtype.kind in "fiu"
+    x = across.to_numpy() if numeric else np.arange(across.size)
+    values = known_values(dataset, field)
+    missing: dict[Kind, list[float]] = {}
+    for at, mark in zip(np.ndindex(*(each.size for each in others)), cycle(_MARKS), strict=False):
+        own = {str(each.dims[0]): i for each, i in zip(others, at, strict=True)}
+        line, status = (each.isel(own).squeeze() for each in (values, dataset["status"]))
+        name = ", ".join(value_text(each[i]) for each, i in zip(others, at, strict=True))
+        order, y = np.argsort(x), line.to_numpy()
+        style = "-" if numeric and not flags(dataset[field]) else "none"
+        axes.plot(
+            x[order], y[order], linestyle=style, marker=mark, markersize=5.0, label=name or None
+        )
+        for kind, there in absent(np.isfinite(y), status.to_numpy()).items():
+            missing.setdefault(kind, []).extend(x[there])
+    for kind, places in missing.items():
+        foot = np.full(len(places), _FOOT)
+        kind.draw(axes, np.array(places), foot, axes.get_xaxis_transform())
+    if not numeric:
+        axes.set_xticks(x, [str(each) for each in across.to_numpy()])
+    _scale(axes, dataset[field], values)
+    axes.grid(color="0.92")
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_xlabel(capitalised(short_label(across)))
+    if others or missing:
+        axes.legend(
+            loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, frameon=False,
+            title=", ".join(words(str(each.name)) for each in others),
+        )  # fmt: skip
+    single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
+    below = wrapped(setting(dataset.squeeze(single)), _SIZE[0], 8)
+    name = capitalised(dataset[field].attrs.get("long_name", words(field)))
+    axes.set_title(below, loc="left", fontsize=8, color="0.3")
+    sheet.suptitle(name, x=0.01, ha="left", fontsize=11, weight="bold")
+    return sheet
+
+
+def _scale(axes: Axes, field: xr.DataArray, values: xr.DataArray) -> None:
+    """Name the axis that goes up: a number with its unit, or the meanings of flags that occur."""
+    meanings: Mapping[int, str] = flags(field)
+    if not meanings:
+        axes.set_ylabel(capitalised(short_label(field)))
+        return
+    there = [code for code in meanings if (values == code).any()]
+    axes.set_yticks(there, [words(meanings[code]) for code in there])
+    axes.margins(y=0.2)

@@ -1,0 +1,128 @@
+"""The runs of a study as figures see them: what stands for the axes, and how a run is marked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.lines import Line2D
+from matplotlib.transforms import Transform
+
+from studies.definition.cases import USUAL_AXES
+from studies.definition.vocabulary import OK, STATUSES
+from studies.errors import StudyError
+from studies.views.plots.captions import words
+from studies.views.plots.maps import SIGNED
+from studies.views.reading import flags, sweep_axes, sweep_coordinates
+
+_CATEGORIES = (
+    ("o", "#56B4E9"), ("s", "#0072B2"), ("D", "#E69F00"), ("^", "#D55E00"),
+    ("P", "#999999"), ("v", "#CC79A7"), ("h", "#009E73"), ("*", "#000000"),
+)  # fmt: skip
+"""Marker and colour by flag value: colours told apart by every kind of eye (Okabe and Ito)."""
+POINTS = 8.0
+"""Size of a mark [points]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """Runs that are drawn alike."""
+
+    name: str
+    marker: str
+    colour: str = "0.15"
+    filled: bool = True
+
+    def draw(
+        self, axes: Axes, x: np.ndarray, y: np.ndarray, transform: Transform | None = None
+    ) -> Line2D:
+        """Draw marks; without a transform in the numbers of the axes."""
+        face = self.colour if self.filled else "none"
+        (line,) = axes.plot(
+            x, y, linestyle="", marker=self.marker, markersize=POINTS, color=self.colour,
+            markerfacecolor=face, label=self.name, zorder=3.0,
+            transform=transform or axes.transData,
+        )  # fmt: skip
+        return line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """How values are drawn: flags by kind; other numbers, where there are no flags, by colour."""
+
+    flags: Mapping[int, Kind]
+    norm: Normalize
+    colours: str
+
+
+_FAILED = Kind(name="failed or missing", marker="x")
+_ABSENT = {
+    OK: Kind(name="no value", marker="."),
+    "limit_load": Kind(name="no equilibrium", marker="s", filled=False),
+}
+"""Runs without a value by status; others are `_FAILED`."""
+
+
+def standing(dataset: xr.Dataset) -> tuple[list[xr.DataArray], list[xr.DataArray]]:
+    """Return what stands for each axis that varies: numbers, the usual ones first; and the others.
+
+    A number stands for an axis where it tells its values apart: the axis itself, or a parameter
+    that a linked axis sets.
+    """
+    several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
+    every = [_standing(dataset, axis) for axis in several]
+    numbers = sorted((each for each in every if each.dtype.kind in "fiu"), key=_rank)
+    return numbers, [each for each in every if each.dtype.kind not in "fiu"]
+
+
+def _standing(dataset: xr.Dataset, axis: str) -> xr.DataArray:
+    """Return the first number that has another value at each point of an axis, or the axis."""
+    known = [dataset[name] for name, over in sweep_coordinates(dataset).items() if over == axis]
+    apart = [
+        each
+        for each in known
+        if each.dtype.kind in "fiu" and len(np.unique(each)) == dataset.sizes[axis]
+    ]
+    return min(apart, key=_rank, default=dataset[axis])
+
+
+def _rank(quantity: xr.DataArray) -> int:
+    name = str(quantity.name)
+    return USUAL_AXES.index(name) if name in USUAL_AXES else len(USUAL_AXES)
+
+
+def known_values(dataset: xr.Dataset, field: str) -> xr.DataArray:
+    """Return a field where runs succeeded, NaN elsewhere; the status of every run."""
+    ok = dataset["status"] == STATUSES.index(OK)
+    return dataset[field].astype(float).where(ok | (field == "status"))
+
+
+def look_of(dataset: xr.Dataset, field: str) -> Look:
+    """Return how a field is drawn; numbers that change sign have zero in the middle."""
+    known = known_values(dataset, field).to_numpy()
+    known = known[np.isfinite(known)]
+    if not known.size:
+        raise StudyError("field", field, "has no value in the runs selected")
+    low, high = float(known.min()), float(known.max())
+    kinds = {
+        value: Kind(name=words(name), marker=marker, colour=colour)
+        for (value, name), (marker, colour) in zip(
+            flags(dataset[field]).items(), _CATEGORIES, strict=False
+        )
+    }
+    if low < 0.0 < high:
+        low, high = min(low, -high), max(high, -low)
+        return Look(flags=kinds, norm=Normalize(low, high), colours=SIGNED)
+    return Look(flags=kinds, norm=Normalize(low, high), colours="viridis")
+
+
+def absent(known: np.ndarray, status: np.ndarray) -> dict[Kind, np.ndarray]:
+    """Return where runs have no value, by why: those that there are."""
+    found = {_ABSENT.get(name, _FAILED): np.zeros_like(known) for name in STATUSES}
+    for value, name in enumerate(STATUSES):
+        found[_ABSENT.get(name, _FAILED)] |= ~known & (status == value)
+    return {kind: there for kind, there in found.items() if there.any()}

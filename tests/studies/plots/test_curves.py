@@ -1,0 +1,147 @@
+"""Curves over one axis of the sweep, contours over two, and lines of several runs together."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.contour import QuadContourSet
+from matplotlib.lines import Line2D
+
+from studies import StudyError
+from studies.definition.vocabulary import STATUSES
+from studies.storage.dataset import attributes_of
+from studies.views.plots.picture import picture
+from studies.views.plots.sweep import sweep_figure
+from tests.studies.plots.test_lines import legend_of, lines_of
+
+LOADS, FRICTIONS, LAWS = [0.6, 0.2, 0.4], [0.0, 0.1], ["none", "kinematic"]
+
+
+def swept(
+    loads: list[float] = LOADS, frictions: list[float] = FRICTIONS, laws: list[str] = LAWS
+) -> xr.Dataset:
+    """Runs whose figure is load + 10 friction + 100 number of the law; a line of s as well."""
+    sweep = ("load_ratio", "friction", "hardening")
+    shape = tuple(map(len, (loads, frictions, laws)))
+    value = np.add.outer(
+        np.add.outer(loads, np.multiply(10.0, frictions)), 100.0 * np.arange(shape[2])
+    )
+    s = np.linspace(0.0, 4.0, 5)
+    return xr.Dataset(
+        {
+            "status": (sweep, np.zeros(shape, dtype=np.int8), attributes_of("status")),
+            "message": (sweep, np.full(shape, "", dtype=object)),
+            "increments": (sweep, value, {"units": "MPa", "long_name": "a figure"}),
+            "contact_pressure": ((*sweep, "s"), value[..., None] * s, {"units": "MPa"}),
+        },
+        coords={
+            "load_ratio": loads,
+            "friction": frictions,
+            "hardening": laws,
+            "s": ("s", s, {"units": "mm"}),
+        },
+        attrs={"scene": "punch", "parameters": json.dumps({})},
+    )
+
+
+def points(line: Line2D) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y in np.transpose(line.get_data())]
+
+
+def test_one_swept_number_is_drawn_as_a_curve_for_each_of_the_rest() -> None:
+    sheet = sweep_figure(swept(frictions=[0.1]), "increments")
+    axes = sheet.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Load ratio", "Increments [MPa]")
+    assert legend_of(sheet) == LAWS
+    for number, line in enumerate(lines_of(sheet)):
+        expected = [(load, load + 1.0 + 100.0 * number) for load in sorted(LOADS)]
+        assert points(line) == [pytest.approx(each) for each in expected]
+        assert line.get_linestyle() == "-"
+
+
+def test_runs_without_a_value_are_marked_at_the_foot_and_named_once() -> None:
+    dataset = swept(frictions=[0.0])
+    for law in range(2):
+        dataset["status"][0, 0, law] = STATUSES.index("limit_load")
+    sheet = sweep_figure(dataset, "increments")
+    assert legend_of(sheet) == [*LAWS, "no equilibrium"]
+    *curves, foot = lines_of(sheet)
+    assert [at[0] for at in points(foot)] == [0.6, 0.6]
+    assert all(y < 0.1 for _, y in points(foot))
+    assert all(np.isnan(line.get_ydata()[-1]) for line in curves)
+
+
+def test_labels_alone_stand_side_by_side() -> None:
+    sheet = sweep_figure(swept(loads=[0.2], frictions=[0.0]), "increments")
+    (line,) = lines_of(sheet)
+    assert points(line) == [(0.0, pytest.approx(0.2)), (1.0, pytest.approx(100.2))]
+    assert line.get_linestyle() == "None"
+    assert [text.get_text() for text in sheet.axes[0].get_xticklabels()] == LAWS
+
+
+def test_an_outcome_is_drawn_by_its_name() -> None:
+    dataset = swept(frictions=[0.0], laws=["none"])
+    dataset["status"][1, 0, 0] = STATUSES.index("limit_load")
+    axes = sweep_figure(dataset, "status").axes[0]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["ok", "limit load"]
+
+
+def test_too_many_curves_ask_for_a_selection() -> None:
+    laws = [f"law{number}" for number in range(13)]
+    with pytest.raises(StudyError, match=r"13 curves, at most 12 .* of hardening"):
+        sweep_figure(swept(frictions=[0.0], laws=laws), "increments")
+    with pytest.raises(StudyError, match="nothing varies here"):
+        sweep_figure(swept(loads=[0.2], frictions=[0.0], laws=["none"]), "increments")
+
+
+def test_contours_are_drawn_where_a_sweep_is_dense_but_not_over_holes() -> None:
+    few, many = [0.0, 0.1, 0.2], list(np.linspace(0.0, 0.7, 8))
+    assert not contours(sweep_figure(swept(many, few, ["none"]), "increments").axes[0])
+    dataset = swept(many, many[::-1], ["none"])
+    dataset["status"][0, 0, 0] = STATUSES.index("limit_load")  # load 0, friction 0.7
+    filled, _ = contours(sweep_figure(dataset, "increments").axes[0])
+    inside = [path.contains_point((0.69, 0.01)) for path in filled.get_paths()]
+    assert not any(inside)
+    middle = [path.contains_point((0.37, 0.33)) for path in filled.get_paths()]
+    (level,) = np.flatnonzero(middle)
+    assert filled.levels[level] <= 0.33 + 3.7 <= filled.levels[level + 1]
+
+
+def contours(axes: Axes) -> list[QuadContourSet]:
+    return [each for each in axes.collections if isinstance(each, QuadContourSet)]
+
+
+def test_lines_of_several_runs_lie_over_one_axis() -> None:
+    dataset = swept()
+    dataset["status"][1, 1, 0] = STATUSES.index("limit_load")  # load 0.2, friction 0.1, none
+    selection = {"load_ratio": 0.4, "friction": 0.1}
+    sheet = picture(dataset, "contact_pressure", selection=selection, over="hardening")
+    assert legend_of(sheet) == LAWS
+    first, second = lines_of(sheet)
+    assert points(first)[-1] == (4.0, pytest.approx(4.0 * 1.4))
+    assert points(second)[-1] == (4.0, pytest.approx(4.0 * 101.4))
+    assert first.get_linestyle() != second.get_linestyle()
+    left = {"load_ratio": 0.2, "friction": 0.1}
+    assert (
+        len(lines_of(picture(dataset, "contact_pressure", selection=left, over="hardening"))) == 1
+    )
+    with pytest.raises(StudyError, match="over = 'colour': must be one of load_ratio"):
+        picture(dataset, "contact_pressure", over="colour")
+
+
+def test_runs_with_different_grids_are_not_laid_over_each_other() -> None:
+    dataset = swept().rename(s="place").drop_vars("place").rename(place="s")
+    dataset = dataset.assign_coords(
+        s_fraction=("s", np.linspace(0.0, 1.0, 5)), s=(("load_ratio", "s"), np.ones((3, 5)))
+    )
+    with pytest.raises(StudyError, match="changes s: these runs have no place in common"):
+        picture(dataset, "contact_pressure", over="load_ratio")
+
+
+def test_the_resolution_is_that_of_the_file() -> None:
+    dataset = swept(frictions=[0.0])
+    assert picture(dataset, "increments", resolution=300).dpi == 300.0

@@ -1,0 +1,38 @@
+"""Messages of runs: each kind once, with its range and the runs that have it."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from studies.definition.vocabulary import STATUSES
+from studies.views.tables import messages
+
+
+def told(texts: list[str], statuses: list[str]) -> str:
+    codes = np.array([STATUSES.index(each) for each in statuses], dtype=np.int8)
+    return messages(
+        xr.Dataset(
+            {
+                "status": ("load_ratio", codes),
+                "message": ("load_ratio", np.array(texts, dtype=object)),
+            },
+            coords={"load_ratio": np.linspace(0.1, 0.1 * len(texts), len(texts))},
+        )
+    )
+
+
+def test_messages_that_differ_in_numbers_are_one_kind_with_its_range() -> None:
+    texts = ["strain reaches 12%: reduce T1", "", "strain reaches 9.5%: reduce T1"]
+    told_of = told([*texts, "strain reaches 12%: reduce T2"], ["ok"] * 4)
+    assert (
+        "\nwarning: strain reaches 9.5 to 12%: reduce T1\n    2 runs: load_ratio = 0.1; " in told_of
+    )
+    assert "\nwarning: strain reaches 12%: reduce T2\n    1 run: load_ratio = 0.4\n" in told_of
+
+
+def test_outcomes_are_kinds_of_their_own() -> None:
+    text = "between x = -1e-3 and 2 of body 'pin2'"
+    told_of = told([text, text.replace("-1e-3", "0.5")], ["ok", "limit_load"])
+    assert f"\nwarning: {text}\n" in told_of
+    assert "\nlimit_load: between x = 0.5 and 2 of body 'pin2'\n" in told_of
