@@ -19,6 +19,7 @@ from solver.loading.program import Lap, Program
 from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
 from solver.model.loads import InitialStress
+from solver.results import saved
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
 from solver.results.mesh_fields import MeshFields, mesh_fields
@@ -172,6 +173,20 @@ class Solution:
     def mesh_fields(self) -> MeshFields:
         """Return the fields at the nodes of all bodies at all stages."""
         return mesh_fields(self.system, self.stages)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model and its states to a file, for `load`."""
+        content = {name: getattr(self, name) for name in ("stages", "tally", "history")}
+        saved.write(Path(path), {"model": self.system.model, **content})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Solution:
+        """Return the solution that `save` has written, with the same version of the solver.
+
+        The file is a pickle, which can run code: load only what you have saved yourself.
+        """
+        content = saved.read(Path(path))
+        return cls(system=System(content.pop("model")), **content)
 
     def audit(self, stage: str = "loaded") -> Audit:
         """Return the audit: figures of a state, violated conditions and warnings.

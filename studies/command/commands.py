@@ -12,7 +12,6 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from studies.definition.study import Study
 from studies.errors import StudyError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -23,6 +22,7 @@ def run(options: argparse.Namespace) -> int:
     from studies.command.cost import dry_run, long_run
     from studies.command.progress import Progress
     from studies.command.report import prepare, report
+    from studies.definition.study import Study
     from studies.execution.cluster import Access
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
 def scenes(options: argparse.Namespace) -> int:
     """List the scenes, or the parameters of one."""
-    from studies.views.tables import scene_table, scenes_table
+    from studies.views.scene_tables import scene_table, scenes_table
 
     print(scene_table(options.name) if options.name else scenes_table())
     return OK
@@ -87,7 +87,8 @@ def show(options: argparse.Namespace) -> int:
     begun = begun_studies(options.path)
     for path in (present_datasets if begun else find_datasets)(options.path):
         with open_netcdf(path) as dataset:
-            print(f"{dataset.attrs['title']}  ({path})\n")
+            words = [dataset.attrs[name] for name in ("note", "tags") if name in dataset.attrs]
+            print(f"{dataset.attrs['title']}  ({path})", *words, "", sep="\n")
             if dataset["status"].size == 1:
                 print(run_details(dataset), end="\n\n")
             else:

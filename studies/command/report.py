@@ -74,7 +74,8 @@ def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
     table = runs_table(dataset) + "\n" if study.size <= SHOWN else ""
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
     ended = f"{study.name}: {study.size} runs ({counts}{_warned(dataset)})"
-    return f"{table}{messages(dataset)}\n{ended}\n"
+    note = f"\nnote: {study.note}\n" if study.note else ""
+    return f"{table}{messages(dataset)}{note}\n{ended}\n"
 
 
 def _warned(dataset: xr.Dataset) -> str:

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import textwrap
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 _HEADING = 9
 """Characters after which a heading goes on in the next line."""
 _WIDTH = 120
 """Characters after which a table goes on below, with the axes repeated."""
 _GAP = "  "
+
+
+def value_text(value: Any) -> str:
+    """Return a value as a table shows it, numbers with four digits."""
+    if isinstance(value, bool):
+        return json.dumps(value)
+    if isinstance(value, float | np.floating):
+        return "-" if np.isnan(value) else f"{value:z.4g}"
+    return "-" if value is None else str(value)
 
 
 def stacked(headings: Sequence[str]) -> list[list[str]]:

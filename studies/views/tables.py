@@ -1,4 +1,4 @@
-"""Text tables: the runs of a study, the parameters of a scene."""
+"""Text tables: the runs of a study, and one run."""
 
 from __future__ import annotations
 
@@ -6,17 +6,14 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.vocabulary import OK, STATUSES
-from studies.scenes.registry import beside, known_scenes, scene_named
 from studies.storage.ugrid import owns
-from studies.views.columns import aligned, in_blocks, stacked
+from studies.views.columns import aligned, in_blocks, stacked, value_text
 from studies.views.reading import flags, sweep_axes, sweep_coordinates
 
 FIGURES: Mapping[str, str] = {
@@ -73,9 +70,9 @@ def runs_table(dataset: xr.Dataset) -> str:
     rows = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
-        where = [_text(values[name][place[axis]]) for name, axis in places.items()]
+        where = [value_text(values[name][place[axis]]) for name, axis in places.items()]
         status = STATUSES[values["status"][at]]
-        rows.append([*where, status, *(_text(each[at]) for each in numbers)])
+        rows.append([*where, status, *(value_text(each[at]) for each in numbers)])
     return in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
 
 
@@ -103,7 +100,7 @@ def messages(dataset: xr.Dataset) -> str:
     found: dict[tuple[str, str], list[tuple[list[str], str]]] = defaultdict(list)
     for at in np.ndindex(status.shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
-        where = (f"{axis} = {_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
+        where = (f"{axis} = {value_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
         if text[at]:
             outcome = STATUSES[status[at]]
             kind = "warning" if outcome == OK else outcome
@@ -139,7 +136,7 @@ def run_details(dataset: xr.Dataset) -> str:
     """Return the parameters, outcome and figures of a single run."""
     lines = [["scene", dataset.attrs["scene"]]]
     swept = {name: dataset[name].item() for name in sweep_coordinates(dataset)}
-    lines += [[name, _text(value)] for name, value in (_parameters(dataset) | swept).items()]
+    lines += [[name, value_text(value)] for name, value in (_parameters(dataset) | swept).items()]
     lines.append(["status", _figure(dataset["status"])])
     if message := str(dataset["message"].item()):
         lines.append(["message", message])
@@ -154,42 +151,13 @@ def run_details(dataset: xr.Dataset) -> str:
     return aligned(lines)
 
 
-def scenes_table() -> str:
-    """Return a line for each scene."""
-    return aligned([[scene.name, scene.summary] for scene in known_scenes()])
-
-
-def scene_table(name: str) -> str:
-    """Return a line for each parameter of a scene: default, what is allowed, what it means.
-
-    ``name`` is that of a scene, or the path of a scene file.
-    """
-    scene = scene_named(name, beside(Path()))
-    known = parameters_of(scene).values()
-    lines = [["parameter", "default", "allowed", "meaning"]]
-    lines += [[each.name, _usual(each), each.allowed, each.description] for each in known]
-    return f"{scene.name}: {scene.summary}\n\n{aligned(lines)}"
-
-
-def _usual(parameter: Parameter) -> str:
-    return "by accuracy" if parameter.default is None else _text(parameter.default)
-
-
 def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
     return json.loads(dataset.attrs["parameters"])
 
 
 def _figure(variable: xr.DataArray) -> str:
     """Return the single value of a variable; what a flag means instead of its number."""
-    return flags(variable).get(variable.item()) or _text(variable.item())
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return json.dumps(value)
-    if isinstance(value, float | np.floating):
-        return "-" if np.isnan(value) else f"{value:z.4g}"
-    return "-" if value is None else str(value)
+    return flags(variable).get(variable.item()) or value_text(variable.item())
 
 
 def _unit(variable: xr.DataArray) -> str:

@@ -248,6 +248,17 @@ def test_show_takes_a_run_a_study_or_a_directory(
     assert main(["show", str(store.directory / "nowhere")]) == 2
 
 
+def test_the_note_and_the_tags_of_a_study_are_printed_with_it(
+    study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = study_file(), str(tmp_path / "out")
+    path.write_text('note = "loads of the drawing"\ntags = ["first", "rail"]\n' + path.read_text())
+    assert main(["run", str(path), "--out", out, "--workers", "1"]) == 0
+    assert "\nnote: loads of the drawing\n" in capsys.readouterr().out
+    assert main(["show", out]) == 0
+    assert "\nloads of the drawing\nfirst rail\n\n" in capsys.readouterr().out
+
+
 def test_plot_draws_any_field_of_any_run(
     computed: tuple[Study, Store], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

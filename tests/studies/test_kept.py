@@ -94,6 +94,18 @@ def test_a_complete_study_imports_nothing_that_computes_or_draws(
     assert not HEAVY & set(told.stderr.split())
 
 
+@pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["scenes", "punch"]])
+def test_scenes_are_told_without_libraries_that_compute_or_draw(arguments: list[str]) -> None:
+    code = (
+        "import atexit, sys; from studies.command.cli import main;"
+        "atexit.register(lambda: print(*sys.modules, file=sys.stderr)); main(sys.argv[1:])"
+    )
+    command = [sys.executable, "-c", code, *arguments]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert "punch" in told.stdout or "usage" in told.stdout
+    assert not HEAVY & set(told.stderr.split())
+
+
 def flip(path: Path) -> None:
     """Damage a file as a disk does: its length and its time stay."""
     state, content = path.stat(), bytearray(path.read_bytes())
