@@ -1,7 +1,8 @@
-"""Every script of `examples/` runs, and what it asserts holds."""
+"""Every script and notebook of `examples/` runs, and what it asserts holds."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -12,19 +13,44 @@ import pytest
 from tests.architecture.sources import ROOT
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 
 def test_there_are_examples() -> None:
     assert "own_law.py" in {path.name for path in EXAMPLES}
+    assert "study_to_figure.ipynb" in {path.name for path in NOTEBOOKS}
+
+
+def run(arguments: list[str], folder: Path) -> None:
+    paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(script: Path, tmp_path: Path) -> None:
-    paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    run(["-W", "error", str(script)], tmp_path)
     assert "assert" in script.read_text(), "an example checks what it shows"
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_cells_of_a_notebook_run_after_make_run(notebook: Path, tmp_path: Path) -> None:
+    """They run on a coarse and small form of the study that `make run` computes."""
+    study = (ROOT / "data/studies/punch.toml").read_text()
+    study = study.replace("[parameters]", '[parameters]\naccuracy = "draft"')
+    study = study.replace("[0.0, 0.1, 0.2, 0.3, 0.4]", "[0.0, 0.2]")
+    study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
+    (tmp_path / "punch.toml").write_text(study)
+    run(["-m", "studies.command.cli", "run", "punch.toml", "--out", "out"], tmp_path)
+    cells = json.loads(notebook.read_text())["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert not any(cell.get("outputs") for cell in cells), "a notebook is kept without its outputs"
+    assert "assert" in "".join(code), "a notebook checks what it shows"
+    (tmp_path / "cells.py").write_text("\n".join(code))
+    run(["-W", "error", "cells.py"], tmp_path)
+    assert (tmp_path / "punch.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "punch.pdf").read_bytes().startswith(b"%PDF")

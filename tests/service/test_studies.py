@@ -59,6 +59,9 @@ def test_python_opens_a_study_by_its_url(service: Server, done: dict[str, Any]) 
     assert dataset.sizes["load_ratio"] == 2
     assert dataset.attrs["id"] == done["id"]
     assert open_study(f"{url}/dataset.nc").identical(dataset)
+    with xr.open_dataset(f"{url}/dataset.nc#mode=bytes") as parts:  # as the README says
+        assert parts["load_ratio"].identical(dataset["load_ratio"])
+        np.testing.assert_array_equal(parts["plastic_strain"], dataset["plastic_strain"])
     with pytest.raises(StudyError, match=r"must be a study of a service: .*404"):
         open_study(f"{service.client.base_url}/studies/{'0' * 32}")
     with pytest.raises(StudyError, match="must be a study of a service"):
