@@ -21,27 +21,47 @@ _ROUNDING = 1e-9
 """Stress / yield stress that is rounding: it has no place."""
 
 
-def _declared(most: str, words: str) -> tuple[Quantity, ...]:
-    """Declare an extreme in a body, and on its contact surface, each with its place."""
-    place = f"of the {words} residual stress in the body"
-    return (
-        declare(f"residual_{most}", f"{words} residual stress in the body", "MPa", dims=_OVER),
-        declare(f"residual_{most}_x", f"position along x {place}", "mm", dims=_OVER),
-        declare(f"residual_{most}_y", f"position along y {place}", "mm", dims=_OVER),
-        declare(
-            f"surface_residual_{most}", f"{words} residual stress at the contact surface", "MPa",
-            dims=_OVER,
-        ),
-        declare(
-            f"surface_residual_{most}_s",
-            f"distance along the surface from its middle {place.replace('in the body', 'there')}",
-            "mm", dims=_OVER,
-        ),
-    )  # fmt: skip
-
-
-LARGEST = _declared("max", "largest")
-SMALLEST = _declared("min", "smallest")
+LARGEST = (
+    declare("residual_max", "largest residual stress in the body", "MPa", dims=_OVER),
+    declare(
+        "residual_max_x", "position along x of the largest residual stress in the body", "mm",
+        dims=_OVER,
+    ),
+    declare(
+        "residual_max_y", "position along y of the largest residual stress in the body", "mm",
+        dims=_OVER,
+    ),
+    declare(
+        "surface_residual_max", "largest residual stress at the contact surface", "MPa",
+        dims=_OVER,
+    ),
+    declare(
+        "surface_residual_max_s",
+        "distance along the surface from its middle of the largest residual stress there", "mm",
+        dims=_OVER,
+    ),
+)  # fmt: skip
+SMALLEST = (
+    declare("residual_min", "smallest residual stress in the body", "MPa", dims=_OVER),
+    declare(
+        "residual_min_x", "position along x of the smallest residual stress in the body", "mm",
+        dims=_OVER,
+    ),
+    declare(
+        "residual_min_y", "position along y of the smallest residual stress in the body", "mm",
+        dims=_OVER,
+    ),
+    declare(
+        "surface_residual_min", "smallest residual stress at the contact surface", "MPa",
+        dims=_OVER,
+    ),
+    declare(
+        "surface_residual_min_s",
+        "distance along the surface from its middle of the smallest residual stress there", "mm",
+        dims=_OVER,
+    ),
+)  # fmt: skip
+"""In the body, with x and y; at its contact surface, with s."""
 
 
 def residual_extremes(look: Look) -> Values:

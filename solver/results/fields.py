@@ -19,7 +19,7 @@ RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("co
 RESIDUAL_MISES = declare(
     "residual_mises", "von Mises stress of the residual stress", "MPa", dims=_MAP
 )
-PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain", dims=_MAP)
+PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain after unloading", dims=_MAP)
 MISES_LOADED = declare("mises_loaded", "von Mises stress under load", "MPa", dims=_MAP)
 STRESS_DIFFERENCE = declare(
     "stress_difference",
@@ -30,7 +30,9 @@ RESIDUAL_PROFILE = declare(
     dims=("station", "component", "depth"),
 )  # fmt: skip
 PLASTIC_STRAIN_PROFILE = declare(
-    "plastic_strain_profile", "equivalent plastic strain along depth", dims=("station", "depth")
+    "plastic_strain_profile",
+    "equivalent plastic strain along depth after unloading",
+    dims=("station", "depth"),
 )
 MAP_STRESS = declare("map_stress", "stress", "MPa", dims=("stage", "component", *_MAP))
 MAP_MISES = declare("map_mises", "von Mises stress", "MPa", dims=("stage", *_MAP))

@@ -11,7 +11,9 @@ from solver.results.quantities import declare
 if TYPE_CHECKING:
     from solver.results.look import Look, Values
 
-MAX_PLASTIC_STRAIN = declare("max_plastic_strain", "largest equivalent plastic strain")
+MAX_PLASTIC_STRAIN = declare(
+    "max_plastic_strain", "largest equivalent plastic strain after unloading"
+)
 DEPTH_OF_MAX_PLASTIC_STRAIN = declare(
     "depth_of_max_plastic_strain",
     "depth of the largest plastic strain; negative in the upper body", "mm",

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.definition.vocabulary import OK, STATUSES
+from solver.results.quantities import QUANTITIES
+from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK, STATUSES
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked, value_text
 from studies.views.reading import flags, sweep_axes, sweep_coordinates
@@ -78,6 +79,8 @@ def runs_table(dataset: xr.Dataset) -> str:
 
 def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
     """Yield the heading of each figure that the runs have, and its values over the sweep."""
+    for name in _own(dataset):
+        yield name.replace("_", " "), dataset[name]
     for name, heading in FIGURES.items():
         if name not in dataset:
             continue
@@ -88,6 +91,15 @@ def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
             each = values.isel(body=k) if "body" in values.dims else values
             words = {c: str(each[c].item()) for c in ("body", "component") if c in each.coords}
             yield heading.format(**words).replace("_", " "), each
+
+
+def _own(dataset: xr.Dataset) -> list[str]:
+    """Return the outputs that a scene file declares, without their places."""
+    rank = dataset["status"].dims
+    names = [str(name) for name, each in dataset.data_vars.items() if each.dims == rank]
+    known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
+    own = [name for name in names if name not in known and not name.startswith("audit_")]
+    return [name for name in own if name[-2:] not in {"_x", "_y"} or name[:-2] not in own]
 
 
 def messages(dataset: xr.Dataset) -> str:

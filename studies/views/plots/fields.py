@@ -15,7 +15,7 @@ Window = Sequence[float]
 """Part of a map: x0, x1, y0, y1 [mm]."""
 
 MAP = ("y", "x")
-ALONG = ("s", "depth", "increment")
+ALONG = ("s", "depth", "increment", "fraction", "moment")
 """Dimensions that one figure of a run runs over: both of a map, or one of these for lines."""
 
 

@@ -30,6 +30,7 @@ _EACH, _LINES = 6, 12
 """Most values of a dimension, and most lines, that are told apart."""
 _STYLES = ("-", "--", ":", "-.")
 _SIZE = (8.0, 4.6)
+_LENGTHS = ("s", "depth")
 
 
 def line_figure(
@@ -39,9 +40,9 @@ def line_figure(
     zoom: float | None = None,
     over: str | None = None,
 ) -> Figure:
-    """Return `field` along the surface, depth or increments: a line for each of the rest.
+    """Return `field` over a length or increments, with a line for each of the rest.
 
-    The rest are passes, stations, stages, bodies.
+    The rest are passes, stations, stages, bodies, contacts.
 
     Of more passes than can be told apart the first, the last and some between are drawn, and of
     several stations then the middle one.
@@ -55,8 +56,8 @@ def line_figure(
     check_field(field, line_fields(run))
     values = component_of(run[field], component)
     along = next(name for name in ALONG if name in values.dims)
-    if zoom is not None and along == "increment":
-        raise StudyError("zoom", zoom, f"{field} lies over increments: leave it out")
+    if zoom is not None and along not in _LENGTHS:
+        raise StudyError("zoom", zoom, f"{field} lies over {words(along)}, no length: leave it out")
     for name in values.dims:
         values = values.dropna(name, how="all")
     if not values.size:

@@ -151,5 +151,5 @@ def test_a_course_is_drawn_over_increments_and_has_no_zoom() -> None:
     run["force"] = ("increment", np.array([0.0, 2.0, 3.0, np.nan]), {"units": "N"})
     (line,) = lines_of(line_figure(run, "force"))
     assert np.asarray(line.get_xdata()).tolist() == [0.0, 1.0, 2.0]
-    with pytest.raises(StudyError, match="force lies over increments: leave it out"):
+    with pytest.raises(StudyError, match="force lies over increment, no length: leave it out"):
         line_figure(run, "force", zoom=1.0)

@@ -22,6 +22,8 @@ from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named, scene_of
 from studies.scenes.scene import FileScene, file_scene, read_scene
+from studies.views.plots.picture import picture
+from studies.views.tables import runs_table
 from tests.studies.scenes.conftest import BLOCKS, blocks, built
 
 ROOT = Path(__file__).parents[3]
@@ -156,6 +158,26 @@ def test_a_data_set_knows_its_scene_without_the_file(
     known = scene_of(dataset.attrs)
     assert known.parameters().mu == 0.2
     assert scene_schema(known)["properties"]["wide"]["unit"] == "mm"
+
+
+def test_what_a_file_asks_for_is_in_the_table_and_in_pictures(
+    swept: tuple[Study, Store, xr.Dataset],
+) -> None:
+    _, _, dataset = swept
+    headings = set(" ".join(runs_table(dataset).splitlines()[:4]).split())
+    assert "least" in headings
+    assert not {"x", "y"} & headings, "places are in the data set"
+    lines = picture(dataset, "line_stress", "yy", selection={"wide": 2.0}, over="mu")
+    drawn = [each for each in lines.axes[0].lines if len(each.get_xdata()) > 2]
+    assert len(drawn) == 2 * dataset.sizes["stage"] * dataset.sizes["line"]
+    x, y = drawn[0].get_data()
+    expected = dataset["line_stress"].sel(mu=0.0, wide=2.0, component="yy").isel(stage=0, line=0)
+    np.testing.assert_allclose(y, expected.squeeze())
+    assert (x[0], x[-1]) == (0.0, 1.0)
+    course = picture(dataset, "contact_normal_force").axes[0]
+    assert course.get_xlabel() == "number of the increment of the program"
+    with pytest.raises(StudyError, match="lies over fraction, no length: leave it out"):
+        picture(dataset, "line_stress", zoom=1.0)
 
 
 def test_a_store_keeps_the_scene_and_gives_it_by_its_id(
