@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _OVER = ("body", "component")
-_ROUNDING = 1e-9
-"""Stress / yield stress that is rounding: it has no place."""
+_ROUNDING, _SAME = 1e-9, 1e-6
+"""Stress / yield stress that is rounding, and has no place; relative difference of rounding."""
 
 
 LARGEST = (
@@ -67,25 +67,34 @@ SMALLEST = (
 def residual_extremes(look: Look) -> Values:
     """Return the extreme residual stresses at the nodes of each body and of its contact surface.
 
-    Where two nodes have the same stress the first one is told; where there is no stress, none.
+    Of nodes with the same stress, as on a track that a pass leaves alike along x, the one nearest
+    to the middle of the contact is told; where there is no stress, none.
     """
     none = _ROUNDING * look.parameters.yield_stress
     found: dict[Quantity, list[Array]] = {each: [] for each in LARGEST + SMALLEST}
     for name, boundary in look.view.surfaces.items():
         body = look.system.full(name)
         stress = to_tensor(look.samples.stress(name, look.unloaded))
+        away = np.abs(look.view.axis.reached(body.X))
         surface = body.boundary_nodes(boundary)
         s = look.view.axis.reached(body.X[:, surface])
         for quantities, sign in ((LARGEST, 1.0), (SMALLEST, -1.0)):
-            inside, at = _most(stress, sign, none, body.X)
-            along, where = _most(stress[:, surface], sign, none, s[None])
+            inside, at = _most(sign * stress, none, body.X, away)
+            along, where = _most(sign * stress[:, surface], none, s[None], away[surface])
+            inside, along = sign * inside, sign * along
             for quantity, values in zip(quantities, (inside, *at, along, *where), strict=True):
                 found[quantity].append(values)
     return {quantity: np.stack(values) for quantity, values in found.items()}
 
 
-def _most(stress: Array, sign: float, none: float, X: Array) -> tuple[Array, Array]:
-    """Return the extreme of each component (4,), and its place (n, 4)."""
-    nodes = (sign * stress).argmax(axis=1)
-    values = stress[np.arange(len(stress)), nodes]
-    return values, np.where(np.abs(values) > none, X[:, nodes], np.nan)
+def _most(stress: Array, none: float, X: Array, away: Array) -> tuple[Array, Array]:
+    """Return the largest value of each component (4,), and its place (n, 4).
+
+    Parameters
+    ----------
+    X, away : positions of the nodes (n, n_nodes), and their distance from the middle (n_nodes,)
+    """
+    most = stress.max(axis=1)
+    same = stress >= most[:, None] - _SAME * np.abs(most[:, None])
+    nodes = np.where(same, away, np.inf).argmin(axis=1)
+    return most, np.where(np.abs(most) > none, X[:, nodes], np.nan)

@@ -63,11 +63,15 @@ def runs_table(dataset: xr.Dataset) -> str:
     """
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
     keys = sum(name == axis for name, axis in places.items())
-    figures = dict(_figures(dataset))
-    headings = [*(name.replace("_", " ") for name in places), "status", *figures]
-    units = [*(_unit(dataset[name]) for name in places), "", *map(_unit, figures.values())]
+    figures = list(_figures(dataset))
+    headings = [
+        *(name.replace("_", " ") for name in places),
+        "status",
+        *(heading for heading, _ in figures),
+    ]
+    units = [*(_unit(dataset[name]) for name in places), "", *(_unit(each) for _, each in figures)]
     values = {name: dataset[name].to_numpy() for name in (*places, "status")}
-    numbers = [each.to_numpy() for each in figures.values()]
+    numbers = [each.to_numpy() for _, each in figures]
     rows = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))

@@ -35,6 +35,7 @@ def commands(page: str) -> list[str]:
 @pytest.mark.parametrize("page", ["README.md", "service/README.md"])
 def test_the_curl_lines_of_a_page_work(service: Server, page: str, tmp_path: Path) -> None:
     (tmp_path / ".curlrc").write_text("fail-with-body\nsilent\nshow-error\nmax-time = 120\n")
+    (tmp_path / "data").symlink_to(ROOT / "data")
     environment = os.environ | {"CURL_HOME": str(tmp_path)}
     answers: list[str] = []
     lines = commands((ROOT / page).read_text())
