@@ -35,6 +35,9 @@ _WORDS = {
     "string_pattern_mismatch": "must match {pattern}",
 }
 
+_TABLES = frozenset({"properties", "additionalProperties", "patternProperties"})
+"""What the schema of a table has, one of them at least."""
+
 Where = tuple[str | int, ...]
 
 
@@ -80,11 +83,7 @@ def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
             node = {"$ref": mapping[part]}
             continue
         options = [_resolved(schema, each) for each in node.get("anyOf", ())]
-        if (
-            options
-            and isinstance(part, str)
-            and not any("properties" in o or "additionalProperties" in o for o in options)
-        ):
+        if options and isinstance(part, str) and not any(_TABLES & o.keys() for o in options):
             continue  # the name of a branch: float, str
         node = next((o for o in options if o.get("type") != "null"), node)
         kept.append(part)
@@ -94,7 +93,8 @@ def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
         elif isinstance(part, int):
             node = node.get("items", (node.get("prefixItems") or [{}])[0])
         else:
-            below = node.get("additionalProperties")
+            named = node.get("patternProperties") or {"": node.get("additionalProperties")}
+            below = next(iter(named.values()))  # a table with names of the user's own
             node = below if isinstance(below, Mapping) else {}
     return tuple(kept), entries
 

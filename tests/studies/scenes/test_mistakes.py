@@ -59,6 +59,16 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "did you mean friction?",
     ),
     "unknown table": (put("body", {}), "body", "did you mean bodies?"),
+    "unknown entry of a rigid body": (
+        rigid(radius=3.0),
+        "rigid.plate.radius",
+        "there is no such entry; there are surfaces, centre, x, y, rotation",
+    ),
+    "unknown entry of a motion": (
+        rigid(y={"pushd": -1.0}),
+        "rigid.plate.y.pushd",
+        "there are moved, pushed, amplitude; did you mean pushed?",
+    ),
     "missing entry": (without("loads", 0, "boundary"), "loads[0].boundary", "must be given"),
     "unknown kind": (put("loads", 0, "kind", "push"), "loads[0]", "'pressure', 'traction'"),
     "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
