@@ -52,6 +52,44 @@ def cells(length: float, smallest: float, ratio: float, largest: float) -> NDArr
     return (nodes[1:] + nodes[:-1]) / 2
 
 
+def closer(start: float, stop: float, num: int, near: float, size: float) -> NDArray[np.float64]:
+    """Return points from ``start`` to ``stop``, ``size`` apart at ``near``, farther away from it.
+
+    The distances are those of a hyperbolic sine: equal close to ``near``, then in a constant
+    ratio. Points that are ``size`` apart or closer when spread evenly are spread evenly.
+
+    Parameters
+    ----------
+    near : between start and stop [mm]
+    size : distance of points at ``near`` [mm]
+
+    Raises
+    ------
+    ModelError
+        for ``size``, where neighbouring distances would differ by more than a factor of two
+    """
+    if (stop - start) / (num - 1) <= size:
+        return np.linspace(start, stop, num)
+    sides = np.array([start - near, stop - near])
+
+    def needed(growth: float) -> float:
+        """Return the number of steps of a growth (logarithm of the ratio) that fill the length."""
+        return float(np.ptp(np.arcsinh(sides * growth / size))) / growth
+
+    low, high = 0.0, math.log(2)
+    if needed(high) > num - 1:
+        raise ModelError(
+            "size", size, f"is too small for {num} points: take more, or a larger size"
+        )
+    while high - low > 1e-15:
+        middle = (low + high) / 2
+        low, high = (middle, high) if needed(middle) > num - 1 else (low, middle)
+    first, last = np.arcsinh(sides * high / size)
+    points = near + size / high * np.sinh(np.linspace(first, last, num))
+    points[[0, -1]] = start, stop
+    return np.asarray(points)
+
+
 def refined(
     points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
 ) -> NDArray[np.float64]:

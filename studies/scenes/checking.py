@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
 from solver.scenes import SCENES
 from studies.errors import StudyError
@@ -124,12 +125,9 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield StudyError("stages", given, "must be given, or loading: one of the two")
 
 
-def stage_names(scene: tables.SceneFile) -> list[str]:
-    """Return the names of the states that are kept."""
-    return [stage.name for stage in scene.stages] or ["loaded", "unloaded"]
-
-
 def _look(scene: tables.SceneFile) -> Iterator[StudyError]:
+    for axis in ("x", "y") if scene.look.map else ():
+        yield from _map(f"look.map.{axis}", getattr(scene.look.map, axis))
     for name, line in scene.look.lines.items():
         where = f"look.lines.{name}"
         yield from _one_of(f"{where}.body", line.body, scene.bodies)
@@ -142,10 +140,26 @@ def _look(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield from _one_of(f"look.points.{name}.body", point.body, scene.bodies)
 
 
+def _map(where: str, axis: tables.Spaced) -> Iterator[StudyError]:
+    start, stop = axis.start, axis.stop
+    if not start < stop:
+        yield StudyError(f"{where}.stop", stop, f"must be > start = {start:g}")
+    elif (axis.near is None) != (axis.size is None):
+        missing = "size" if axis.size is None else "near"
+        yield StudyError(f"{where}.{missing}", None, "must be given: near and size go together")
+    elif axis.near is not None and not start <= axis.near <= stop:
+        yield StudyError(f"{where}.near", axis.near, f"must be from {start:g} to {stop:g}")
+    else:
+        try:
+            axis.positions()
+        except ModelError as error:
+            yield StudyError(f"{where}.{error.field}", error.value, error.allowed)
+
+
 def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
     for name, output in scene.outputs.items():
         where = f"outputs.{name}"
-        yield from _one_of(f"{where}.stage", output.stage, stage_names(scene))
+        yield from _one_of(f"{where}.stage", output.stage, scene.stage_names)
         places: dict[str, list[str]] = {
             "body": list(scene.bodies),
             "line": list(scene.look.lines),

@@ -10,7 +10,6 @@ from solver.results.asked import Asked
 from solver.results.places import Fields, Places, along_lines, at_points, on_pairs, over_time
 from solver.results.view import View
 from studies.scenes import tables
-from studies.scenes.checking import stage_names
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,13 +24,13 @@ _NOWHERE = np.zeros(0)
 
 def view_of(scene: tables.SceneFile) -> View:
     """Return the map grid and the states; lines and points are looked at by `looked`."""
-    names = stage_names(scene)
+    names = scene.stage_names
     released = "unloaded" if scene.loading else _released(scene)
     under_load = [name for name in names if name != released]
     grid = scene.look.map
     return View(
-        x=np.linspace(grid.x.start, grid.x.stop, grid.x.num) if grid else _NOWHERE,
-        y=np.linspace(grid.y.start, grid.y.stop, grid.y.num) if grid else _NOWHERE,
+        x=grid.x.positions() if grid else _NOWHERE,
+        y=grid.y.positions() if grid else _NOWHERE,
         depth=_NOWHERE,
         station=_NOWHERE,
         s=_NOWHERE,

@@ -225,10 +225,11 @@ def _parameters(description: Description, declared: Mapping[str, tables.Paramete
     def checked(self: Any) -> None:
         check(self)
         try:
-            _tables(description, self)
+            mistakes = list(clashes(_tables(description, self), None))
         except SceneError as error:
-            first = error.mistakes[0]
-            raise ModelError(first.field, first.value, first.allowed) from None
+            mistakes = list(error.mistakes)
+        for first in mistakes[:1]:
+            raise ModelError(first.field, first.value, first.allowed)
 
     def reduced(self: Any) -> tuple[Any, ...]:
         return _again, (description, _values(self))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import Annotated, Any, Literal, get_type_hints
 
+import numpy as np
 from annotated_types import Interval
+from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
+from solver.mesh.grids import closer
 from solver.scenes.material_parameters import MaterialParameters
 from solver.scenes.parameters import Friction, Length, Stress
 from studies.scenes.shape_tables import Arc, Line, Shape
@@ -181,11 +184,19 @@ class Loading(Table):
 
 
 class Spaced(Table):
-    """Equal steps from ``start`` to ``stop``."""
+    """Points from ``start`` to ``stop``: in equal steps, or ``size`` apart at ``near``."""
 
     start: float
     stop: float
     num: Annotated[int, Interval(ge=2, le=2000)]
+    near: float | None = None
+    size: Length | None = None
+
+    def positions(self) -> NDArray[np.float64]:
+        """Return the points (num,) [mm]."""
+        if self.near is None or self.size is None:
+            return np.linspace(self.start, self.stop, self.num)
+        return closer(self.start, self.stop, self.num, self.near, self.size)
 
 
 class Map(Table):
@@ -278,3 +289,8 @@ class SceneFile(Table):
     loading: Loading | None = None
     look: Look = Look()
     outputs: dict[Label, Output] = Field(default_factory=dict)
+
+    @property
+    def stage_names(self) -> list[str]:
+        """Names of the states that are kept."""
+        return [stage.name for stage in self.stages] or ["loaded", "unloaded"]

@@ -30,6 +30,11 @@ def rigid(**changes: Any) -> Callable[[Tables], None]:
     return put("rigid", {"plate": body})
 
 
+def seen_on(**x: Any) -> Callable[[Tables], None]:
+    along = {"start": -1.0, "stop": 1.0, "num": 9}
+    return put("look", "map", {"x": along | x, "y": along})
+
+
 def without(*path: Any) -> Callable[[Tables], None]:
     def change(tables: Tables) -> None:
         at: Any = tables
@@ -152,6 +157,26 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         put("look", "lines", "middle", "radius", 1.0),
         "look.lines.middle",
         "start and end, or",
+    ),
+    "map from right to left": (
+        seen_on(stop=-1.5),
+        "look.map.x.stop",
+        "must be > start = -1",
+    ),
+    "map with half of a grading": (
+        seen_on(near=0.0),
+        "look.map.x.size",
+        "near and size go together",
+    ),
+    "map graded to what it has not": (
+        seen_on(near=2.0, size=0.1),
+        "look.map.x.near",
+        "must be from -1 to 1",
+    ),
+    "map graded too much": (
+        seen_on(near=0.0, size=1e-9),
+        "look.map.x.size",
+        "is too small for 9 points",
     ),
     "list of a wrong length": (
         put("look", "lines", "middle", "end", [1.0]),

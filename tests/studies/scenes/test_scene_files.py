@@ -65,6 +65,32 @@ def test_parameters_check_themselves(scene: FileScene) -> None:
         built(tables).parameters(mu=0.0)
 
 
+def test_a_swept_value_that_cannot_be_is_refused_before_it_is_computed() -> None:
+    tables = blocks()
+    tables["parameters"]["which"] = {"default": "upper", "choices": ["upper", "nobody"]}
+    tables["loads"][0]["body"] = "$which"
+    scene = built(tables)
+    with pytest.raises(ModelError, match=r"loads\[0\].body.*must be one of"):
+        scene.parameters(which="nobody")
+
+
+def test_a_map_is_fine_where_it_is_asked_to_be() -> None:
+    tables = blocks()
+    along = {"start": -20.0, "stop": 30.0, "num": 120, "near": 1.0, "size": 0.02}
+    tables["look"]["map"] = {"x": along, "y": along | {"size": 5.0}}
+    scene = built(tables)
+    view = scene.view(scene.parameters())
+    assert (view.x[0], view.x[-1], len(view.x)) == (-20.0, 30.0, 120)
+    steps = np.diff(view.x)
+    middles = (view.x[1:] + view.x[:-1]) / 2
+    assert np.interp(1.0, middles, steps) == pytest.approx(0.02, rel=0.01)
+    assert np.argmin(steps) == np.abs(middles - 1.0).argmin()
+    ratios = steps[1:] / steps[:-1]
+    assert ratios.max() < 1.1
+    assert ratios[-10:] == pytest.approx(ratios[-1], rel=1e-4)
+    assert np.diff(view.y) == pytest.approx(50 / 119)  # closer than asked for already
+
+
 def test_the_schema_tells_range_unit_and_meaning(scene: FileScene) -> None:
     known = scene_schema(scene)["properties"]
     assert known["wide"]["unit"] == "mm"
