@@ -50,6 +50,9 @@ def declarations(
             yield StudyError(field, name, "a data set has a variable of this name: choose another")
         if name not in used:
             yield StudyError(field, default, f"has no effect: no entry says ${name}")
+        if is_expression(default):
+            yield StudyError(f"{field}.default", default, "must be a value; see derived")
+            continue
         if each.range is not None and not number:
             yield StudyError(f"{field}.range", each.range, "goes with a number as default")
         elif each.range is not None and not each.range[0] <= default <= each.range[1]:  # type: ignore[operator]
@@ -62,8 +65,6 @@ def declarations(
         elif each.choices is not None and default not in each.choices:
             listed = ", ".join(each.choices)
             yield StudyError(f"{field}.default", default, f"must be one of its choices: {listed}")
-        if is_expression(default):
-            yield StudyError(f"{field}.default", default, "must be a value; see derived")
 
 
 def _one_of(field: str, name: str, known: Iterable[str]) -> Iterator[StudyError]:

@@ -23,15 +23,22 @@ from studies.scenes.tables import Parameter, SceneFile
 PLAIN = ("name", "summary", "parameters", "derived")
 """Entries of a scene file in which no expression stands, and the table of derived numbers."""
 
+DESCRIBED = ("parameters", "outputs")
+"""Entries of a scene file whose tables have a description."""
+
 Where = tuple[str | int, ...]
 """Keys and positions that lead to an entry."""
+
+
+Mistakes = dict[Where, StudyError | None]
+"""What is wrong by its place; None where the cause is told elsewhere."""
 
 
 class _Evaluated(NamedTuple):
     """A tree whose expressions have been evaluated, and those that have no value."""
 
     tree: Any
-    mistakes: list[tuple[Where, StudyError]]
+    mistakes: Mistakes
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +83,11 @@ class Description:
         return _digest("\n".join(parts).encode())[:32]
 
     @cached_property
+    def key(self) -> tuple[str, str]:
+        """Content id, and the content with its words."""
+        return self.digest, json.dumps(self.content, sort_keys=True, default=str)
+
+    @cached_property
     def parameters(self) -> dict[str, Parameter]:
         """The declared parameters.
 
@@ -100,20 +112,20 @@ class Description:
             with all entries that are wrong
         """
         found = self._evaluated(values)
-        unknown = {where for where, _ in found.mistakes}
-        mistakes = [mistake for _, mistake in found.mistakes]
+        mistakes = [mistake for mistake in found.mistakes.values() if mistake]
         try:
             tables = SceneFile.model_validate_json(_json(found.tree), strict=True)
+            if not found.mistakes:
+                return tables
         except ValidationError as error:
-            mistakes += mistakes_of(error, SceneFile, unknown)
-        if mistakes:
-            raise SceneError(self.file, mistakes)
-        return tables
+            mistakes += mistakes_of(error, SceneFile, found.mistakes)
+        raise SceneError(self.file, mistakes)
 
     def used(self) -> set[str]:
         """Return the parameters that some entry names, through derived numbers too."""
         derived = self._derived
-        rest = {key: value for key, value in self.content.items() if key not in PLAIN}
+        told = _without_words(self.content)
+        rest = {key: value for key, value in told.items() if key not in PLAIN}
         found = set().union(*(names(text) for _, text in _expressions(rest)))
         for name in reversed(list(derived)):
             if name in found and is_expression(derived[name]):
@@ -122,10 +134,11 @@ class Description:
 
     @property
     def declared(self) -> dict[str, Any]:
-        """The defaults as they are written, where a declaration may be wrong."""
+        """The defaults as they are written; None where there is none that can be."""
         given = self.content.get("parameters")
         tables = given.items() if isinstance(given, Mapping) else ()
-        return {str(k): v.get("default") for k, v in tables if isinstance(v, Mapping)}
+        defaults = {str(k): v.get("default") if isinstance(v, Mapping) else None for k, v in tables}
+        return {name: each if _can_be(each) else None for name, each in defaults.items()}
 
     @property
     def _derived(self) -> dict[str, Any]:
@@ -138,14 +151,17 @@ class Description:
         return {"name": "scene", "materials": {"m": material}, "bodies": {"b": {"material": "m"}}}
 
     def _evaluated(self, values: Mapping[str, Any]) -> _Evaluated:
-        mistakes: list[tuple[Where, StudyError]] = []
+        mistakes: Mistakes = {}
         known = dict(values)
         for name, text in self._derived.items():
             where = ("derived", name)
+            value = _value(where, text, known, mistakes)
             if name in values:
                 allowed = "is a parameter too: give it another name"
-                mistakes.append((where, StudyError(f"derived.{name}", text, allowed)))
-            known[name] = _value(where, text, known, mistakes)
+                mistakes[where] = StudyError(dotted(where), text, allowed)
+            elif where not in mistakes and not _can_be(value):
+                mistakes[where] = StudyError(dotted(where), text, "must be a number")
+            known[name] = None if where in mistakes else value
         tree: dict[str, Any] = {
             key: value if key in PLAIN else _replaced((key,), value, known, mistakes)
             for key, value in self.content.items()
@@ -188,14 +204,12 @@ def _bytes(path: Path) -> bytes:
         raise StudyError("scene", str(path), f"cannot be read: {error.strerror}") from None
 
 
-def _replaced(
-    where: Where, value: Any, known: Mapping[str, Any], mistakes: list[tuple[Where, StudyError]]
-) -> Any:
+def _replaced(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
     """Return a part of the tree with numbers and words in place of expressions."""
     if isinstance(value, Mapping):
         return {
             str(key): each
-            if key == "description"
+            if key == "description" and len(where) == 2 and where[0] in DESCRIBED
             else _replaced((*where, str(key)), each, known, mistakes)
             for key, each in value.items()
         }
@@ -204,16 +218,23 @@ def _replaced(
     return _value(where, value, known, mistakes)
 
 
-def _value(
-    where: Where, value: Any, known: Mapping[str, Any], mistakes: list[tuple[Where, StudyError]]
-) -> Any:
+def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
+    """Return the value of an expression; None where it has none, or needs what has none."""
     if not is_expression(value):
         return value
+    if any(known.get(name, value) is None for name in names(value)):
+        mistakes[where] = None
+        return None
     try:
         return evaluated(value, known)
     except ExpressionError as error:
-        mistakes.append((where, StudyError(dotted(where), value, str(error))))
+        mistakes[where] = StudyError(dotted(where), value, str(error))
         return None
+
+
+def _can_be(value: Any) -> bool:
+    """Tell whether a parameter may have this value: a number or a word, true or false."""
+    return isinstance(value, bool | int | float | str) and not is_expression(value)
 
 
 def _expressions(value: Any) -> Iterator[tuple[Where, str]]:
@@ -227,14 +248,21 @@ def _expressions(value: Any) -> Iterator[tuple[Where, str]]:
         yield (), value
 
 
-def _without_words(content: Any) -> Any:
-    """Return tables without summary and descriptions, which make no numbers."""
-    if isinstance(content, Mapping):
-        kept = {k: v for k, v in content.items() if k not in ("summary", "description")}
-        return {key: _without_words(each) for key, each in kept.items()}
-    if isinstance(content, list | tuple):
-        return [_without_words(each) for each in content]
-    return content
+def _without_words(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables without summary and descriptions, which make no numbers."""
+    return {
+        key: {name: _undescribed(each) for name, each in value.items()}
+        if key in DESCRIBED and isinstance(value, Mapping)
+        else value
+        for key, value in content.items()
+        if key != "summary"
+    }
+
+
+def _undescribed(table: Any) -> Any:
+    if not isinstance(table, Mapping):
+        return table
+    return {key: value for key, value in table.items() if key != "description"}
 
 
 def _json(tree: Any) -> str:

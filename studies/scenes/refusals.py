@@ -30,10 +30,10 @@ _WORDS = {
     "string_too_long": "must have at most {max_length} characters",
     "too_short": "must have {min_length} or more",
     "too_long": "must have at most {max_length}",
-    "union_tag_not_found": "must be a table with a kind",
-    "union_tag_invalid": "must be of a kind {expected_tags}",
     "string_pattern_mismatch": "must match {pattern}",
 }
+
+_KINDS = ("union_tag_not_found", "union_tag_invalid")
 
 _TABLES = frozenset({"properties", "additionalProperties", "patternProperties"})
 """What the schema of a table has, one of them at least."""
@@ -44,50 +44,80 @@ Where = tuple[str | int, ...]
 def mistakes_of(
     error: ValidationError, table: type[BaseModel], known: Collection[Where] = ()
 ) -> Iterator[StudyError]:
-    """Yield what is wrong, but for what is ``known`` to be wrong at these places."""
+    """Yield what is wrong, but for what is ``known`` to be wrong at these places.
+
+    Of a table whose entries are wrong the entries are told alone.
+    """
     schema = table.model_json_schema()
-    told: set[Where] = set()
-    for each in error.errors():
-        kept, entries = _walked(schema, each["loc"])
-        if kept in known or kept in told:
-            continue
-        told.add(kept)
-        yield StudyError(dotted(kept), _given(each), _allowed(each, entries))
+    walked = [(each, *_walked(schema, _loc(each))) for each in error.errors()]
+    wrong = {kept for _, kept, _ in walked} | set(known)
+    above = {where[:k] for where in wrong for k in range(len(where))}
+    told: dict[Where, tuple[Any, list[str]]] = {}
+    for each, kept, entries in walked:
+        if kept not in above and kept not in known:
+            told.setdefault(kept, (_given(each), []))[1].append(_allowed(each, entries))
+    for kept, (given, allowed) in told.items():
+        yield StudyError(dotted(kept), given, _either(list(dict.fromkeys(allowed))))
+
+
+def _either(allowed: list[str]) -> str:
+    """Return what is allowed by one of the branches of a union."""
+    *others, last = (each.removeprefix("must be ") for each in allowed)
+    return f"must be {', '.join(others)} or {last}" if others else allowed[0]
+
+
+def _loc(each: Any) -> Where:
+    """Return where it is wrong: of a table that is of no known kind, its kind."""
+    loc: Where = each["loc"]
+    return (*loc, "kind") if each["type"] in _KINDS else loc
 
 
 def _given(each: Any) -> Any:
+    if each["type"] in _KINDS:
+        return each["input"].get("kind")
     return None if each["type"] == "missing" else each["input"]
 
 
 def _allowed(each: Any, entries: list[str]) -> str:
     kind, context = each["type"], each.get("ctx", {})
     if kind == "extra_forbidden":
-        name = str(each["loc"][-1])
-        matches = difflib.get_close_matches(name, entries, n=1)
-        meant = f"; did you mean {matches[0]}?" if matches else ""
-        return f"there is no such entry; there are {', '.join(entries)}{meant}"
+        listed = f"there is no such entry; there are {', '.join(entries)}"
+        return listed + _meant(str(each["loc"][-1]), entries)
+    if kind in _KINDS:
+        return f"must be one of {', '.join(entries)}" + _meant(str(_given(each)), entries)
     if kind in _WORDS:
         return _WORDS[kind].format(**context)
     return str(each["msg"])
 
 
+def _meant(name: str, known: list[str]) -> str:
+    matches = difflib.get_close_matches(name, known, n=1)
+    return f"; did you mean {matches[0]}?" if matches else ""
+
+
 def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
-    """Return a place without the tags that unions put into it, and the entries of its table."""
+    """Return a place without the tags that unions put into it, and what its table may have.
+
+    These are the entries; where its kind is not known, the kinds.
+    """
     node: Mapping[str, Any] = schema
     kept: list[str | int] = []
     entries: list[str] = []
     for part in loc:
         node = _resolved(schema, node)
+        options = [_resolved(schema, each) for each in node.get("anyOf", ())]
+        options = [each for each in options if each.get("type") != "null"]
+        if len(options) == 1:
+            (node,), options = options, []
         mapping = node.get("discriminator", {}).get("mapping", {})
         if part in mapping:
             node = {"$ref": mapping[part]}
             continue
-        options = [_resolved(schema, each) for each in node.get("anyOf", ())]
         if options and isinstance(part, str) and not any(_TABLES & o.keys() for o in options):
             continue  # the name of a branch: float, str
-        node = next((o for o in options if o.get("type") != "null"), node)
+        node = next(iter(options), node)
         kept.append(part)
-        entries = list(node.get("properties", {}))
+        entries = list(node.get("properties", mapping))
         if part in entries:
             node = node["properties"][part]
         elif isinstance(part, int):

@@ -57,22 +57,22 @@ class FileScene(Scene):
 
 
 def file_scene(description: Description) -> FileScene:
-    """Return the scene of a description, the same object for the same content.
+    """Return the scene of a description, the same object for the same content and words.
 
     Raises
     ------
     SceneError
         with all mistakes that can be told without building the bodies
     """
-    known = _SCENES.get(description.digest)
+    known = _SCENES.get(description.key)
     if known is None:
-        known = _SCENES[description.digest] = _made(description)
+        known = _SCENES[description.key] = _made(description)
         while len(_SCENES) > _MOST:
             del _SCENES[next(iter(_SCENES))]
     return known
 
 
-_SCENES: dict[str, FileScene] = {}
+_SCENES: dict[tuple[str, str], FileScene] = {}
 _MOST = 64
 """Scenes of files that a process keeps."""
 

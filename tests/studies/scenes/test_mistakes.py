@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from studies.errors import SceneError
+from studies.scenes.description import Description
+from studies.scenes.refusals import dotted
+from studies.scenes.scene import file_scene
 from tests.studies.scenes.conftest import blocks, built
 
 Tables = dict[str, Any]
@@ -64,6 +70,17 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "did you mean friction?",
     ),
     "unknown table": (put("body", {}), "body", "did you mean bodies?"),
+    "text in a shape": (put(*SHAPE, "size", "fine"), "bodies.upper.shape.size", "number"),
+    "unknown entry of a shape": (
+        put(*SHAPE, "sise", 0.1),
+        "bodies.upper.shape.sise",
+        "did you mean size?",
+    ),
+    "no parameter in a shape": (
+        put(*SHAPE, "size", "$fine"),
+        "bodies.upper.shape.size",
+        "$fine is no parameter",
+    ),
     "unknown entry of a rigid body": (
         rigid(radius=3.0),
         "rigid.plate.radius",
@@ -75,7 +92,33 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "there are moved, pushed, amplitude; did you mean pushed?",
     ),
     "missing entry": (without("loads", 0, "boundary"), "loads[0].boundary", "must be given"),
-    "unknown kind": (put("loads", 0, "kind", "push"), "loads[0]", "'pressure', 'traction'"),
+    "unknown kind": (
+        put("loads", 0, "kind", "presure"),
+        "loads[0].kind",
+        "must be one of displacement, initial_stress, pressure, temperature, traction; "
+        "did you mean pressure?",
+    ),
+    "no kind": (without(*SHAPE, "kind"), "bodies.upper.shape.kind", "must be one of disc, fillet"),
+    "wrong derived number": (
+        lambda t: t.update(derived={"side": "$sid"}),
+        "derived.side",
+        "$sid is no parameter",
+    ),
+    "list for a default": (
+        put("parameters", "wide", "default", [3.0]),
+        "parameters.wide.default",
+        "must be true or false, an integer, a number or a text",
+    ),
+    "expression for a default": (
+        put("parameters", "wide", "default", "2*$mu"),
+        "parameters.wide.default",
+        "must be a value",
+    ),
+    "list too short by a wrong entry": (
+        rigid(surfaces={"face": {"kind": "line", "points": [[0, "here"], [5, 2.5]]}}),
+        "rigid.plate.surfaces.face.points[0][1]",
+        "must be a number",
+    ),
     "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
     "unknown parameter": (
         put("contacts", 0, "friction", "$nu"),
@@ -242,6 +285,7 @@ def test_a_mistake_is_told_by_its_entry(kind: str) -> None:
     with pytest.raises(SceneError) as caught:
         built(tables)
     found = {each.field: each.allowed for each in caught.value.mistakes}
+    assert len(found) <= 2, "one mistake is told as many"
     assert field in found, caught.value
     assert any(words in found[field] for words in allowed.split("|")), found[field]
     assert "blocks.toml" in str(caught.value)
@@ -276,3 +320,30 @@ def test_all_mistakes_of_bodies_are_told_at_once() -> None:
 
 def test_the_scene_itself_has_no_mistake() -> None:
     assert built(blocks()).name == "blocks"
+
+
+EVERYTHING = tomllib.loads((Path(__file__).parent / "everything.toml").read_text())
+
+
+def leaves(tree: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the place of each number and word of a tree."""
+    for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
+        if isinstance(value, dict | list):
+            yield from leaves(value, (*at, key))
+        else:
+            yield (*at, key)
+
+
+@pytest.mark.parametrize("wrong", ["$nothing", {"wrong": 1}], ids=["expression", "table"])
+@pytest.mark.parametrize("where", list(leaves(EVERYTHING)), ids=dotted)
+def test_any_wrong_entry_is_told_by_itself_and_alone(where: tuple[Any, ...], wrong: Any) -> None:
+    tables = copy.deepcopy(EVERYTHING)
+    put(*where, wrong)(tables)
+    if where[-1] in ("summary", "description", "unit") and isinstance(wrong, str):
+        return  # any text will do
+    with pytest.raises(SceneError) as caught:
+        file_scene(Description("everything.toml", tables, {}))
+    told = [each.field for each in caught.value.mistakes]
+    if where == ("rigid", "plate", "rotation", "moved"):  # the one entry that says $turn
+        told.remove("parameters.turn")
+    assert told == [dotted(where)]

@@ -136,6 +136,25 @@ def test_the_id_is_the_content(tmp_path: Path, old: str, new: str, same: bool) -
     assert (first == second) is same
 
 
+def test_a_name_is_no_word_about_it() -> None:
+    """A boundary, a derived number or a stage may be called description, and counts in the id."""
+    tables = blocks()
+    tables["derived"]["description"] = 2.0
+    tables["stages"][0]["increments"] = "$description"
+    with pytest.raises(SceneError, match=r"stages\[0\].increments = 2.0"):
+        built(tables)
+    tables["derived"]["description"] = 2
+    first = built(tables)
+    tables["derived"]["description"] = 3
+    assert built(tables).id != first.id
+    tables["outputs"]["least"]["description"] = "costs $5, of $nothing"
+    second = built(tables)
+    assert second.id != first.id
+    tables["outputs"]["least"]["description"] = tables["summary"] = "in other words"
+    third = built(tables)
+    assert (third.id, third.summary) == (second.id, "in other words")
+
+
 def test_the_mesh_counts_in_the_id(tmp_path: Path) -> None:
     pin = read_scene(ROOT / "data/scenes/pin.toml")
     (tmp_path / "pin.toml").write_bytes((ROOT / "data/scenes/pin.toml").read_bytes())
