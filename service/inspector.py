@@ -20,9 +20,10 @@ from anyio import CapacityLimiter
 from service.errors import Busy
 from studies import StudyError
 from studies.errors import SceneError
-from studies.scenes.description import Description, mesh_names, toml_of
+from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene, read_scene
+from studies.toml import toml_of
 
 SECONDS = 60
 """Time that reading a scene may take."""
@@ -53,7 +54,7 @@ class Inspector:
         """
         if self.one.statistics().tasks_waiting >= WAITING:
             raise Busy(f"{WAITING} scenes wait to be read already: ask later")
-        needed = mesh_names(toml_of(_FILE, text))
+        needed = mesh_names(toml_of(text, "scene", _FILE))
         for name in meshes:
             if not name.lower().endswith(FORMATS):
                 raise StudyError("meshes", name, f"must end in one of {', '.join(FORMATS)}")
@@ -67,7 +68,7 @@ class Inspector:
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}
-        return file_scene(Description(_FILE, toml_of(_FILE, text), given))
+        return file_scene(Description(_FILE, toml_of(text, "scene", _FILE), given))
 
 
 async def _answer(folder: str) -> dict[str, Any]:

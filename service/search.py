@@ -11,7 +11,8 @@ from solver.scenes import SCENES, Scene
 from studies import StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
-from studies.scenes.registry import one_of, scene_named
+from studies.errors import one_of
+from studies.scenes.registry import scene_named
 from studies.storage.shelf import newest
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)

@@ -1,9 +1,11 @@
-"""What can go wrong with a study, told apart."""
+"""What can go wrong with a study, told apart; words for what is allowed."""
 
 from __future__ import annotations
 
+import difflib
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 
 class StudyError(ValueError):
@@ -95,3 +97,15 @@ class CatalogueDamaged(RuntimeError):
 
 class GridLost(ConnectionError):
     """The scheduler could not be reached or forgot its tasks; running again computes the rest."""
+
+
+def one_of(name: Any, names: Iterable[str]) -> str:
+    """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
+    known = list(names)
+    return f"must be one of {', '.join(known) or '(there is none)'}{nearest(name, known)}"
+
+
+def nearest(name: Any, names: Iterable[str]) -> str:
+    """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
+    matches = difflib.get_close_matches(str(name), list(names), n=1)
+    return f"; did you mean {matches[0]}?" if matches else ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import httpx
 
 from studies.errors import StudyError
 from studies.storage.appearing import appearing
+from studies.toml import read_toml
 
 _WAIT = 60.0
 """Seconds to wait for an answer."""
@@ -40,12 +40,7 @@ class Service:
 
     def submit(self, path: Path) -> dict[str, Any]:
         """Send a study file, and before it the scene file it names; the service checks both."""
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise StudyError("file", str(path), f"cannot be read: {error.strerror}") from None
-        except ValueError as error:
-            raise StudyError("file", str(path), f"must be valid TOML: {error}") from None
+        content = read_toml(path, "file")
         scene = content.get("scene")
         if isinstance(scene, str) and scene.endswith(".toml"):
             content["scene"] = self.post_scene(path.parent / scene)["id"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -32,8 +31,9 @@ from studies.definition.sweep import (
     linked_values,
     owners,
 )
-from studies.errors import StudyError
-from studies.scenes.registry import Find, beside, name_of, nothing, one_of, scene_named
+from studies.errors import StudyError, one_of
+from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
+from studies.toml import read_toml
 
 
 class Study(BaseModel):
@@ -66,13 +66,7 @@ class Study(BaseModel):
     @classmethod
     def from_toml(cls, path: Path | str) -> Self:
         """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-            content = tomllib.loads(text)
-        except OSError as error:
-            raise StudyError("file", str(path), f"cannot be read: {error.strerror}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise StudyError("file", str(path), f"must be valid TOML: {error}") from None
+        content = read_toml(path, "file")
         return cls.from_dict(content, scenes=beside(Path(path).parent))
 
     @classmethod

@@ -16,8 +16,7 @@ from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.spaced import spaced
-from studies.errors import StudyError
-from studies.scenes.registry import nearest
+from studies.errors import StudyError, nearest
 
 MAXIMUM_RUNS = 100_000
 """Largest number of points a sweep may have."""

@@ -8,7 +8,7 @@ from typing import Any
 from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
 from solver.scenes import SCENES
-from studies.errors import StudyError
+from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
 
@@ -70,7 +70,7 @@ def declarations(
 def _one_of(field: str, name: str, known: Iterable[str]) -> Iterator[StudyError]:
     names = list(known)
     if name not in names:
-        yield StudyError(field, name, f"must be one of {', '.join(names) or '(there is none)'}")
+        yield StudyError(field, name, one_of(name, names))
 
 
 def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyError]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +18,7 @@ from studies.scenes.meshfile import LARGEST, MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import Parameter, SceneFile
+from studies.toml import toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived")
 """Entries of a scene file in which no expression stands, and the table of derived numbers."""
@@ -67,7 +67,7 @@ class Description:
             when a file cannot be read, or is no TOML
         """
         path = Path(path)
-        content = toml_of(path.name, _bytes(path))
+        content = toml_of(_bytes(path), "scene", path.name)
         meshes = {}
         for name in mesh_names(content):
             if (path.parent / name).is_file():  # one that is not there is a mistake of the file
@@ -167,20 +167,6 @@ class Description:
             for key, value in self.content.items()
         }
         return _Evaluated(tree, mistakes)
-
-
-def toml_of(name: str, data: bytes) -> dict[str, Any]:
-    """Return the tables of a TOML text.
-
-    Raises
-    ------
-    StudyError
-        where it is none
-    """
-    try:
-        return tomllib.loads(data.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise StudyError("scene", name, f"must be valid TOML: {error}") from None
 
 
 def mesh_names(content: Mapping[str, Any]) -> list[str]:

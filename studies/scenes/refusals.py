@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from studies.errors import StudyError
+from studies.errors import StudyError, nearest, one_of
 
 _WORDS = {
     "missing": "must be given",
@@ -82,17 +81,12 @@ def _allowed(each: Any, entries: list[str]) -> str:
     kind, context = each["type"], each.get("ctx", {})
     if kind == "extra_forbidden":
         listed = f"there is no such entry; there are {', '.join(entries)}"
-        return listed + _meant(str(each["loc"][-1]), entries)
+        return listed + nearest(each["loc"][-1], entries)
     if kind in _KINDS:
-        return f"must be one of {', '.join(entries)}" + _meant(str(_given(each)), entries)
+        return one_of(_given(each), entries)
     if kind in _WORDS:
         return _WORDS[kind].format(**context)
     return str(each["msg"])
-
-
-def _meant(name: str, known: list[str]) -> str:
-    matches = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {matches[0]}?" if matches else ""
 
 
 def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:

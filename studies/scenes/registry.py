@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 from solver.scenes import SCENES, Scene
-from studies.errors import StudyError
+from studies.errors import StudyError, one_of
 from studies.scenes.description import Description
 
 GROUP = "residua.scenes"
@@ -101,18 +100,6 @@ def scene_of(told: Mapping[str, Any]) -> Scene:
     from studies.scenes.scene import file_scene
 
     return file_scene(Description(str(told["scene"]), json.loads(told["scene_file"]), None))
-
-
-def one_of(name: Any, names: Iterable[str]) -> str:
-    """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
-    known = list(names)
-    return f"must be one of {', '.join(known)}{nearest(name, known)}"
-
-
-def nearest(name: Any, names: Iterable[str]) -> str:
-    """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
-    matches = difflib.get_close_matches(str(name), list(names), n=1)
-    return f"; did you mean {matches[0]}?" if matches else ""
 
 
 def _installed() -> dict[str, EntryPoint]:

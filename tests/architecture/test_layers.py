@@ -17,7 +17,9 @@ LAYERS = {
         "deprecation", "errors", "tensors", "linear", "mesh", "materials", "model", "fem",
         "contact", "loading", "steady", "results", "scenes",
     ),
-    "studies": ("errors", "scenes", "definition", "storage", "execution", "views", "command"),
+    "studies": (
+        "errors", "toml", "scenes", "definition", "storage", "execution", "views", "command",
+    ),
 }  # fmt: skip
 
 

@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from studies.definition.study import Study
-from studies.errors import StudyError
-from studies.scenes.registry import one_of
+from studies.errors import StudyError, one_of
 
 STRAIN = "plastic_strain"
 

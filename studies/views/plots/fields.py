@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import xarray as xr
 
 from studies.definition.vocabulary import SYMMETRIC
-from studies.errors import StudyError
-from studies.scenes.registry import one_of
+from studies.errors import StudyError, one_of
 
 Window = Sequence[float]
 """Part of a map: x0, x1, y0, y1 [mm]."""

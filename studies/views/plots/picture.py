@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import xarray as xr
 from matplotlib.figure import Figure
 
-from studies.errors import StudyError
-from studies.scenes.registry import one_of
+from studies.errors import StudyError, one_of
 from studies.views.plots.fields import (
     ALONG,
     MAP,

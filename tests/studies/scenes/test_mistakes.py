@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from studies.errors import SceneError
+from studies import Study
+from studies.errors import SceneError, StudyError
 from studies.scenes.description import Description
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
@@ -347,3 +348,21 @@ def test_any_wrong_entry_is_told_by_itself_and_alone(where: tuple[Any, ...], wro
     if where == ("rigid", "plate", "rotation", "moved"):  # the one entry that says $turn
         told.remove("parameters.turn")
     assert told == [dotted(where)]
+
+
+@pytest.mark.parametrize(
+    "text", ["a = " + "1" * 5000, "a = " + "[" * 5000, "a = 'b", "\udcff"], ids=lambda t: t[:6]
+)
+def test_what_is_no_toml_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(StudyError, match=r"^scene = '.*': must be valid TOML: .+$"):
+        Description.read(path)
+    with pytest.raises(StudyError, match=r"^file = '.*': must be valid TOML: .+$"):
+        Study.from_toml(path)
+
+
+def test_a_date_is_text_and_a_mark_of_byte_order_is_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xef\xbb\xbfsummary = 1979-05-27\n")
+    assert Description.read(path).content == {"summary": "1979-05-27"}
