@@ -23,7 +23,9 @@ LAW = 2e-6, 1.3
 """Rate and exponent of the seconds of made-up runs."""
 
 
-def remember(store: Store, ids: list[str], figures: list[tuple[int, int, float]]) -> None:
+def remember(
+    store: Store, ids: list[str], figures: list[tuple[int, int, float]], keep: str = ""
+) -> None:
     """Put runs of the punch into the catalogue: unknowns, increments, seconds."""
     names = ("degrees_of_freedom", "increments", "cpu_seconds")
     rows = [
@@ -31,7 +33,7 @@ def remember(store: Store, ids: list[str], figures: list[tuple[int, int, float]]
             "id": run_id, "scene": "punch", "status": "ok", "message": "", "parameters": {},
             "scalars": dict(zip(names, each, strict=True)), "path": f"runs/{run_id}.nc",
             "created": "2026-01-01T00:00:00+00:00", "cpu_seconds": each[2], "solver_source": "",
-            "keep": "",
+            "keep": keep,
         }
         for run_id, each in zip(ids, figures, strict=True)
     ]  # fmt: skip
@@ -119,6 +121,25 @@ def test_a_scene_that_does_not_tell_its_work_is_told_by_its_runs(store: Store) -
     assert found.bytes > 0
     assert found.basis == "fake does not tell the work of its paths"
     Bounds(unknowns=1, increments=1, cpu_seconds=1.0).check(found)
+
+
+def test_kept_fields_count_on_the_disk(store: Store) -> None:
+    plain = estimate(Study.from_dict(PUNCH), store)
+    kept = estimate(Study.from_dict(PUNCH | {"keep": "fields"}), store)
+    assert plain.unknowns and plain.to_compute == kept.to_compute == 2
+    each = (kept.bytes - plain.bytes) / (kept.to_compute * plain.unknowns)
+    assert 50 < each < 400
+
+
+def test_files_are_as_large_as_those_that_keep_as_much(store: Store) -> None:
+    remember(store, ids(20), [(9_000, 10, 1.0)] * 20, keep="fields")
+    path = store.run_path(ids(20)[3])
+    path.parent.mkdir()
+    path.write_bytes(bytes(5_000_000))
+    plain = estimate(Study.from_dict(PUNCH), store)
+    kept = estimate(Study.from_dict(PUNCH | {"keep": "fields"}), store)
+    assert plain.bytes < kept.bytes
+    assert kept.bytes == pytest.approx(2 * 1.8 * 5e6)
 
 
 def test_20_000_runs_are_estimated_in_a_second(store: Store) -> None:
