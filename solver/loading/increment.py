@@ -8,7 +8,7 @@ From the last converged state, at the current displacements:
 3. compliance of the contact points ``W = H K^-1 H'``
 4. the frictional contact problem on W, exactly; the free rigid motions of parts held by contact
    alone are extra unknowns with exact balance equations, as in FETI. Where the problem has no
-   solution the tangent is too soft, and is blended with the elastic stiffness
+   solution, or steps are far too long, the tangent is blended with the elastic stiffness
 5. line search on the plastic residual, contact forces interpolated
 6. converged when the residual, contact forces included, and the contact conditions vanish
 
@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
+_SHORT, _STIFF = 0.1, 3
+"""Share of a step below which it is short; after two short ones the blends begin with this one."""
 _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
@@ -63,8 +65,7 @@ class Increment:
     Parameters
     ----------
     guess : state to iterate from, ``start`` when absent; prescribed motions are those at ``time``
-    contact : False takes the bodies apart
-    friction : False leaves it out
+    contact, friction : False takes the bodies apart, leaves friction out
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
     patient : if no body can flow without hardening, so that an equilibrium exists, use all
@@ -97,8 +98,7 @@ class Increment:
         self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
         self._pivoted, self._blended = 0, 0
-        # in a corner of the yield surface no tangent is left: a little elastic stiffness stays
-        self._softened = any(part.body.law.cornered for part in system.parts)
+        self._softened = any(part.body.law.cornered for part in system.parts)  # no tangent there
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
         # vertices touch without friction, for their slip is not known, unless nothing else holds
         self._grip = False
@@ -114,7 +114,7 @@ class Increment:
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
         best, since_best, softest, moving = np.inf, 0, Flow(), False
-        series, begun = Series(), 0.0
+        series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
@@ -125,7 +125,7 @@ class Increment:
             best = max(min(best, error), tolerances.residual)
             begun = begun if iteration else violation
             hopeless = since_best > _PATIENCE and not self.patient
-            hopeless |= error > max(_DIVERGED * best, begun)
+            hopeless |= error > _DIVERGED * max(best, begun)
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
             # a body that flows far moves far: not all that is out of balance may be rounding
@@ -135,7 +135,8 @@ class Increment:
             if balanced and violation < tolerances.contact and candidates.beyond >= 0:
                 return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
-            first = len(_BLENDS) - 1 if elastic_first else int(self._softened)
+            first = _STIFF if crawled > 1 else int(self._softened)
+            first = len(_BLENDS) - 1 if elastic_first else first
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
@@ -149,6 +150,7 @@ class Increment:
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
             before, (share, u, responses) = u, self._search(u, residuals, candidates, step)
+            crawled = crawled + 1 if share < _SHORT else 0
             moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
             forces = (1 - share) * candidates.forces + share * step.forces
             ahead = series.sum(before, candidates, step, share)
@@ -161,8 +163,7 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            # an iteration that stops at rounding is no flow; a body that flows without resistance
-            # is in balance, but still moves
+            # to stop at rounding is no flow; what flows without resistance is in balance, but moves
             softest if moving or best > _UNBALANCED * tolerances.residual else None,
         )
 
@@ -244,7 +245,6 @@ class Increment:
         self, u: Vectors, residuals: Vectors, candidates: Candidates, step: Step
     ) -> tuple[float, Vectors, tuple[Response, ...]]:
         trial: tuple[Vectors, tuple[Response, ...]]
-
         # where vertices change status, contact forces before the step may make its slope negative;
         # with those after the step the slope is the quadratic form of the tangent
         before = candidates.forces

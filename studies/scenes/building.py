@@ -232,7 +232,7 @@ def _place(names: list[str]) -> Any:
 
     def words(time: float) -> str:
         k = min(max(math.ceil(time - 1e-9) - 1, 0), len(names) - 1)
-        return f"stage {names[k]}, {time - k:.4g} of it"
+        return f"{time - k:.4g} of stage {names[k]}"
 
     return words
 
