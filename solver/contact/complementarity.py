@@ -44,7 +44,18 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
         empty = np.zeros(0)
         solvable = not problem.balance.size
         return ContactSolution(empty, empty, start, False) if solvable else None
+    if _at_rest(problem):
+        nothing = np.zeros_like(problem.offset), np.zeros_like(problem.balance)
+        return ContactSolution(*nothing, np.full_like(start, OPEN), False)
     return _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
+
+
+def _at_rest(problem: ContactProblem) -> bool:
+    """Whether no point touches and no force acts: then a body that floats stays where it is."""
+    gaps = problem.offset[: problem.n]
+    force, length = replace(problem, balance=np.zeros(0)).scales
+    apart = bool((gaps >= -_TOLERANCE * length).all())
+    return apart and bool((np.abs(problem.balance) <= _CONSISTENT * force).all())
 
 
 def change_of(

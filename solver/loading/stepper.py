@@ -233,8 +233,13 @@ class Stepper:
 
 
 def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:
-    """Return the state at ``time`` on the line through the last two, or None at a reversal."""
+    """Return the state at ``time`` on the line through the last two, or None at a reversal.
+
+    None too where bodies have come apart: one that contact alone has held would move on for ever.
+    """
     if not past or now.time == past[-1].time:
+        return None
+    if now.contacts and not any(contact.normal.any() for contact in now.contacts):
         return None
     before = past[-1]
     share = (time - now.time) / (now.time - before.time)

@@ -42,3 +42,13 @@ def test_a_ball_is_pressed_in_without_an_increment_cut(
     force = found.reaction("ball", "loaded")[1]
     finer = pressed(friction, depth, 2 * steps).reaction("ball", "loaded")[1]
     assert force == pytest.approx(finer, rel=0.01)
+
+
+def test_a_strip_that_nothing_holds_any_more_stays_where_it_is() -> None:
+    """It came loose between the ball and the anvil in the first of five increments of release."""
+    found = pressed(0.0, 0.02, 20)
+    bottom = np.stack([np.linspace(0.1, 2.9, 8), np.full(8, -1.0)])
+    lifted = found.at("strip", bottom, "unloaded")["displacement"][1]
+    assert np.abs(lifted).max() < 0.02 / 5
+    assert found.motion("ball", "unloaded").y == 0.0
+    assert found.audit().passed, found.audit().violations
