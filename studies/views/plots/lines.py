@@ -31,6 +31,7 @@ _EACH, _LINES = 6, 12
 _STYLES = ("-", "--", ":", "-.")
 _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth")
+_DISTANCE = "distance"
 
 
 def line_figure(
@@ -54,7 +55,7 @@ def line_figure(
     """
     run = run if over else one_run(run)
     check_field(field, line_fields(run))
-    values = component_of(run[field], component)
+    values = _placed(component_of(run[field], component), run)
     along = next(name for name in ALONG if name in values.dims)
     if zoom is not None and along not in _LENGTHS:
         raise StudyError("zoom", zoom, f"{field} lies over {words(along)}, no length: leave it out")
@@ -64,6 +65,7 @@ def line_figure(
         raise StudyError("field", field, "has no value in the run selected")
     values = _told_apart(values, [name for name in values.dims if name != along])
     others = [name for name in values.dims if name != along]
+    at = _DISTANCE if _DISTANCE in values.coords else along
     if zoom is not None:
         middle = focus(run, zoom) if along == "s" else 0.0
         values = values.where(abs(values[along] - middle) <= zoom, drop=True)
@@ -82,13 +84,13 @@ def line_figure(
             line = values.isel(dict(zip(others, (first, *rest), strict=False))).dropna(along)
             if line.size:
                 name = ", ".join(value_text(line[each]) for each in others)
-                axes.plot(line[along], line, style, color=colour, label=name, linewidth=1.6)
+                axes.plot(line[at], line, style, color=colour, label=name, linewidth=1.6)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.0)
-    axes.set(xlabel=label(values[along]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
+    axes.set(xlabel=label(values[at]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
     if others:
         title = ", ".join(words(str(name)) for name in others)
         axes.legend(
@@ -96,6 +98,13 @@ def line_figure(
             title=title,
         )  # fmt: skip
     return sheet
+
+
+def _placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
+    """Return values along lines or contact surfaces with the distance from their start [mm]."""
+    distance = run.get(f"{str(values.name).partition('_')[0]}_distance")
+    there = distance is not None and set(distance.dims) <= set(values.dims)
+    return values.assign_coords({_DISTANCE: distance}) if there else values
 
 
 def _told_apart(values: xr.DataArray, others: Sequence[Hashable]) -> xr.DataArray:

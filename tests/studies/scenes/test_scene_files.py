@@ -218,7 +218,11 @@ def test_what_a_file_asks_for_is_in_the_table_and_in_pictures(
     x, y = drawn[0].get_data()
     expected = dataset["line_stress"].sel(mu=0.0, wide=2.0, component="yy").isel(stage=0, line=0)
     np.testing.assert_allclose(y, expected.squeeze())
-    assert (x[0], x[-1]) == (0.0, 1.0)
+    assert (x[0], x[-1]) == (0.0, 2.0)  # over the length, not its fraction
+    assert lines.axes[0].get_xlabel().endswith("[mm]")
+    lengths = picture(dataset, "pair_pressure", selection={"mu": 0.0}, over="wide").axes[0]
+    drawn = [each for each in lengths.lines if len(each.get_xdata()) > 2]
+    assert sorted({each.get_xdata()[-1] for each in drawn}) == [2.0, 4.0], "each its own length"
     course = picture(dataset, "contact_normal_force").axes[0]
     assert course.get_xlabel() == "number of the increment of the program"
     with pytest.raises(StudyError, match="lies over fraction, no length: leave it out"):
