@@ -54,7 +54,7 @@ def _at_rest(problem: ContactProblem) -> bool:
     """Whether no point touches and no force acts: then a body that floats stays where it is."""
     gaps = problem.offset[: problem.n]
     force, length = replace(problem, balance=np.zeros(0)).scales
-    apart = bool((gaps >= -_TOLERANCE * length).all())
+    apart = bool((gaps > _TOLERANCE * length).all())
     return apart and bool((np.abs(problem.balance) <= _CONSISTENT * force).all())
 
 

@@ -57,8 +57,10 @@ class Asked:
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The number and, of an extreme value, its place."""
-        where = next(filter(None, (self.body, self.line, self.contact)))
-        usual = f"{self.take} of {self.of} in {where}, stage {self.stage}"
+        places = {"body": self.body, "line": self.line, "contact": self.contact}
+        where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
+        what = self.of.replace(".", " ").replace("_", " ")
+        usual = f"{self.take} of {what} of {where}, stage {self.stage}"
         units = _UNITS[self.of.partition(".")[0]]
         units = {"extent": "mm", "integral": f"{units} mm".removeprefix("1 ")}.get(self.take, units)
         number = Quantity(name=self.name, long_name=self.description or usual, units=units)
