@@ -189,7 +189,8 @@ def test_a_study_sweeps_a_file(swept: tuple[Study, Store, xr.Dataset]) -> None:
     assert dataset["line_x"].sel(mu=0.0, wide=4.0, fraction=0.5).item() == pytest.approx(2.0)
     assert (dataset["least"] < -150.0).all()
     assert dataset["least"].attrs["units"] == "MPa"
-    assert "minimum of stress.yy in lower" in dataset["least"].attrs["long_name"]
+    label = "minimum of stress yy of body lower, stage pressed"
+    assert dataset["least"].attrs["long_name"] == label
     assert dataset["least_x"].attrs["units"] == "mm"
     assert study.scene == study.problem.id and study.problem.name == "blocks"
 
