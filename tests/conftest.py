@@ -7,6 +7,10 @@ from collections.abc import Iterator
 
 import pytest
 
+# Workers of the test run share the cores: threads of BLAS would wait for each other. Set before
+# any test loads the library, and inherited by the processes that tests start.
+os.environ["OMP_NUM_THREADS"] = "1"
+
 
 @pytest.fixture(autouse=True, scope="session")
 def no_settings_from_outside() -> Iterator[None]:
