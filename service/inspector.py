@@ -59,7 +59,8 @@ class Inspector:
             if not name.lower().endswith(FORMATS):
                 raise StudyError("meshes", name, f"must end in one of {', '.join(FORMATS)}")
             if name not in needed:
-                raise StudyError("meshes", name, f"no body of the scene is read from it: {needed}")
+                listed = ", ".join(needed) or "(it names none)"
+                raise StudyError("meshes", name, f"must be a file that the scene names: {listed}")
         async with self.one:
             with tempfile.TemporaryDirectory() as folder:
                 for name, data in {**meshes, _FILE: text}.items():

@@ -101,7 +101,7 @@ class GridLost(ConnectionError):
 
 def one_of(name: Any, names: Iterable[str]) -> str:
     """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
-    known = list(names)
+    known = list(dict.fromkeys(names))
     return f"must be one of {', '.join(known) or '(there is none)'}{nearest(name, known)}"
 
 

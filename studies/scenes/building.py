@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,7 +13,7 @@ from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release
 from solver.model.amplitude import Amplitude
 from solver.scenes.material_parameters import MaterialParameters
-from studies.errors import StudyError
+from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.shape_tables import Line
@@ -22,7 +22,6 @@ from studies.scenes.shapes import mesh_of
 if TYPE_CHECKING:
     from skfem import Mesh
 
-    from solver.contact.system import System
     from solver.materials.law import Law
     from solver.model.body import Body
     from solver.model.loads import Load
@@ -30,8 +29,8 @@ if TYPE_CHECKING:
     from solver.model.rigid import RigidBody
 
 T = TypeVar("T")
-_NEAR = 0.1
-"""Gap / shortest edge of a surface, up to which a body held by contact alone counts as touching."""
+_BESIDE = ("name", "summary", "parameters.", "derived.", "stages", "loading", "look.", "outputs.")
+"""Entries of which the bodies and how they are held do not depend."""
 
 
 @dataclass
@@ -43,14 +42,20 @@ class Builder:
     scene : its tables, for values of its parameters
     meshes : mesh files by the name that bodies give
     mistakes : what was found wrong so far
+    absent : tables with something wrong, such as ``bodies.pin``: stand-ins are in their place
     """
 
     scene: tables.SceneFile
     meshes: Mapping[str, MeshFile] | None
     mistakes: list[StudyError] = field(default_factory=list)
+    absent: Collection[str] = ()
+    _boundaries: dict[str, list[str]] = field(default_factory=dict, init=False)
 
     def model(self) -> Model | None:
-        """Return the model; None where there are mistakes."""
+        """Return the model; None where there are mistakes.
+
+        What is told of one table hides nothing of the others.
+        """
         from solver.model.model import Model
 
         t = self.scene
@@ -58,7 +63,7 @@ class Builder:
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
-        if self.mistakes:
+        if self._hurt():
             return None
         return self.tried(
             "",
@@ -78,6 +83,11 @@ class Builder:
             self.mistakes.append(StudyError(name, error.value, error.allowed))
             return None
 
+    def _hurt(self) -> bool:
+        """Whether something is wrong that the model is made of."""
+        fields = [*self.absent, *(mistake.field for mistake in self.mistakes)]
+        return any(not field.startswith(_BESIDE) for field in fields)
+
     # -- bodies ------------------------------------------------------------------------------
 
     def _law(self, name: str, table: Any) -> Law | None:
@@ -91,14 +101,29 @@ class Builder:
         from solver.model.body import Body
 
         where = f"bodies.{name}"
+        lost = table.mesh is not None and self.meshes is not None and table.mesh not in self.meshes
+        if lost or where in self.absent or (table.mesh is None and table.shape is None):
+            return None  # that is told already
         at = where if table.shape is None else f"{where}.shape"
         as_made = self.tried(at, lambda: _made(table, self.meshes))
         mesh = self.tried(where, lambda: _placed(as_made, table)) if as_made else None
-        law = laws.get(table.material)
-        if mesh is None or law is None:
+        if mesh is None:
             return None
-        each = enumerate(self.scene.loads)
-        loads = tuple(self._load(k, load) for k, load in each if load.body == name)
+        self._boundaries[name] = list(mesh.boundaries or {})
+        supports = {
+            boundary: held
+            for boundary, held in table.supports.items()
+            if self._named(f"{where}.supports.{boundary}", name, boundary)
+        }
+        loads = tuple(
+            self._load(k, load)
+            for k, load in enumerate(self.scene.loads)
+            if load.body == name
+            and self._named(f"loads[{k}].boundary", name, getattr(load, "boundary", None))
+        )
+        law = laws.get(table.material)
+        if law is None:
+            return None
         usual = "quad8" if mesh.t.shape[0] == 4 else "tri6"
         return self.tried(
             where,
@@ -109,7 +134,7 @@ class Builder:
                 kinematics=self.scene.kinematics,
                 element=table.element or usual,
                 thickness=self.scene.thickness,
-                supports=table.supports,
+                supports=supports,
                 loads=loads,
             ),
         )
@@ -117,6 +142,9 @@ class Builder:
     def _rigid(self, name: str, table: tables.Rigid) -> RigidBody | None:
         from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc
 
+        if f"rigid.{name}" in self.absent:
+            return None
+        self._boundaries[name] = list(table.surfaces)
         surfaces = {}
         for each, surface in table.surfaces.items():
             if isinstance(surface, Line):
@@ -143,6 +171,15 @@ class Builder:
             ),
         )
 
+    def _named(self, field: str, body: str, boundary: str | None) -> bool:
+        """Whether a body has a boundary, or need not have; it is a mistake where it has not."""
+        known = self._boundaries.get(body)
+        if boundary is None or known is None or boundary in known:
+            return True
+        allowed = f"must name a boundary of {body}: {', '.join(known) or 'it has none'}"
+        self.mistakes.append(StudyError(field, boundary, allowed + nearest(boundary, known)))
+        return False
+
     # -- what acts ---------------------------------------------------------------------------
 
     def _load(self, k: int, table: Any) -> Load:
@@ -163,6 +200,8 @@ class Builder:
 
         given = table.model_dump(exclude={"name", "slave", "master", "amplitude", "shear_limit"})
         slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
+        for side, (body, boundary) in (("slave", slave), ("master", master)):
+            self._named(f"contacts[{k}].{side}", body, boundary)
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
         return self.tried(
             f"contacts[{k}]",
@@ -208,23 +247,6 @@ class Builder:
             for k, stage in enumerate(self.scene.stages)
         )
         return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
-
-
-def apart(system: System) -> Iterator[StudyError]:
-    """Yield the bodies that contact alone must hold, and that touch nothing at the beginning."""
-    from solver.model.rigid import RigidBody
-
-    state = system.initial()
-    for number, (name, part) in enumerate(zip(system.all_names, system.parts, strict=True)):
-        own = [i for i in system.interfaces if number in (i.slave, i.master)]
-        if not part.rigid.shape[1] or not own:
-            continue
-        gap = min(float(i.pairing(state.u, 0.0).gap.min()) for i in own)
-        # a curved surface touches at a point, and its gap is a mean around it
-        if gap > _NEAR * min(i.slave_surface.shortest_edge for i in own):
-            allowed = f"is held by contact alone and stands {gap:.4g} mm away: move it there"
-            kind = "rigid" if isinstance(part.body, RigidBody) else "bodies"
-            yield StudyError(f"{kind}.{name}", name, allowed)
 
 
 def _place(names: list[str]) -> Any:

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from studies.errors import SceneError, StudyError
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
+from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import LARGEST, MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
@@ -26,10 +27,6 @@ PLAIN = ("name", "summary", "parameters", "derived")
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
 
-Where = tuple[str | int, ...]
-"""Keys and positions that lead to an entry."""
-
-
 Mistakes = dict[Where, StudyError | None]
 """What is wrong by its place; None where the cause is told elsewhere."""
 
@@ -39,6 +36,26 @@ class _Evaluated(NamedTuple):
 
     tree: Any
     mistakes: Mistakes
+
+
+class Readable(NamedTuple):
+    """What can be read of a scene file.
+
+    Attributes
+    ----------
+    tables : with stand-ins where there are mistakes; None where too little is left
+    wrong : the mistakes by their places
+    own : see `mending.Mended`
+    """
+
+    tables: SceneFile | None
+    wrong: Mistakes
+    own: Mapping[Where, frozenset[str]]
+
+    @property
+    def mistakes(self) -> list[StudyError]:
+        """What is told."""
+        return [mistake for mistake in self.wrong.values() if mistake]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +118,7 @@ class Description:
         try:
             return SceneFile.model_validate_json(_json(self._bare() | stub), strict=True).parameters
         except ValidationError as error:
-            raise SceneError(self.file, list(mistakes_of(error, SceneFile))) from None
+            raise SceneError(self.file, [*mistakes_of(error, SceneFile).values()]) from None
 
     def tables(self, values: Mapping[str, Any]) -> SceneFile:
         """Return the tables for values of all parameters.
@@ -111,15 +128,25 @@ class Description:
         SceneError
             with all entries that are wrong
         """
-        found = self._evaluated(values)
-        mistakes = [mistake for mistake in found.mistakes.values() if mistake]
+        found = self.readable(values)
+        if found.tables is None or found.wrong:
+            raise SceneError(self.file, found.mistakes)
+        return found.tables
+
+    def readable(self, values: Mapping[str, Any]) -> Readable:
+        """Return what can be read for values of all parameters, and what cannot."""
+        tree, wrong = self._evaluated(values)
         try:
-            tables = SceneFile.model_validate_json(_json(found.tree), strict=True)
-            if not found.mistakes:
-                return tables
+            tables = SceneFile.model_validate_json(_json(tree), strict=True)
+            if not wrong:
+                return Readable(tables, wrong, {})
         except ValidationError as error:
-            mistakes += mistakes_of(error, SceneFile, found.mistakes)
-        raise SceneError(self.file, mistakes)
+            wrong |= mistakes_of(error, SceneFile, wrong)
+        rest, own = mended(tree, wrong)
+        try:
+            return Readable(SceneFile.model_validate_json(_json(rest), strict=True), wrong, own)
+        except ValidationError:  # too little is left, or a name is none
+            return Readable(None, wrong, own)
 
     def used(self) -> set[str]:
         """Return the parameters that some entry names, through derived numbers too."""

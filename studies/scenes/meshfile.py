@@ -26,6 +26,8 @@ LARGEST = 50_000_000
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body is made of, and their corners."""
 _LINES = ("line", "line3")
+_NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
+"""Cell data of meshio that say in which set a cell is, by number."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,8 +63,7 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
         raise ModelError("mesh", name, "must lie in a plane: its z differ")
     blocks = [(block.type, np.asarray(block.data)) for block in found.cells]
-    named = {key: each for key, each in found.cell_sets.items() if not key.startswith("gmsh:")}
-    sets = {key: dict(enumerate(each)) for key, each in named.items()}
+    sets = _sets(found)
     plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
     if not plane:
         listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
@@ -85,7 +86,7 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
         )
     mesh, number = _made(points[:, :2], np.vstack(list(chosen.values())), kind)
     lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
-    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets))
+    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, found.point_sets))
 
 
 def _read(name: str, data: bytes) -> Any:
@@ -104,6 +105,22 @@ def _read(name: str, data: bytes) -> Any:
         except Exception as error:  # whatever a damaged file makes a reader raise
             reason = str(error).replace(str(path), name) or type(error).__name__
     raise ModelError("mesh", name, f"cannot be read: {reason}")
+
+
+def _sets(found: Any) -> dict[str, dict[int, Any]]:
+    """Return the cells of each named set by block; a number without a name is its own name."""
+    sets = {
+        name: dict(enumerate(each))
+        for name, each in found.cell_sets.items()
+        if not name.startswith("gmsh:")
+    }
+    names = {tuple(map(int, each)): name for name, each in found.field_data.items()}
+    for key in set(_NUMBERS) & found.cell_data.keys():
+        for k, (block, numbers) in enumerate(zip(found.cells, found.cell_data[key], strict=True)):
+            for number in np.unique(numbers):
+                name = names.get((int(number), block.dim), str(number))
+                sets.setdefault(name, {}).setdefault(k, np.flatnonzero(numbers == number))
+    return sets
 
 
 def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:
@@ -138,11 +155,20 @@ def _made(points: NDArray[np.float64], cells: NDArray[np.int64], kind: str) -> t
 
 
 def _boundaries(
-    mesh: Mesh, number: NDArray[np.int64], lines: dict[int, Any], sets: dict[str, dict[int, Any]]
+    mesh: Mesh,
+    number: NDArray[np.int64],
+    lines: dict[int, Any],
+    sets: dict[str, dict[int, Any]],
+    nodes: dict[str, Any],
 ) -> dict[str, NDArray[np.int64]]:
-    """Return the facets of each set of lines that lies on the mesh, and the outline."""
+    """Return the outline, and the facets of each set of lines or nodes that lies on the mesh."""
     facets = {ends: k for k, ends in enumerate(map(tuple, np.sort(mesh.facets, axis=0).T.tolist()))}
-    found = {OUTLINE: np.asarray(mesh.boundary_facets())}
+    outline = np.asarray(mesh.boundary_facets())
+    found = {OUTLINE: outline}
+    for name, own in nodes.items():  # the edges of the outline with both ends in the set
+        inside = np.isin(mesh.facets[:, outline], number[np.asarray(own, dtype=np.int64)])
+        if inside.all(0).any():
+            found[name] = outline[inside.all(0)]
     for name, own in sets.items():
         pairs = [number[cells[_rows(own, k)]] for k, cells in lines.items()]
         ends = np.sort(np.vstack([np.zeros((0, 2), dtype=int), *pairs]), axis=1)

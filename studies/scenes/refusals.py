@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from studies.errors import StudyError, nearest, one_of
+from studies.scenes.mending import Where
 
 _WORDS = {
     "missing": "must be given",
@@ -37,13 +38,11 @@ _KINDS = ("union_tag_not_found", "union_tag_invalid")
 _TABLES = frozenset({"properties", "additionalProperties", "patternProperties"})
 """What the schema of a table has, one of them at least."""
 
-Where = tuple[str | int, ...]
-
 
 def mistakes_of(
     error: ValidationError, table: type[BaseModel], known: Collection[Where] = ()
-) -> Iterator[StudyError]:
-    """Yield what is wrong, but for what is ``known`` to be wrong at these places.
+) -> dict[Where, StudyError]:
+    """Return what is wrong by its place, but for what is ``known`` to be wrong at these places.
 
     Of a table whose entries are wrong the entries are told alone.
     """
@@ -55,8 +54,10 @@ def mistakes_of(
     for each, kept, entries in walked:
         if kept not in above and kept not in known:
             told.setdefault(kept, (_given(each), []))[1].append(_allowed(each, entries))
-    for kept, (given, allowed) in told.items():
-        yield StudyError(dotted(kept), given, _either(list(dict.fromkeys(allowed))))
+    return {
+        kept: StudyError(dotted(kept), given, _either(list(dict.fromkeys(allowed))))
+        for kept, (given, allowed) in told.items()
+    }
 
 
 def _either(allowed: list[str]) -> str:

@@ -18,12 +18,13 @@ from solver.results.look import Look, Values
 from solver.scenes.effort import Effort
 from solver.scenes.parameters import check, described
 from solver.scenes.scene import Scene
-from studies.errors import SceneError, StudyError
+from studies.errors import SceneError
 from studies.scenes import tables
-from studies.scenes.building import Builder, apart
-from studies.scenes.checking import clashes, declarations
+from studies.scenes.building import Builder
+from studies.scenes.checking import clashes
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of
+from studies.scenes.examining import examined
 from studies.scenes.looking import asked, looked, view_of
 
 if TYPE_CHECKING:
@@ -56,17 +57,22 @@ class FileScene(Scene):
         return type(self).__name__, self.id
 
 
-def file_scene(description: Description) -> FileScene:
+def file_scene(description: Description, *, built: bool = False) -> FileScene:
     """Return the scene of a description, the same object for the same content and words.
+
+    Parameters
+    ----------
+    built : whether its bodies are built once, with the defaults, to find what is wrong with them
 
     Raises
     ------
     SceneError
-        with all mistakes that can be told without building the bodies
+        with all mistakes
     """
     known = _SCENES.get(description.key)
-    if known is None:
-        known = _SCENES[description.key] = _made(description)
+    if known is None or built:
+        scene = examined(description, built=built)
+        known = _SCENES.setdefault(description.key, _made(description, scene))
         while len(_SCENES) > _MOST:
             del _SCENES[next(iter(_SCENES))]
     return known
@@ -77,27 +83,11 @@ _MOST = 64
 """Scenes of files that a process keeps."""
 
 
-def _made(description: Description) -> FileScene:
-    parameters, scene = {}, None
-    mistakes: list[StudyError] = []
-    try:
-        parameters = description.parameters
-        mistakes += declarations(parameters, description.used())
-    except SceneError as error:
-        mistakes += error.mistakes
-    try:
-        scene = description.tables(description.declared)
-    except SceneError as error:  # it tells wrong declarations too
-        told = {each.field for each in mistakes}
-        mistakes += [each for each in error.mistakes if each.field not in told]
-    if scene is not None:
-        mistakes += clashes(scene, description.meshes)
-    if mistakes or scene is None:
-        raise SceneError(description.file, mistakes)
+def _made(description: Description, scene: tables.SceneFile) -> FileScene:
     return FileScene(
         name=scene.name,
         summary=scene.summary or f"scene of the file {description.file}",
-        parameters=_parameters(description, parameters),
+        parameters=_parameters(description, scene.parameters),
         branch=_branch(description),
         model=partial(_model, description),
         program=partial(_program, description),
@@ -112,26 +102,6 @@ def _made(description: Description) -> FileScene:
     )
 
 
-def check_built(scene: FileScene) -> None:
-    """Build the scene with its defaults.
-
-    Raises
-    ------
-    SceneError
-        with all mistakes of meshes, boundaries, bodies and contact pairs
-    """
-    from solver.contact.system import System
-
-    description, parameters = scene.description, scene.parameters()
-    builder = Builder(_tables(description, parameters), description.meshes)
-    model = builder.model()
-    if model is not None:
-        system = builder.tried("", lambda: System(model))
-        builder.mistakes += apart(system) if system else ()
-    if builder.mistakes:
-        raise SceneError(description.file, builder.mistakes)
-
-
 def read_scene(path: Path | str) -> FileScene:
     """Return the scene of a file, checked with its default parameters.
 
@@ -140,9 +110,7 @@ def read_scene(path: Path | str) -> FileScene:
     StudyError, SceneError
         when the file cannot be read, or with all its mistakes
     """
-    scene = file_scene(Description.read(path))
-    check_built(scene)
-    return scene
+    return file_scene(Description.read(path), built=True)
 
 
 # -- what the driver of scenes calls -------------------------------------------------------------

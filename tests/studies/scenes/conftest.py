@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from studies.scenes.description import Description
-from studies.scenes.scene import FileScene, check_built, file_scene
+from studies.scenes.scene import FileScene, file_scene
 
 BLOCKS = """
 name = "blocks"
@@ -80,9 +80,7 @@ def blocks() -> dict[str, Any]:
 
 def built(content: dict[str, Any]) -> FileScene:
     """Return the scene of tables, its bodies built once."""
-    scene = file_scene(Description("blocks.toml", content, {}))
-    check_built(scene)
-    return scene
+    return file_scene(Description("blocks.toml", content, {}), built=True)
 
 
 @pytest.fixture

@@ -36,6 +36,60 @@ def test_parts_of_a_gmsh_file_have_their_boundaries() -> None:
     assert np.hypot(*plate.p[:, ends]) == pytest.approx(10.0)
 
 
+def two_squares(**data: object) -> meshio.Mesh:
+    """Return two squares, the lower side of the right one a line."""
+    cells = [("line", np.array([[1, 2]])), ("quad", np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))]
+    return meshio.Mesh(np.pad(SQUARE, ((0, 0), (0, 1))), cells, **data)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "names"),
+    [
+        ("mesh.msh", "gmsh:physical", {"right": (7, 2), "below": (3, 1)}),  # format 2.2
+        ("mesh.msh", "gmsh:physical", {}),
+        ("mesh.mesh", "medit:ref", {}),
+    ],
+)
+def test_numbers_of_cells_tell_parts_and_boundaries(
+    tmp_path: Path, name: str, key: str, names: dict[str, tuple[int, int]]
+) -> None:
+    numbers = [np.array([3]), np.array([4, 7])]
+    mesh = two_squares(
+        cell_data={key: numbers, "gmsh:geometrical": numbers}
+        if name == "mesh.msh"
+        else {key: numbers},
+        field_data={name: np.array(tag) for name, tag in names.items()},
+    )
+    path = tmp_path / name
+    if name == "mesh.msh":
+        meshio.write(path, mesh, file_format="gmsh22")
+    else:
+        mesh.write(path)
+    file = MeshFile(name, path.read_bytes())
+    part, boundary = ("right", "below") if names else ("7", "3")
+    right = file.mesh(part)
+    assert right.p[0].min() == 1.0
+    assert right.nelements == 1
+    assert set(right.boundaries) == {OUTLINE, boundary}
+    ends = right.p[:, right.facets[:, right.boundaries[boundary]]]
+    assert ends[1] == pytest.approx(0.0)
+    assert ends.shape == (2, 2, 1)
+    with pytest.raises(ModelError, match=f"4, {part}"):
+        file.mesh("below" if names else "3")
+
+
+def test_sets_of_nodes_are_boundaries(tmp_path: Path) -> None:
+    mesh = two_squares(
+        point_sets={"above": np.array([3, 4, 5]), "corner": np.array([0])},
+        cell_sets={"left": [np.array([], dtype=int), np.array([0])]},
+    )
+    file = written(tmp_path, mesh, "mesh.inp")
+    assert set(file.mesh(None).boundaries) == {OUTLINE, "above"}
+    left = file.mesh("left")
+    (facet,) = left.boundaries["above"]
+    assert left.p[1, left.facets[:, facet]] == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize("kind", ["quad", "quad8", "quad9", "triangle", "triangle6"])
 def test_all_kinds_of_cells_are_read(tmp_path: Path, kind: str) -> None:
     quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])

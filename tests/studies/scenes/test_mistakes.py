@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,266 +17,7 @@ from studies.scenes.description import Description
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
 from tests.studies.scenes.conftest import blocks, built
-
-Tables = dict[str, Any]
-
-
-def put(*path: Any) -> Callable[[Tables], None]:
-    """Return what writes the last of ``path`` at the place that the others lead to."""
-
-    def change(tables: Tables) -> None:
-        at: Any = tables
-        for key in path[:-2]:
-            at = at[key]
-        at[path[-2]] = path[-1]
-
-    return change
-
-
-def rigid(**changes: Any) -> Callable[[Tables], None]:
-    body = {"surfaces": {"face": {"kind": "line", "points": [[-1, 2.5], [5, 2.5]]}}} | changes
-    return put("rigid", {"plate": body})
-
-
-def seen_on(**x: Any) -> Callable[[Tables], None]:
-    along = {"start": -1.0, "stop": 1.0, "num": 9}
-    return put("look", "map", {"x": along | x, "y": along})
-
-
-def without(*path: Any) -> Callable[[Tables], None]:
-    def change(tables: Tables) -> None:
-        at: Any = tables
-        for key in path[:-1]:
-            at = at[key]
-        del at[path[-1]]
-
-    return change
-
-
-SHAPE = ("bodies", "upper", "shape")
-MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
-    "text for a number": (
-        put("contacts", 0, "friction", "high"),
-        "contacts[0].friction",
-        "must be a number",
-    ),
-    "number out of range": (
-        put("contacts", 0, "friction", -1.0),
-        "contacts[0].friction",
-        "at least 0",
-    ),
-    "infinite number": (put("loads", 0, "value", float("inf")), "loads[0].value", "finite"),
-    "unknown entry": (
-        put("contacts", 0, "frictoin", 0.1),
-        "contacts[0].frictoin",
-        "did you mean friction?",
-    ),
-    "unknown table": (put("body", {}), "body", "did you mean bodies?"),
-    "text in a shape": (put(*SHAPE, "size", "fine"), "bodies.upper.shape.size", "number"),
-    "unknown entry of a shape": (
-        put(*SHAPE, "sise", 0.1),
-        "bodies.upper.shape.sise",
-        "did you mean size?",
-    ),
-    "no parameter in a shape": (
-        put(*SHAPE, "size", "$fine"),
-        "bodies.upper.shape.size",
-        "$fine is no parameter",
-    ),
-    "unknown entry of a rigid body": (
-        rigid(radius=3.0),
-        "rigid.plate.radius",
-        "there is no such entry; there are surfaces, centre, x, y, rotation",
-    ),
-    "unknown entry of a motion": (
-        rigid(y={"pushd": -1.0}),
-        "rigid.plate.y.pushd",
-        "there are moved, pushed, amplitude; did you mean pushed?",
-    ),
-    "missing entry": (without("loads", 0, "boundary"), "loads[0].boundary", "must be given"),
-    "unknown kind": (
-        put("loads", 0, "kind", "presure"),
-        "loads[0].kind",
-        "must be one of displacement, initial_stress, pressure, temperature, traction; "
-        "did you mean pressure?",
-    ),
-    "no kind": (without(*SHAPE, "kind"), "bodies.upper.shape.kind", "must be one of disc, fillet"),
-    "wrong derived number": (
-        lambda t: t.update(derived={"side": "$sid"}),
-        "derived.side",
-        "$sid is no parameter",
-    ),
-    "list for a default": (
-        put("parameters", "wide", "default", [3.0]),
-        "parameters.wide.default",
-        "must be true or false, an integer, a number or a text",
-    ),
-    "expression for a default": (
-        put("parameters", "wide", "default", "2*$mu"),
-        "parameters.wide.default",
-        "must be a value",
-    ),
-    "list too short by a wrong entry": (
-        rigid(surfaces={"face": {"kind": "line", "points": [[0, "here"], [5, 2.5]]}}),
-        "rigid.plate.surfaces.face.points[0][1]",
-        "must be a number",
-    ),
-    "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
-    "unknown parameter": (
-        put("contacts", 0, "friction", "$nu"),
-        "contacts[0].friction",
-        "$nu is no parameter",
-    ),
-    "no arithmetic": (put("loads", 0, "value", "2*($wide"), "loads[0].value", "ends too early"),
-    "without effect": (put("contacts", 0, "friction", 0.1), "parameters.mu", "has no effect"),
-    "default out of range": (
-        put("parameters", "mu", "default", 2.0),
-        "parameters.mu.default",
-        "in its range, 0 to 1",
-    ),
-    "default not a choice": (
-        put("parameters", "rule", "default", "kinematic"),
-        "parameters.rule.default",
-        "one of its choices",
-    ),
-    "name taken": (
-        put("outputs", {"plastic_work": {"of": "mises", "stage": "pressed", "body": "lower"}}),
-        "outputs.plastic_work",
-        "choose another",
-    ),
-    "unknown material": (
-        put("bodies", "upper", "material", "brass"),
-        "bodies.upper.material",
-        "one of steel",
-    ),
-    "unknown body": (put("loads", 0, "body", "top"), "loads[0].body", "one of upper, lower"),
-    "unknown body of a surface": (
-        put("contacts", 0, "slave", "top.bottom"),
-        "contacts[0].slave",
-        "one of upper, lower",
-    ),
-    "unknown stage": (
-        put("outputs", "least", "stage", "loaded"),
-        "outputs.least.stage",
-        "one of pressed",
-    ),
-    "unknown stage of an amplitude": (
-        put("loads", 0, "amplitude", {"later": 1.0}),
-        "loads[0].amplitude",
-        "one of pressed",
-    ),
-    "output nowhere": (
-        without("outputs", "least", "body"),
-        "outputs.least",
-        "needs one of body, line",
-    ),
-    "shape and mesh": (
-        put("bodies", "upper", "mesh", "a.msh"),
-        "bodies.upper.shape",
-        "one of the two",
-    ),
-    "mesh not there": (
-        lambda t: (
-            t["bodies"]["upper"].update(mesh="a.msh", shape=None)
-            or t["bodies"]["upper"].pop("shape")
-        ),
-        "bodies.upper.mesh",
-        "no such file",
-    ),
-    "mesh elsewhere": (
-        put("bodies", "upper", "mesh", "../a.msh"),
-        "bodies.upper.mesh",
-        "must match",
-    ),
-    "stages and loading": (
-        put("loading", {"factor": 1.0, "step": 0.1}),
-        "stages",
-        "one of the two",
-    ),
-    "two of one name": (
-        lambda t: t["stages"].append({"name": "pressed"}),
-        "stages",
-        "two have this name",
-    ),
-    "wrong place of a line": (
-        put("look", "lines", "middle", "radius", 1.0),
-        "look.lines.middle",
-        "start and end, or",
-    ),
-    "map from right to left": (
-        seen_on(stop=-1.5),
-        "look.map.x.stop",
-        "must be > start = -1",
-    ),
-    "map with half of a grading": (
-        seen_on(near=0.0),
-        "look.map.x.size",
-        "near and size go together",
-    ),
-    "map graded to what it has not": (
-        seen_on(near=2.0, size=0.1),
-        "look.map.x.near",
-        "must be from -1 to 1",
-    ),
-    "map graded too much": (
-        seen_on(near=0.0, size=1e-9),
-        "look.map.x.size",
-        "is too small for 9 points",
-    ),
-    "list of a wrong length": (
-        put("look", "lines", "middle", "end", [1.0]),
-        "look.lines.middle.end[1]",
-        "must be given",
-    ),
-    "unknown boundary": (
-        put("loads", 0, "boundary", "up"),
-        "bodies.upper.pressure",
-        "bottom, left, right, top|left, right, bottom, top",
-    ),
-    "unknown contact boundary": (
-        put("contacts", 0, "master", "lower.up"),
-        "master",
-        "must name a boundary",
-    ),
-    "size too large": (put(*SHAPE, "size", 1e-5), "bodies.upper.shape.size", "200000"),
-    "shape inside out": (put(*SHAPE, "x", [4, 0]), "bodies.upper.shape.x", "increasing"),
-    "body left free": (
-        without("bodies", "lower", "supports"),
-        "supports",
-        "body 'upper' can move freely|body 'lower' can move freely",
-    ),
-    "bodies apart": (
-        put("bodies", "upper", "move", [0.0, 0.5]),
-        "bodies.upper",
-        "stands 0.5 mm away",
-    ),
-    "bodies overlap": (
-        put("bodies", "upper", "move", [0.0, -0.5]),
-        "contacts",
-        "overlaps 'lower' by 0.5 mm",
-    ),
-    "hardening without its curve": (
-        put("parameters", "rule", {"default": "table", "choices": ["table"]}),
-        "materials.steel.curve",
-        "must be points",
-    ),
-    "axis crossed": (
-        lambda t: t.update(kinematics="axisymmetric") or put(*SHAPE, "x", [-1, 3])(t),
-        "bodies.upper.mesh",
-        "x >= 0",
-    ),
-    "rigid both moved and pushed": (
-        rigid(x={"moved": 1.0, "pushed": 2.0}),
-        "rigid.plate.x",
-        "not both",
-    ),
-    "rigid without surface": (rigid(surfaces={}), "rigid.plate.surfaces", "1 or more"),
-    "rigid of one name": (
-        lambda t: rigid()(t) or t["rigid"].update(upper=t["rigid"].pop("plate")),
-        "rigid",
-        "two have this name",
-    ),
-}
+from tests.studies.scenes.mistakes import MISTAKES, put
 
 
 @pytest.mark.parametrize("kind", MISTAKES)
@@ -292,20 +34,45 @@ def test_a_mistake_is_told_by_its_entry(kind: str) -> None:
     assert "blocks.toml" in str(caught.value)
 
 
-def test_all_mistakes_are_told_at_once() -> None:
+def told(*kinds: str) -> list[str]:
+    """Return the entries that are told of a file with mistakes of these kinds."""
     tables = blocks()
-    for kind in ("text for a number", "unknown entry", "no arithmetic", "unknown word"):
+    for kind in kinds:
         MISTAKES[kind][0](tables)
-    with pytest.raises(SceneError, match="5 mistakes") as caught:
+    with pytest.raises(SceneError) as caught:
         built(tables)
-    fields = {each.field for each in caught.value.mistakes}
-    assert fields == {
-        "parameters.mu",
-        "contacts[0].friction",
-        "contacts[0].frictoin",
-        "loads[0].value",
-        "kinematics",
-    }
+    each = [(mistake.field, mistake.allowed) for mistake in caught.value.mistakes]
+    assert len(each) == len(set(each)), "a mistake is told twice"
+    return [field for field, _ in each]
+
+
+alone = cache(told)
+
+
+APART = (
+    "unknown table", "unknown word", "default out of range", "hardening without its curve",
+    "unknown material", "unknown boundary of a support", "text for a number",
+    "unknown contact boundary", "no arithmetic", "unknown stage of an amplitude",
+    "unknown entry of a motion", "two of one name", "wrong place of a line",
+    "map with half of a grading", "output nowhere",
+)  # fmt: skip
+"""Kinds of mistakes of which none changes what another one changes."""
+
+
+def test_all_mistakes_are_told_at_once() -> None:
+    together = told(*APART)
+    assert len(together) >= len(APART)
+    assert set(together) == {field for kind in APART for field in alone(kind)}
+
+
+@pytest.mark.parametrize("kind", APART)
+def test_two_mistakes_bring_no_third(kind: str) -> None:
+    for other in MISTAKES:
+        try:
+            both = told(kind, other)
+        except (KeyError, TypeError, AttributeError):  # the one took away what the other changes
+            continue
+        assert set(both) <= {*alone(kind), *alone(other)}, other
 
 
 def test_all_mistakes_of_bodies_are_told_at_once() -> None:
@@ -313,10 +80,16 @@ def test_all_mistakes_of_bodies_are_told_at_once() -> None:
     for kind in ("unknown boundary", "hardening without its curve"):
         MISTAKES[kind][0](tables)
     tables["bodies"]["lower"]["shape"]["x"] = [4, 0]
-    with pytest.raises(SceneError, match="mistakes") as caught:
+    with pytest.raises(SceneError, match="3 mistakes") as caught:
         built(tables)
     fields = {each.field for each in caught.value.mistakes}
-    assert {"bodies.lower.shape.x", "materials.steel.curve"} <= fields
+    assert fields == {"bodies.lower.shape.x", "materials.steel.curve", "loads[0].boundary"}
+
+
+@pytest.mark.parametrize("kind", ["body left free", "bodies apart", "bodies overlap"])
+def test_what_hurts_no_body_hides_nothing_of_them(kind: str) -> None:
+    beside = ("default out of range", "wrong place of a line", "unknown stage", "two of one name")
+    assert set(told(kind)) < set(told(kind, *beside))
 
 
 def test_the_scene_itself_has_no_mistake() -> None:
@@ -343,7 +116,7 @@ def test_any_wrong_entry_is_told_by_itself_and_alone(where: tuple[Any, ...], wro
     if where[-1] in ("summary", "description", "unit") and isinstance(wrong, str):
         return  # any text will do
     with pytest.raises(SceneError) as caught:
-        file_scene(Description("everything.toml", tables, {}))
+        file_scene(Description("everything.toml", tables, {}), built=True)
     told = [each.field for each in caught.value.mistakes]
     if where == ("rigid", "plate", "rotation", "moved"):  # the one entry that says $turn
         told.remove("parameters.turn")

@@ -1,0 +1,277 @@
+"""Kinds of mistakes of a scene file: what makes them, the entry that is told, and words of it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+Tables = dict[str, Any]
+
+
+def put(*path: Any) -> Callable[[Tables], None]:
+    """Return what writes the last of ``path`` at the place that the others lead to."""
+
+    def change(tables: Tables) -> None:
+        at: Any = tables
+        for key in path[:-2]:
+            at = at[key]
+        at[path[-2]] = copy.deepcopy(path[-1])
+
+    return change
+
+
+def rigid(**changes: Any) -> Callable[[Tables], None]:
+    body = {"surfaces": {"face": {"kind": "line", "points": [[-1, 2.5], [5, 2.5]]}}} | changes
+    return put("rigid", {"plate": body})
+
+
+def seen_on(**x: Any) -> Callable[[Tables], None]:
+    along = {"start": -1.0, "stop": 1.0, "num": 9}
+    return put("look", "map", {"x": along | x, "y": along})
+
+
+def without(*path: Any) -> Callable[[Tables], None]:
+    def change(tables: Tables) -> None:
+        at: Any = tables
+        for key in path[:-1]:
+            at = at[key]
+        del at[path[-1]]
+
+    return change
+
+
+SHAPE = ("bodies", "upper", "shape")
+MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
+    "text for a number": (
+        put("contacts", 0, "friction", "high"),
+        "contacts[0].friction",
+        "must be a number",
+    ),
+    "number out of range": (
+        put("contacts", 0, "friction", -1.0),
+        "contacts[0].friction",
+        "at least 0",
+    ),
+    "infinite number": (put("loads", 0, "value", float("inf")), "loads[0].value", "finite"),
+    "unknown entry": (
+        put("contacts", 0, "frictoin", 0.1),
+        "contacts[0].frictoin",
+        "did you mean friction?",
+    ),
+    "unknown table": (put("body", {}), "body", "did you mean bodies?"),
+    "text in a shape": (put(*SHAPE, "size", "fine"), "bodies.upper.shape.size", "number"),
+    "unknown entry of a shape": (
+        put(*SHAPE, "sise", 0.1),
+        "bodies.upper.shape.sise",
+        "did you mean size?",
+    ),
+    "no parameter in a shape": (
+        put(*SHAPE, "size", "$fine"),
+        "bodies.upper.shape.size",
+        "$fine is no parameter",
+    ),
+    "unknown entry of a rigid body": (
+        rigid(radius=3.0),
+        "rigid.plate.radius",
+        "there is no such entry; there are surfaces, centre, x, y, rotation",
+    ),
+    "unknown entry of a motion": (
+        rigid(y={"pushd": -1.0}),
+        "rigid.plate.y.pushd",
+        "there are moved, pushed, amplitude; did you mean pushed?",
+    ),
+    "missing entry": (without("loads", 0, "boundary"), "loads[0].boundary", "must be given"),
+    "unknown kind": (
+        put("loads", 0, "kind", "presure"),
+        "loads[0].kind",
+        "must be one of displacement, initial_stress, pressure, temperature, traction; "
+        "did you mean pressure?",
+    ),
+    "no kind": (without(*SHAPE, "kind"), "bodies.upper.shape.kind", "must be one of disc, fillet"),
+    "wrong derived number": (
+        lambda t: t.update(derived={"side": "$sid"}),
+        "derived.side",
+        "$sid is no parameter",
+    ),
+    "list for a default": (
+        put("parameters", "wide", "default", [3.0]),
+        "parameters.wide.default",
+        "must be true or false, an integer, a number or a text",
+    ),
+    "expression for a default": (
+        put("parameters", "wide", "default", "2*$mu"),
+        "parameters.wide.default",
+        "must be a value",
+    ),
+    "list too short by a wrong entry": (
+        rigid(surfaces={"face": {"kind": "line", "points": [[0, "here"], [5, 2.5]]}}),
+        "rigid.plate.surfaces.face.points[0][1]",
+        "must be a number",
+    ),
+    "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
+    "unknown parameter": (
+        put("contacts", 0, "friction", "$nu"),
+        "contacts[0].friction",
+        "$nu is no parameter",
+    ),
+    "no arithmetic": (put("loads", 0, "value", "2*($wide"), "loads[0].value", "ends too early"),
+    "without effect": (put("contacts", 0, "friction", 0.1), "parameters.mu", "has no effect"),
+    "default out of range": (
+        put("parameters", "mu", "default", 2.0),
+        "parameters.mu.default",
+        "in its range, 0 to 1",
+    ),
+    "default not a choice": (
+        put("parameters", "rule", "default", "kinematic"),
+        "parameters.rule.default",
+        "one of its choices",
+    ),
+    "name taken": (
+        put("outputs", {"plastic_work": {"of": "mises", "stage": "pressed", "body": "lower"}}),
+        "outputs.plastic_work",
+        "choose another",
+    ),
+    "unknown material": (
+        put("bodies", "upper", "material", "brass"),
+        "bodies.upper.material",
+        "one of steel",
+    ),
+    "unknown body": (put("loads", 0, "body", "top"), "loads[0].body", "one of upper, lower"),
+    "unknown body of a surface": (
+        put("contacts", 0, "slave", "top.bottom"),
+        "contacts[0].slave",
+        "one of upper, lower",
+    ),
+    "unknown stage": (
+        put("outputs", "least", "stage", "loaded"),
+        "outputs.least.stage",
+        "one of pressed",
+    ),
+    "unknown stage of an amplitude": (
+        put("loads", 0, "amplitude", {"later": 1.0}),
+        "loads[0].amplitude",
+        "one of pressed",
+    ),
+    "output nowhere": (
+        without("outputs", "least", "body"),
+        "outputs.least",
+        "needs one of body, line",
+    ),
+    "shape and mesh": (
+        put("bodies", "upper", "mesh", "a.msh"),
+        "bodies.upper.shape",
+        "one of the two",
+    ),
+    "mesh not there": (
+        lambda t: (
+            t["bodies"]["upper"].update(mesh="a.msh", shape=None)
+            or t["bodies"]["upper"].pop("shape")
+        ),
+        "bodies.upper.mesh",
+        "no such file",
+    ),
+    "mesh elsewhere": (
+        put("bodies", "upper", "mesh", "../a.msh"),
+        "bodies.upper.mesh",
+        "must match",
+    ),
+    "stages and loading": (
+        put("loading", {"factor": 1.0, "step": 0.1}),
+        "stages",
+        "one of the two",
+    ),
+    "two of one name": (
+        lambda t: t["stages"].append({"name": "pressed"}),
+        "stages",
+        "two have this name",
+    ),
+    "wrong place of a line": (
+        put("look", "lines", "middle", "radius", 1.0),
+        "look.lines.middle",
+        "start and end, or",
+    ),
+    "map from right to left": (
+        seen_on(stop=-1.5),
+        "look.map.x.stop",
+        "must be > start = -1",
+    ),
+    "map with half of a grading": (
+        seen_on(near=0.0),
+        "look.map.x.size",
+        "near and size go together",
+    ),
+    "map graded to what it has not": (
+        seen_on(near=2.0, size=0.1),
+        "look.map.x.near",
+        "must be from -1 to 1",
+    ),
+    "map graded too much": (
+        seen_on(near=0.0, size=1e-9),
+        "look.map.x.size",
+        "is too small for 9 points",
+    ),
+    "list of a wrong length": (
+        put("look", "lines", "middle", "end", [1.0]),
+        "look.lines.middle.end[1]",
+        "must be given",
+    ),
+    "unknown boundary": (
+        put("loads", 0, "boundary", "topp"),
+        "loads[0].boundary",
+        "must name a boundary of upper: left, right, bottom, top; did you mean top?",
+    ),
+    "unknown contact boundary": (
+        put("contacts", 0, "master", "lower.up"),
+        "contacts[0].master",
+        "must name a boundary of lower",
+    ),
+    "unknown boundary of a support": (
+        put("bodies", "upper", "supports", {"lef": "x"}),
+        "bodies.upper.supports.lef",
+        "did you mean left?",
+    ),
+    "unknown surface": (
+        lambda t: rigid()(t) or put("contacts", 0, "slave", "plate.side")(t),
+        "contacts[0].slave",
+        "must name a boundary of plate: face",
+    ),
+    "size too large": (put(*SHAPE, "size", 1e-5), "bodies.upper.shape.size", "200000"),
+    "shape inside out": (put(*SHAPE, "x", [4, 0]), "bodies.upper.shape.x", "increasing"),
+    "body left free": (
+        without("bodies", "lower", "supports"),
+        "supports",
+        "body 'upper' can move freely|body 'lower' can move freely",
+    ),
+    "bodies apart": (
+        put("bodies", "upper", "move", [0.0, 0.5]),
+        "bodies.upper",
+        "stands 0.5 mm away",
+    ),
+    "bodies overlap": (
+        put("bodies", "upper", "move", [0.0, -0.5]),
+        "contacts",
+        "overlaps 'lower' by 0.5 mm",
+    ),
+    "hardening without its curve": (
+        put("parameters", "rule", {"default": "table", "choices": ["table"]}),
+        "materials.steel.curve",
+        "must be points",
+    ),
+    "axis crossed": (
+        lambda t: t.update(kinematics="axisymmetric") or put(*SHAPE, "x", [-1, 3])(t),
+        "bodies.upper.mesh",
+        "x >= 0",
+    ),
+    "rigid both moved and pushed": (
+        rigid(x={"moved": 1.0, "pushed": 2.0}),
+        "rigid.plate.x",
+        "not both",
+    ),
+    "rigid without surface": (rigid(surfaces={}), "rigid.plate.surfaces", "1 or more"),
+    "rigid of one name": (
+        lambda t: rigid()(t) or t["rigid"].update(upper=t["rigid"].pop("plate")),
+        "rigid",
+        "two have this name",
+    ),
+}
