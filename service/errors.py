@@ -25,6 +25,7 @@ from studies.errors import (
     StoreBusy,
     StoreFull,
     Unusable,
+    worded,
 )
 
 log = logging.getLogger(__name__)
@@ -153,7 +154,7 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     """Return field, value and what is allowed for each error FastAPI found."""
     errors = []
     for error in exc.errors():
-        field, value, allowed = dotted(error["loc"]), shown(error.get("input")), error["msg"]
+        field, value, allowed = dotted(error["loc"]), shown(error.get("input")), worded(error)
         if error["type"] == "json_invalid":
             reason = f"{error['ctx']['error']} at character {error['loc'][-1]}"
             field, value, allowed = "body", None, f"valid JSON ({reason})"

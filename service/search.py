@@ -12,7 +12,7 @@ from studies import StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
 from studies.errors import one_of
-from studies.scenes.registry import scene_named
+from studies.scenes.registry import known_names, scene_named
 from studies.storage.shelf import newest
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
@@ -44,6 +44,9 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     scenes: list[Scene] = [*SCENES.values(), *posted]
     if which.scene is not None:
         own = [scene for scene in posted if scene.name == which.scene]
+        names = [*known_names(), *(scene.name for scene in posted)]
+        if which.scene not in names:
+            raise StudyError("scene", which.scene, one_of(which.scene, names))
         scenes = [*own] or [scene_named(which.scene)]
     known: dict[str, list[Parameter]] = {}
     for scene in scenes:

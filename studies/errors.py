@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
@@ -109,3 +109,38 @@ def nearest(name: Any, names: Iterable[str]) -> str:
     """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
     matches = difflib.get_close_matches(str(name), list(names), n=1)
     return f"; did you mean {matches[0]}?" if matches else ""
+
+
+_WORDS = {
+    "missing": "must be given",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_type": "must be an integer",
+    "int_from_float": "must be an integer",
+    "int_parsing": "must be an integer",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text",
+    "finite_number": "must be finite",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "dict_type": "must be a table",
+    "tuple_type": "must be a list",
+    "literal_error": "must be {expected}",
+    "enum": "must be {expected}",
+    "extra_forbidden": "is not known here",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "string_too_long": "must have at most {max_length} characters",
+    "too_short": "must have {min_length} or more",
+    "too_long": "must have at most {max_length}",
+    "string_pattern_mismatch": "must match {pattern}",
+}
+"""What is allowed where pydantic finds an error of a type."""
+
+
+def worded(error: Mapping[str, Any]) -> str:
+    """Return what is allowed in place of what an error of pydantic is about."""
+    words = _WORDS.get(error["type"])
+    return words.format(**error.get("ctx", {})) if words else str(error["msg"])

@@ -7,31 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from studies.errors import StudyError, nearest, one_of
+from studies.errors import StudyError, nearest, one_of, worded
 from studies.scenes.mending import Where
-
-_WORDS = {
-    "missing": "must be given",
-    "float_type": "must be a number",
-    "int_type": "must be an integer",
-    "int_from_float": "must be an integer",
-    "bool_type": "must be true or false",
-    "string_type": "must be a text",
-    "finite_number": "must be finite",
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
-    "dict_type": "must be a table",
-    "tuple_type": "must be a list",
-    "literal_error": "must be {expected}",
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be at least {ge:g}",
-    "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be at most {le:g}",
-    "string_too_long": "must have at most {max_length} characters",
-    "too_short": "must have {min_length} or more",
-    "too_long": "must have at most {max_length}",
-    "string_pattern_mismatch": "must match {pattern}",
-}
 
 _KINDS = ("union_tag_not_found", "union_tag_invalid")
 
@@ -79,15 +56,13 @@ def _given(each: Any) -> Any:
 
 
 def _allowed(each: Any, entries: list[str]) -> str:
-    kind, context = each["type"], each.get("ctx", {})
+    kind = each["type"]
     if kind == "extra_forbidden":
         listed = f"there is no such entry; there are {', '.join(entries)}"
         return listed + nearest(each["loc"][-1], entries)
     if kind in _KINDS:
         return one_of(_given(each), entries)
-    if kind in _WORDS:
-        return _WORDS[kind].format(**context)
-    return str(each["msg"])
+    return worded(each)
 
 
 def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:

@@ -165,12 +165,19 @@ def test_a_scene_larger_than_the_limit_is_refused(service: Server) -> None:
     assert answer.status_code == 413
 
 
-def test_a_scene_that_takes_too_much_is_refused(service: Server, tmp_path: Path) -> None:
-    """Two bodies of the most elements a shape may have take more memory than there is for one."""
-    many = "[[" + "x" * 200_000
-    assert post(service, many.encode()).status_code == 422
-    deep = "a = " + "[" * 100_000
-    assert post(service, deep.encode()).status_code == 422
+@pytest.mark.parametrize("text", ["[[" + "x" * 200_000, "a = " + "[" * 100_000])
+def test_text_that_is_hard_to_read_is_refused(service: Server, text: str) -> None:
+    assert post(service, text.encode()).status_code == 422
+
+
+def test_a_mesh_that_takes_too_much_is_refused(service: Server) -> None:
+    """The mesh claims four billion nodes: more than the memory of the process that reads it."""
+    many = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4000000000 1 4000000000\n"
+    bomb = f"{many}2 1 0 4000000000\n1\n$EndNodes\n".encode()
+    answer = post(service, PIN, pin_msh=bomb)
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["allowed"] == "must be read within 60 s and 8 GiB of memory"
+    assert post(service, PIN, pin_msh=MESH).status_code in (200, 201), "the service goes on"
 
 
 def test_the_command_submits_a_study_with_its_scene_file(service: Server, tmp_path: Path) -> None:
