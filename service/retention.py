@@ -111,7 +111,9 @@ class Keeper:
                 " AND finished IS NOT NULL ORDER BY finished, turn"
             ).fetchall()
         oldest = datetime.now(UTC) - timedelta(days=self.days) if self.days else None
-        excess = size(self.store.directory) - self.size if self.size is not None else 0
+        scenes = size(self.store.directory / "scenes")  # no study that is deleted frees these
+        used = size(self.store.directory) - scenes
+        excess = used - self.size if self.size is not None else 0
         for job in ended:
             old = oldest is not None and datetime.fromisoformat(job["finished"]) < oldest
             if not (old or excess > 0):

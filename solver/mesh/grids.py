@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from skfem import Mesh, MeshQuad2
 
 
+_MOST = 1_000_000
+"""Elements that a line may be divided into."""
 _SAME = 1e-9
 """Distance / size of a mesh, below which corners are merged."""
 
@@ -36,9 +38,12 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> NDAr
         raise ModelError("smallest", smallest, f"must be in (0, {length:g}] [mm]")
     if not ratio >= 1:
         raise ModelError("ratio", ratio, "must be at least 1")
-    sizes = []
+    sizes: list[float] = []
     total, size = 0.0, smallest
     while total < length * (1 - 1e-9):
+        if len(sizes) == _MOST:
+            allowed = f"must make at most {_MOST} elements along {length:g} mm"
+            raise ModelError("size", smallest, allowed)
         sizes.append(min(size, max(largest, smallest)))
         total += sizes[-1]
         size *= ratio

@@ -8,7 +8,7 @@ import types
 import typing
 from collections.abc import Callable
 from dataclasses import field, fields
-from functools import cache
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
@@ -65,7 +65,7 @@ _Bound = tuple[Callable[[float, float], bool], float, str]
 _Rule = tuple[str, Any, str, tuple[str, ...], tuple[_Bound, ...]]
 
 
-@cache
+@lru_cache(maxsize=128)
 def _rules(kind: Any) -> tuple[_Rule, ...]:
     """Return name, types, what it must be, permitted words and bounds of every field."""
     rules = []
@@ -81,7 +81,7 @@ def _rules(kind: Any) -> tuple[_Rule, ...]:
     return tuple(rules)
 
 
-@cache
+@lru_cache(maxsize=128)
 def _left_out(kind: Any) -> frozenset[str]:
     """Return the fields that need not be given and have no default of their own."""
     return frozenset(item.name for item in fields(kind) if item.default is None)

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -92,7 +92,7 @@ class Parameter:
         return StudyError(field, value, f"must be {self.allowed}")
 
 
-@cache
+@lru_cache(maxsize=128)
 def parameters_of(scene: Scene) -> dict[str, Parameter]:
     """Return the parameters of a scene, by name, in the order in which it declares them."""
     hints = get_type_hints(scene.parameters, include_extras=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from keyword import iskeyword
 
 from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
@@ -11,6 +12,7 @@ from solver.scenes import SCENES
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
+from studies.scenes.description import LARGEST
 
 _NODAL = ("stress.xx", "stress.yy", "stress.zz", "stress.xy", "mises", "plastic_strain",
           "displacement.x", "displacement.y")  # fmt: skip
@@ -48,6 +50,10 @@ def declarations(
         number = isinstance(default, int | float) and not isinstance(default, bool)
         if name in QUANTITIES or name in RESERVED:
             yield StudyError(field, name, "a data set has a variable of this name: choose another")
+        if iskeyword(name):
+            yield StudyError(field, name, "is a word of the language Python: choose another")
+        if number and not -LARGEST <= default <= LARGEST:  # type: ignore[operator]
+            yield StudyError(f"{field}.default", default, f"must be at most {LARGEST:g} in size")
         if name not in used:
             yield StudyError(field, default, f"has no effect: no entry says ${name}")
         if is_expression(default):
@@ -191,13 +197,14 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
     for field, names in groups.items():
         for name in names:
             yield StudyError(field, name, "two have this name: each needs one of its own")
-    taken: dict[str, Any] = {**QUANTITIES, **dict.fromkeys(RESERVED), **scene.parameters}
+    taken = {*QUANTITIES, *RESERVED, *scene.parameters}
     for name in scene.outputs:
-        for each in (name, f"{name}_x", f"{name}_y"):
-            if each in taken:
-                allowed = f"the data set has {each} already: choose another name"
-                yield StudyError(f"outputs.{name}", name, allowed)
+        own = {name, f"{name}_x", f"{name}_y"}
+        for each in sorted(own & taken):
+            allowed = f"the data set has {each} already: choose another name"
+            yield StudyError(f"outputs.{name}", name, allowed)
+        taken |= own
 
 
 def _twice(names: list[str]) -> list[str]:
-    return sorted({name for name in names if names.count(name) > 1})
+    return sorted(name for name, count in Counter(names).items() if count > 1)

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple, Self
 from pydantic import ValidationError
 
 from studies.errors import SceneError, StudyError
+from studies.scenes import meshfile
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
 from studies.scenes.mending import Where, mended
-from studies.scenes.meshfile import LARGEST, MeshFile
+from studies.scenes.meshfile import MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import Parameter, SceneFile
@@ -23,6 +24,9 @@ from studies.toml import toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived")
 """Entries of a scene file in which no expression stands, and the table of derived numbers."""
+
+LARGEST = 1e100
+"""Largest number that a parameter may have by default."""
 
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
@@ -210,8 +214,8 @@ def mesh_names(content: Mapping[str, Any]) -> list[str]:
 
 def _bytes(path: Path) -> bytes:
     try:
-        if path.stat().st_size > LARGEST:
-            raise StudyError("scene", str(path), f"must be at most {LARGEST} bytes")
+        if path.stat().st_size > meshfile.LARGEST:
+            raise StudyError("scene", str(path), f"must be at most {meshfile.LARGEST} bytes")
         return path.read_bytes()
     except OSError as error:
         raise StudyError("scene", str(path), f"cannot be read: {error.strerror}") from None
@@ -247,7 +251,9 @@ def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistake
 
 def _can_be(value: Any) -> bool:
     """Tell whether a parameter may have this value: a number or a word, true or false."""
-    return isinstance(value, bool | int | float | str) and not is_expression(value)
+    if isinstance(value, int | float):
+        return not abs(value) > LARGEST
+    return isinstance(value, str) and not is_expression(value)
 
 
 def _expressions(value: Any) -> Iterator[tuple[Where, str]]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakKeyDictionary
 
+from solver.errors import ModelError
 from solver.scenes.effort import Effort
+from studies.errors import StudyError
 from studies.scenes import tables
 from studies.scenes.building import mesh_of_body
 
 if TYPE_CHECKING:
+    from skfem import Mesh
+
     from studies.scenes.description import Description
 
 
@@ -31,10 +35,15 @@ def effort_of(
     ----------
     scene : tables for the values of its parameters
     increments : of each of its runs, those that are shared once
+
+    Raises
+    ------
+    StudyError
+        for a body that cannot be meshed with these values
     """
     elements = unknowns = 0
     for name, body in scene.bodies.items():
-        size = _size(description, body.model_dump_json(exclude={"supports", "material"}))
+        size = _size_of(description, name, body)
         elements += size.elements
         sides = [side.split(".") for pair in scene.contacts for side in (pair.slave, pair.master)]
         own = {side[1] for side in sides if side[0] == name}
@@ -50,12 +59,25 @@ def effort_of(
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
 
 
-@lru_cache(maxsize=512)
-def _size(description: Description, body: str) -> _Size:
-    """Return the size of a body, whose table is given as JSON."""
-    table = tables.Body.model_validate_json(f'{{"material": "any", {body[1:]}')
-    mesh = mesh_of_body(table, description.meshes)
-    quadratic = table.element not in ("quad4", "tri3")
-    nodes = mesh.nvertices + quadratic * mesh.nfacets + (table.element == "quad9") * mesh.nelements
+_SIZES: WeakKeyDictionary[Description, dict[str, _Size]] = WeakKeyDictionary()
+"""What was found of the bodies of each file that is in use, by their tables."""
+
+
+def _size_of(description: Description, name: str, body: tables.Body) -> _Size:
+    """Return the size of a body."""
+    known = _SIZES.setdefault(description, {})
+    key = body.model_dump_json(exclude={"supports", "material"})
+    if key not in known:
+        try:
+            known[key] = _size(body, mesh_of_body(body, description.meshes))
+        except ModelError as error:
+            where = f"bodies.{name}" if body.shape is None else f"bodies.{name}.shape"
+            raise StudyError(f"{where}.{error.field}", error.value, error.allowed) from None
+    return known[key]
+
+
+def _size(body: tables.Body, mesh: Mesh) -> _Size:
+    quadratic = body.element not in ("quad4", "tri3")
+    nodes = mesh.nvertices + quadratic * mesh.nfacets + (body.element == "quad9") * mesh.nelements
     edges = {name: len(facets) for name, facets in (mesh.boundaries or {}).items()}
     return _Size(mesh.nelements, int(nodes), edges)

@@ -23,6 +23,9 @@ OUTLINE = "outline"
 LARGEST = 50_000_000
 """Bytes a mesh file may have."""
 
+MOST_POINTS = 1_000_000
+"""Points a mesh file may have."""
+
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body is made of, and their corners."""
 _LINES = ("line", "line3")
@@ -58,11 +61,18 @@ class MeshFile:
 def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
     found = _read(name, data)
     points = np.asarray(found.points, dtype=float)
+    if len(points) > MOST_POINTS:
+        raise ModelError("mesh", name, f"must have at most {MOST_POINTS} points; {len(points)}")
+    if not np.isfinite(points).all():
+        raise ModelError("mesh", name, "must have finite points")
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ModelError("mesh", name, "must have points of two or three coordinates")
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
         raise ModelError("mesh", name, "must lie in a plane: its z differ")
     blocks = [(block.type, np.asarray(block.data)) for block in found.cells]
+    for kind, each in blocks:
+        if each.size and not 0 <= each.min() <= each.max() < len(points):
+            raise ModelError("mesh", name, f"must have no {kind} of points that are not there")
     sets = _sets(found)
     plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
     if not plane:

@@ -166,7 +166,7 @@ def _tables(description: Description, parameters: Any) -> tables.SceneFile:
     return _tables_of(description, tuple(_values(parameters).items()))
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _tables_of(description: Description, values: tuple[tuple[str, Any], ...]) -> tables.SceneFile:
     return description.tables(dict(values))
 

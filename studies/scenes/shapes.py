@@ -176,7 +176,7 @@ def _disc(shape: tables.Disc) -> Mesh:
     R, size = shape.radius, shape.size
     n = max(2, 2 * round(np.pi * R / 4 / size))  # elements along a quarter of the rim
     m = max(1, round((1 - _CORE) * R / size))
-    _limited([np.zeros(n + 1), np.zeros(n + 4 * m + 1)])
+    _few(n * (n + 4 * m))
     square = np.linspace(-1.0, 1.0, n + 1)
 
     def core(X: Array) -> Array:
@@ -271,10 +271,14 @@ def _lines(
 
 def _limited(lines: list[Array]) -> list[Array]:
     """Return the lines of a grid, if its elements are not too many."""
-    count = (len(lines[0]) - 1) * (len(lines[1]) - 1)
+    _few((len(lines[0]) - 1) * (len(lines[1]) - 1))
+    return lines
+
+
+def _few(count: int) -> None:
+    """Refuse a mesh of too many elements."""
     if count > MOST_ELEMENTS:
         raise ModelError("size", f"{count} elements", f"at most {MOST_ELEMENTS} elements")
-    return lines
 
 
 def _named(mesh: Mesh, names: dict[str, str]) -> Mesh:

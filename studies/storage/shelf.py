@@ -8,7 +8,7 @@ from pathlib import Path
 
 from solver.scenes import Scene
 from studies.errors import StudyError
-from studies.scenes.description import Description
+from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.appearing import appearing
@@ -21,8 +21,9 @@ def keep(directory: Path, scene: Scene) -> None:
     if not isinstance(scene, FileScene):
         return
     folder = directory / "scenes" / scene.id
-    if (folder / _FILE).is_file():
-        return
+    with suppress(StudyError):  # one that is damaged is written anew
+        if kept(directory, scene.id):
+            return
     folder.mkdir(parents=True, exist_ok=True)
     meshes = scene.description.meshes or {}
     written = {name: mesh.data for name, mesh in meshes.items()}
@@ -47,16 +48,15 @@ def kept(directory: Path, scene_id: str) -> FileScene | None:
         return None
     try:
         told = json.loads(path.read_bytes())
-        meshes = {
-            each.name: MeshFile(each.name, each.read_bytes())
-            for each in folder.iterdir()
-            if each.name != _FILE and not each.name.endswith(".part")
-        }
+        names = mesh_names(told["content"])
+        meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
         scene = file_scene(Description(told["file"], told["content"], meshes))
     except (OSError, ValueError, KeyError) as error:
-        raise StudyError("scene", scene_id, f"cannot be read from {path}: {error}") from None
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise StudyError("scene", scene_id, f"is kept damaged, post it again: {reason}") from None
     if scene.id != scene_id:
-        raise StudyError("scene", scene_id, f"is not what {path} holds: its content has changed")
+        allowed = "is kept damaged, post it again: its content has changed"
+        raise StudyError("scene", scene_id, allowed)
     return scene
 
 

@@ -200,6 +200,9 @@ def test_the_oldest_go_until_the_data_fit(place: Place) -> None:
     for study, days in zip(found, (1, 3, 2), strict=True):
         aged(place, study, days)
     everything = sum(p.stat().st_size for p in place.store.directory.rglob("*") if p.is_file())
+    scenes = place.store.directory / "scenes"
+    scenes.mkdir()
+    (scenes / "large.msh").write_bytes(b" " * 100_000)  # stays: deleting a study does not free it
     place.keeper(size=everything).sweep()
     assert all(place.there(study) for study in found)
     place.keeper(size=everything - 1).sweep()

@@ -6,6 +6,7 @@ import io
 import subprocess
 import sys
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,7 @@ def test_bodies_are_built_before_a_scene_is_kept(service: Server) -> None:
         (PIN, {}, "bodies.plate.mesh", "no such file"),
         (PIN, {"pin_msh": b"$MeshFormat"}, "bodies.plate.mesh", "cannot be read"),
         (PIN, {"pin_msh": MESH, "other_msh": MESH}, "meshes", "that the scene names: pin.msh"),
-        (PIN.replace(b"pin.msh", b"pin.xdmf"), {"pin_xdmf": MESH}, "meshes", "must end in"),
+        (PIN.replace(b"pin.msh", b"pin.xdmf"), {"pin_xdmf": MESH}, "meshes", "end in one of .msh"),
         (PIN.replace(b'"pin.msh"', b'"../pin.msh"'), {}, "bodies.plate.mesh", "must match"),
         (PIN.replace(b'"pin.msh"', b'"/etc/passwd"'), {}, "bodies.plate.mesh", "must match"),
     ],
@@ -168,6 +169,36 @@ def test_a_scene_larger_than_the_limit_is_refused(service: Server) -> None:
 @pytest.mark.parametrize("text", ["[[" + "x" * 200_000, "a = " + "[" * 100_000])
 def test_text_that_is_hard_to_read_is_refused(service: Server, text: str) -> None:
     assert post(service, text.encode()).status_code == 422
+
+
+def test_a_scene_file_has_at_most_a_million_bytes(service: Server) -> None:
+    answer = post(service, b"# " + b"x" * 1_000_000)
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["allowed"] == "must have at most 1000000 bytes"
+
+
+def test_a_body_that_a_swept_value_spoils_is_refused_by_its_entry(service: Server) -> None:
+    low = BLOCKS.replace("range = [1.0, 100.0]", "range = [-9.0, 100.0]").replace('"$wide/4"', "1")
+    found = post(service, low.encode()).json()["id"]
+    study = {"name": "spoiled", "scene": found, "sweep": {"wide": [4.0, -4.0]}}
+    for route in ("/estimate", "/studies"):
+        answer = service.client.post(route, json=study)
+        assert answer.status_code == 422, answer.text
+        (error,) = answer.json()["errors"]
+        assert error["field"].startswith("bodies.upper.shape"), error
+
+
+def test_reading_a_scene_holds_nobody_up(service: Server) -> None:
+    """The key of this text takes seconds to parse; other requests are answered meanwhile."""
+    hard = (".".join("a" * 20_000) + " = 1").encode()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(post, service, hard)
+        answered = 0
+        while not waiting.done():
+            assert service.client.get("/scenes/punch").status_code == 200
+            answered += 1
+        assert waiting.result().status_code == 422
+    assert answered > 3
 
 
 def test_a_mesh_that_takes_too_much_is_refused(service: Server) -> None:

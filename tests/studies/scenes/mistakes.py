@@ -132,6 +132,29 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "outputs.plastic_work",
         "choose another",
     ),
+    "names of outputs that meet": (
+        put("outputs", "least_x", {"of": "mises", "stage": "pressed", "body": "lower"}),
+        "outputs.least_x",
+        "the data set has least_x already",
+    ),
+    "parameter with a word of Python": (
+        lambda t: (
+            put("parameters", "lambda", {"default": 0.2})(t)
+            or put("contacts", 0, "cohesion", "$lambda")(t)
+        ),
+        "parameters.lambda",
+        "choose another",
+    ),
+    "number beyond all bounds": (
+        put("parameters", "wide", {"default": 10**400, "unit": "mm"}),
+        "parameters.wide.default",
+        "at most 1e+100",
+    ),
+    "size far too small": (
+        put(*SHAPE, "near", [{"at": [0, 0], "size": 1e-12, "radius": 1.0}]),
+        "bodies.upper.shape.size",
+        "elements along",
+    ),
     "unknown material": (
         put("bodies", "upper", "material", "brass"),
         "bodies.upper.material",

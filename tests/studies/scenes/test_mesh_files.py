@@ -78,6 +78,17 @@ def test_numbers_of_cells_tell_parts_and_boundaries(
         file.mesh("below" if names else "3")
 
 
+def test_points_that_are_not_there_or_none_are_refused(tmp_path: Path) -> None:
+    for index in (-1, 6):
+        mesh = meshio.Mesh(SQUARE, [("quad", np.array([[0, 1, 4, index]]))])
+        with pytest.raises(ModelError, match=r"mesh\.mesh"):
+            written(tmp_path, mesh, "mesh.mesh").mesh(None)
+    holed = np.where(SQUARE == 2, np.nan, SQUARE)
+    mesh = meshio.Mesh(holed, [("quad", np.array([[0, 1, 4, 3]]))])
+    with pytest.raises(ModelError, match="finite points"):
+        written(tmp_path, mesh, "mesh.mesh").mesh(None)
+
+
 def test_sets_of_nodes_are_boundaries(tmp_path: Path) -> None:
     mesh = two_squares(
         point_sets={"above": np.array([3, 4, 5]), "corner": np.array([0])},
