@@ -48,7 +48,11 @@ class MapQuery(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    field: str = Field(default="residual_stress", description="variable on the map grid")
+    field: str | None = Field(
+        default=None,
+        description="variable on the map grid; `residual_stress` by default, or `map_stress` where "
+        "the bodies are not released",
+    )
     component: str | None = Field(default=None, description="of a stress; the first by default")
     zoom: float | None = Field(
         default=None,

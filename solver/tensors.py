@@ -53,6 +53,11 @@ def von_mises(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))
 
 
+def not_below_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return values of an invariant that has no sign, without what interpolation undershoots."""
+    return np.maximum(values, 0.0)
+
+
 def stress_difference(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return sigma1 - sigma2 (...) of the xy plane, of Mandel components (4, ...) [MPa]."""
     xx, yy, _, xy = mandel

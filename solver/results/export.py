@@ -25,25 +25,45 @@ _CELLS = {
     "tri6": "triangle6",
 }
 """Element -> cell of meshio. Corners, mid-sides and the middle have the same order in both."""
+_PVD = "stages.pvd"
 
 
 def write_vtu(fields: MeshFields, folder: Path) -> Path:
-    """Write a .vtu for each stage and the .pvd that holds them together; return the latter."""
+    """Write a .vtu for each stage and the .pvd that holds them together; return the latter.
+
+    They take the place of the stages that the folder had.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise ModelError("folder", str(folder), "must be a folder, or not exist yet") from None
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     stages = ElementTree.SubElement(root, "Collection")
-    for number, name in enumerate(fields.stages):
-        file = folder / f"{number}-{''.join(c if c.isalnum() else '-' for c in name)}.vtu"
-        to_meshio(fields, name).write(file)
-        ElementTree.SubElement(
-            stages, "DataSet", timestep=repr(float(number)), name=name, file=file.name
-        )
-    path = folder / "stages.pvd"
-    ElementTree.ElementTree(root).write(path, xml_declaration=True, encoding="utf-8")
+    path, before = folder / _PVD, _listed(folder / _PVD)
+    with tempfile.TemporaryDirectory(dir=folder) as part:
+        for number, name in enumerate(fields.stages):
+            file = f"{number}-{''.join(c if c.isalnum() else '-' for c in name)}.vtu"
+            to_meshio(fields, name).write(Path(part) / file)
+            ElementTree.SubElement(
+                stages, "DataSet", timestep=repr(float(number)), name=name, file=file
+            )
+        whole = ElementTree.ElementTree(root)
+        whole.write(Path(part) / _PVD, xml_declaration=True, encoding="utf-8")
+        now = [each.attrib["file"] for each in stages]
+        for name in (*now, _PVD):  # all are written: nothing is left half-done
+            (Path(part) / name).replace(folder / name)
+    for name in before - {*now}:
+        (folder / name).unlink(missing_ok=True)
     return path
+
+
+def _listed(path: Path) -> set[str]:
+    """Return the files beside a .pvd that it lists; none where there is no such file."""
+    try:
+        found = ElementTree.parse(path).iter("DataSet")
+        return {Path(each.attrib["file"]).name for each in found}
+    except (OSError, ElementTree.ParseError, KeyError):
+        return set()
 
 
 def vtu_of(fields: MeshFields, stage: str) -> bytes:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.quantities import declare
-from solver.tensors import stress_difference, to_tensor, von_mises
+from solver.tensors import not_below_zero, stress_difference, to_tensor, von_mises
 
 if TYPE_CHECKING:
     from solver.results.look import Look, Values
@@ -54,7 +54,9 @@ def maps(look: Look) -> Values:
     samples = look.samples
     residual = samples.on_map(lambda body: samples.stress(body, look.unloaded))
     under_load = samples.on_map(lambda body: samples.stress(body, look.loaded))
-    strain = samples.on_map(lambda body: samples.plastic_strain(body, look.unloaded))
+    strain = not_below_zero(
+        samples.on_map(lambda body: samples.plastic_strain(body, look.unloaded))
+    )
     return {
         RESIDUAL_STRESS: to_tensor(residual),
         RESIDUAL_MISES: von_mises(residual),
@@ -72,7 +74,7 @@ def stress_maps(look: Look) -> Values:
     return {
         MAP_STRESS: np.stack([to_tensor(each) for each in stress]),
         MAP_MISES: np.stack([von_mises(each) for each in stress]),
-        MAP_PLASTIC_STRAIN: np.stack(strain),
+        MAP_PLASTIC_STRAIN: not_below_zero(np.stack(strain)),
     }
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from solver.results.samples import Nodal
-from solver.tensors import to_tensor, von_mises
+from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from solver.results.samples import Bodies, Solved
@@ -29,6 +28,6 @@ def nodal_fields(system: Bodies, body: str, at: Solved) -> dict[str, Array]:
         "displacement": system.displacement(body, at.state).reshape(-1, 2).T,
         "stress": to_tensor(nodal.stress(body, at)),
         # recovered from the points: that of recovered stress would go beyond the strength
-        "von_mises": np.maximum(nodal.of_points(body, von_mises(stress)), 0.0),
+        "von_mises": not_below_zero(nodal.of_points(body, von_mises(stress))),
         "plastic_strain": nodal.plastic_strain(body, at),
     }

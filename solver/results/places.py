@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from solver.results.quantities import Quantity, declare
+from solver.tensors import not_below_zero
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -136,7 +137,9 @@ class Fields:
         from solver.fem.fields import Sampler
 
         sampler = Sampler(self.system.full(places.body), places.X)
-        return {name: sampler(f) for name, f in self.at_nodes(places.body, stage).items()}
+        found = {name: sampler(f) for name, f in self.at_nodes(places.body, stage).items()}
+        positive = ("von_mises", "plastic_strain")
+        return found | {name: not_below_zero(found[name]) for name in positive}
 
     def _on_pair(self, pair: int, stage: str) -> Slave:
         """Return what acts on the slave of a pair."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from solver.fem.fields import Sampler
-from solver.tensors import to_tensor, von_mises
+from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -82,7 +82,7 @@ class Nodal:
     def plastic_strain(self, body: str, converged: Solved) -> Array:
         """Return recovered equivalent plastic strain (n_nodes,), not below zero."""
         strain = self.system.response(body, converged).state.accumulated
-        return np.maximum(self.of_points(body, strain), 0.0)
+        return not_below_zero(self.of_points(body, strain))
 
 
 class Samples(Nodal):
@@ -122,7 +122,7 @@ class Samples(Nodal):
         """Return stress (station, 4, depth) [MPa] and plastic strain (station, depth)."""
         body = self.view.profile_body
         stress = self.along_depth(self.stress(body, converged))
-        strain = self.along_depth(self.plastic_strain(body, converged))
+        strain = not_below_zero(self.along_depth(self.plastic_strain(body, converged)))
         return to_tensor(stress).swapaxes(0, 1), strain
 
     def flow(self, converged: Solved) -> Array:

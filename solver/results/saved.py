@@ -22,14 +22,23 @@ def write(path: Path, content: Mapping[str, Any]) -> None:
 
     Raises
     ------
-    ModelError : the model holds something that cannot be stored, such as a function without a name
+    ModelError : the file cannot be written, or the model holds something that cannot be stored,
+        such as a function without a name
     """
     try:
         stored = pickle.dumps(dict(content))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         allowed = f"must hold no lambda and no function within a function: {error}"
         raise ModelError("model", "", allowed) from None
-    path.write_bytes(_HEAD + version(_PACKAGE).encode() + b"\n" + stored)
+    part = path.with_name(f"{path.name}.part")  # a file that is there stays until this is whole
+    try:
+        part.write_bytes(_HEAD + version(_PACKAGE).encode() + b"\n" + stored)
+        part.replace(path)
+    except OSError as error:
+        allowed = f"cannot be written: {error.strerror}"
+        raise ModelError("path", str(path), allowed) from None
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -90,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
     )  # fmt: skip
-    one.add_argument("--field", default="residual_stress")
+    one.add_argument("--field", help="residual_stress, or map_stress where nothing is released")
     one.add_argument("--component")
     one.add_argument(
         "--zoom", type=float, metavar="MM",

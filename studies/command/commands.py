@@ -120,7 +120,8 @@ def export(options: argparse.Namespace) -> int:
     from solver.errors import ModelError
     from solver.results.export import write_vtu
     from studies.storage.ugrid import read
-    from studies.views.reading import open_netcdf, run_file
+    from studies.views.picking import run_file
+    from studies.views.reading import open_netcdf
 
     with open_netcdf(run_file(options.path, _selection(options.select))) as run:
         fields = read(run)
@@ -230,7 +231,7 @@ def _save(drawn: Any, path: Path) -> None:
     if kind not in kinds:
         raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
     with _written("--out", path) as part:
-        drawn.savefig(part, format=kind)
+        drawn.savefig(part, format=kind, dpi=drawn.dpi)  # its own default is that of the start
 
 
 @contextmanager

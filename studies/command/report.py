@@ -86,11 +86,11 @@ def _warned(dataset: xr.Dataset) -> str:
 
 def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
     """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
+    from studies.views.picking import one_run
     from studies.views.plots.maps import map_figure
-    from studies.views.reading import one_run
 
     try:
-        drawn = map_figure(one_run(dataset), "residual_stress", "xx")
+        drawn = map_figure(one_run(dataset), component="xx")
     except StudyError:
         return {}
     picture = io.BytesIO()

@@ -20,6 +20,7 @@ import itertools
 import json
 import logging
 import tempfile
+import time
 import uuid
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -49,6 +50,8 @@ ENGINE: Literal["h5netcdf"] = "h5netcdf"
 _BATCH = 500
 """Runs that are verified before their rows are put."""
 
+_UNFINISHED = 600.0
+"""Seconds after which what is beside a data set, and not finished, will not be."""
 _LOG = logging.getLogger("studies")
 
 
@@ -221,7 +224,7 @@ class Store:
     def writing(self, tidy: bool = True) -> Iterator[None]:
         """Hold the directory as its only writer.
 
-        With `tidy`, unfinished files of killed writers are deleted: nobody else writes here.
+        With `tidy`, unfinished files of killed writers are deleted: nobody else writes runs here.
 
         A store whose lock the caller holds (`held`) takes it as it is.
 
@@ -243,7 +246,7 @@ class Store:
             file = (self.directory / ".lock").open("a+", encoding="ascii")
         with locked(self.directory, file):
             parts = self.directory.glob("*/**/*.part") if tidy else ()  # keys are next to them
-            for part in parts:
+            for part in filter(_left, parts):
                 part.unlink(missing_ok=True)
             self.reconcile()
             yield
@@ -273,6 +276,14 @@ class Store:
             path.rename(target)
         here, there = (each.relative_to(self.directory) for each in (path, target))
         _LOG.warning("%s cannot be read and is now %s: %s", here, there, reason)
+
+
+def _left(part: Path) -> bool:
+    """Whether nobody writes an unfinished file any more; a report is written without the lock."""
+    try:
+        return part.parent.name == "runs" or time.time() - part.stat().st_mtime > _UNFINISHED
+    except FileNotFoundError:
+        return False
 
 
 def _holds_json(path: Path) -> bool:

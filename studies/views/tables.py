@@ -15,7 +15,7 @@ from solver.results.quantities import QUANTITIES
 from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK, STATUSES
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked, value_text
-from studies.views.reading import flags, sweep_axes, sweep_coordinates
+from studies.views.picking import flags, sweep_axes, sweep_coordinates
 
 FIGURES: Mapping[str, str] = {
     "surface_residual_max": "largest residual {component} surface {body}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -66,3 +67,15 @@ def test_a_file_in_the_place_of_a_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(ModelError, match="must be a folder"):
         pressed("quad4").to_vtu(tmp_path / "out")
+
+
+def test_a_folder_holds_the_stages_of_the_last_export_alone(tmp_path: Path) -> None:
+    solution = pressed("quad4")
+    (tmp_path / "mine.txt").write_text("stays")
+    solution.to_vtu(tmp_path)
+    before = {each.name for each in tmp_path.iterdir()}
+    one = replace(solution, stages={"alone": solution.stages["loaded"]})
+    one.to_vtu(tmp_path)
+    after = {each.name for each in tmp_path.iterdir()}
+    assert before == {"mine.txt", "stages.pvd", "0-loaded.vtu", "1-unloaded.vtu"}
+    assert after == {"mine.txt", "stages.pvd", "0-alone.vtu"}

@@ -59,3 +59,23 @@ def test_a_model_that_cannot_be_stored_says_why_and_writes_nothing(tmp_path: Pat
     with pytest.raises(ModelError, match="must hold no lambda"):
         found.save(tmp_path / "a.solution")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_was_saved_before_stays_until_the_new_file_is_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.solution"
+    saved.write(path, {"model": 1})
+
+    def full(self: Path, data: bytes) -> int:
+        with self.open("wb") as file:
+            file.write(data[:5])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(ModelError, match="cannot be written: No space left"):
+        saved.write(path, {"model": 2})
+    assert saved.read(path) == {"model": 1}
+    assert [each.name for each in tmp_path.iterdir()] == ["a.solution"]
+    with pytest.raises(ModelError, match="cannot be written"):
+        saved.write(tmp_path / "nowhere" / "a.solution", {})

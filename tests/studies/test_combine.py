@@ -17,7 +17,7 @@ from studies.definition.vocabulary import STATUSES
 from studies.storage import provenance
 from studies.storage.combine import combine
 from studies.storage.dataset import run_dataset
-from studies.views.reading import one_run
+from studies.views.picking import one_run
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 

@@ -15,9 +15,9 @@ from solver.results.quantities import QUANTITIES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.command.cli import main
 from studies.definition.vocabulary import LABEL_ATTRIBUTES, STATUSES
+from studies.views.picking import one_run
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
-from studies.views.reading import one_run
 from studies.views.tables import runs_table
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import record

@@ -24,7 +24,7 @@ def test_a_study_is_opened_by_its_name_the_last_one_of_several(store: Store) -> 
         assert dataset["friction"].values.tolist() == [0.2]
     with pytest.raises(StudyError, match=r"name = 'tuor': must be one of other, tour"):
         open_study(store.directory, "tuor")
-    with pytest.raises(StudyError, match=r"several studies; give the name of one: other, tour"):
+    with pytest.raises(StudyError, match=r"give the directory of one, or its name \(other, tour\)"):
         open_study(store.directory)
 
 

@@ -26,14 +26,8 @@ from studies.views.comparison.problem import (
 )
 from studies.views.comparison.reference import STRAIN, Published
 from studies.views.comparison.refinement import sizes_of
-from studies.views.reading import (
-    find_datasets,
-    one_run,
-    open_netcdf,
-    select,
-    sweep_axes,
-    sweep_coordinates,
-)
+from studies.views.picking import one_run, select, sweep_axes, sweep_coordinates
+from studies.views.reading import find_datasets, open_netcdf
 
 CASE = "case"
 """Dimension whose labels are those of the published cases."""

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError
+from studies.views.picking import flags, sweep_axes
 from studies.views.plots.captions import (
     capitalised,
     setting,
@@ -21,7 +22,6 @@ from studies.views.plots.captions import (
     wrapped,
 )
 from studies.views.plots.runs import Kind, absent, known_values, look_of, standing
-from studies.views.reading import flags, sweep_axes
 
 MOST_CURVES = 12
 

@@ -13,6 +13,7 @@ from studies.errors import StudyError, one_of
 Window = Sequence[float]
 """Part of a map: x0, x1, y0, y1 [mm]."""
 
+_RESIDUAL, _STRESS = "residual_stress", "map_stress"
 MAP = ("y", "x")
 ALONG = ("s", "depth", "increment", "fraction", "moment")
 """Dimensions that one figure of a run runs over: both of a map, or one of these for lines."""
@@ -28,6 +29,16 @@ def sweep_fields(dataset: xr.Dataset) -> list[str]:
     ]
 
 
+def labelled_fields(dataset: xr.Dataset) -> list[str]:
+    """Return the variables with one number a run for each label, such as body or component."""
+    sweep = set(dataset["status"].dims)
+    return [
+        str(name)
+        for name, each in dataset.data_vars.items()
+        if sweep < set(each.dims) and not {*MAP, *ALONG} & {*each.dims} and each.dtype.kind in "fi"
+    ]
+
+
 def map_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables that are drawn as maps of the bodies."""
     return [str(name) for name, each in dataset.data_vars.items() if set(MAP) <= set(each.dims)]
@@ -36,6 +47,12 @@ def map_fields(dataset: xr.Dataset) -> list[str]:
 def line_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables that are drawn as lines along one of `ALONG`."""
     return [str(name) for name, each in dataset.data_vars.items() if set(ALONG) & set(each.dims)]
+
+
+def usual_field(dataset: xr.Dataset) -> str:
+    """Return what is drawn by default: residual stress, or stress where no body is released."""
+    maps = map_fields(dataset)
+    return next((name for name in (_RESIDUAL, _STRESS) if name in maps), _RESIDUAL)
 
 
 def check_field(field: str, known: list[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Sequence
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError
+from studies.views.picking import one_run
 from studies.views.plots.captions import label, value_text, words, wrapped
 from studies.views.plots.fields import (
     ALONG,
@@ -22,13 +24,12 @@ from studies.views.plots.fields import (
     too_close,
 )
 from studies.views.plots.maps import entitle
-from studies.views.reading import one_run
 
 _DECAYED = 0.02
 """Depth is shown to where nothing larger than this part of the peak is left."""
 _EACH, _LINES = 6, 12
 """Most values of a dimension, and most lines, that are told apart."""
-_STYLES = ("-", "--", ":", "-.")
+_STYLES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (8, 2, 1, 2, 1, 2)), (0, (1, 4)))
 _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth")
 _DISTANCE = "distance"
@@ -63,7 +64,7 @@ def line_figure(
         values = values.dropna(name, how="all")
     if not values.size:
         raise StudyError("field", field, "has no value in the run selected")
-    values = _told_apart(values, [name for name in values.dims if name != along])
+    values = _told_apart(values, [name for name in values.dims if name != along], over)
     others = [name for name in values.dims if name != along]
     at = _DISTANCE if _DISTANCE in values.coords else along
     if zoom is not None:
@@ -107,10 +108,16 @@ def _placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
     return values.assign_coords({_DISTANCE: distance}) if there else values
 
 
-def _told_apart(values: xr.DataArray, others: Sequence[Hashable]) -> xr.DataArray:
-    """Return as many lines as can be told apart; dimensions with one value left are dropped."""
+def _told_apart(values: xr.DataArray, others: Sequence[Hashable], over: str | None) -> xr.DataArray:
+    """Return as many lines as can be told apart; dimensions with one value left are dropped.
+
+    Each value of the axis `over` keeps its lines.
+    """
+    if over and (count := values.sizes[over]) > _LINES:
+        allowed = f"has {count} values, of which {_LINES} can be told apart: select some of them"
+        raise StudyError("over", over, allowed)
     for name in others:
-        if values.sizes[name] > _EACH:
+        if values.sizes[name] > _EACH and name != over:
             among = np.linspace(0.0, values.sizes[name] - 1.0, _EACH)
             values = values.isel({name: among.round().astype(int)})
     if math.prod(values.sizes[name] for name in others) > _LINES:

@@ -9,8 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.markers import CARETDOWN
 
 from studies.errors import StudyError
+from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, wrapped
 from studies.views.plots.fields import (
+    MAP,
     Window,
     check_field,
     component_of,
@@ -19,8 +21,8 @@ from studies.views.plots.fields import (
     is_half,
     map_fields,
     too_close,
+    usual_field,
 )
-from studies.views.reading import one_run
 
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
@@ -40,7 +42,7 @@ _TEXT = 3.2
 
 def map_figure(
     run: xr.Dataset,
-    field: str = "residual_stress",
+    field: str | None = None,
     component: str | None = None,
     zoom: float | None = None,
     window: Window | None = None,
@@ -50,7 +52,8 @@ def map_figure(
     Parameters
     ----------
     run : data set of one run
-    field : variable over ``y`` and ``x``
+    field : variable over ``y`` and ``x``, by default the residual stress, or the stress where the
+        bodies are not released; of several stages the last is drawn
     component : of a stress tensor; the first one by default
     zoom : show only what lies within this distance of the contact's centre, or of its edge where
         half of the bodies was computed [mm]
@@ -62,8 +65,10 @@ def map_figure(
         when the data set has no such field or component, or there are no points in what is shown
     """
     run = one_run(run)
+    field = field or usual_field(run)
     check_field(field, map_fields(run))
-    values = component_of(run[field], component).transpose("y", "x")
+    values = component_of(run[field], component)
+    values = values.isel({name: -1 for name in values.dims if name not in MAP}).transpose(*MAP)
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     if zoom is not None:
         middle = focus(run, zoom)
@@ -82,15 +87,16 @@ def map_figure(
         values["x"], values["y"], values, shading="nearest", rasterized=True,
         cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
     )  # fmt: skip
-    left, right = axes.get_xlim()
-    ends = [end for end in (-edge, edge) if edge > 0.0 and left <= end <= right]
+    (left, right), (low, up) = axes.get_xlim(), axes.get_ylim()
+    seen = edge > 0.0 and low <= 0.0 <= up
+    ends = [end for end in (-edge, edge) if seen and left <= end <= right]
     if ends:  # from above: a line would hide the stress at the surface
         axes.plot(
             ends, [0.0] * len(ends), linestyle="none", marker=CARETDOWN, color="k",
             label="edge of contact under load",
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
-    axes.set(xlim=(left, right), xlabel=_symbol(run["x"]), ylabel=_symbol(run["y"]))
+    axes.set(xlim=(left, right), ylim=(low, up), xlabel=_symbol(run["x"]), ylabel=_symbol(run["y"]))
     axes.set_aspect("equal")
     beside = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.16 / width, 1.0))
     over, under = bool((values > high).any()), signed and bool((values < -high).any())
@@ -110,8 +116,12 @@ def whole(values: xr.DataArray) -> xr.DataArray:
     """Return a map of both halves of bodies that are symmetric about x = 0, from the half x >= 0.
 
     Shear across this line, or this axis, changes sign on the other side. A column on it stays one.
+    Where the map begins away from it, what lies between the halves is not known.
     """
+    values = values.isel(x=values["x"].to_numpy() >= 0.0)
     x = values["x"].to_numpy()
+    if (start := 2.0 * x[0] - x[1]) > 0.0:  # one step from the map towards the line
+        values = xr.concat([values.isel(x=[0]).assign_coords(x=[start]) * np.nan, values], "x")
     component = str(values["component"].item()) if "component" in values.coords else ""
     sign = -1.0 if component.count("x") == 1 else 1.0
     other = sign * values.isel(x=slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1))

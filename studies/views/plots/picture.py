@@ -8,19 +8,22 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError, one_of
+from studies.views.picking import one_run, positions, runs_over, select, sweep_coordinates
 from studies.views.plots.fields import (
     ALONG,
     MAP,
     Window,
     check_field,
+    component_of,
+    labelled_fields,
     line_fields,
     map_fields,
     sweep_fields,
+    usual_field,
 )
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.sweep import sweep_figure
-from studies.views.reading import one_run, positions, runs_over, select, sweep_coordinates
 
 _COARSEST, _FINEST = 50, 600
 """Dots per inch."""
@@ -28,7 +31,7 @@ _COARSEST, _FINEST = 50, 600
 
 def picture(
     dataset: xr.Dataset,
-    field: str,
+    field: str | None = None,
     component: str | None = None,
     zoom: float | None = None,
     selection: Mapping[str, str | float] | None = None,
@@ -37,12 +40,13 @@ def picture(
     over: str | None = None,
     resolution: float | None = None,
 ) -> Figure:
-    """Return a figure of `field`.
+    """Return a figure of `field`, by default of residual stress (of stress, if none is kept).
 
     Parameters
     ----------
     dataset : of a study or of a run
-    field : a variable with one value a run, or one over the bodies, their surface or depth
+    field : a variable with one value a run (for each body, component or point), or one over the
+        bodies, their surface or depth
     component : of a stress tensor; the first one by default
     zoom : show only what lies within this distance of the contact's centre or edge, or of the
         surface [mm]
@@ -58,13 +62,18 @@ def picture(
         when there is no such field, component, axis or value, or nothing to show
     """
     maps, lines, singles = map_fields(dataset), line_fields(dataset), sweep_fields(dataset)
+    labelled = labelled_fields(dataset)
+    field = field or usual_field(dataset)
     given = {"component": component, "zoom": zoom, "window": window, "over": over}
     if field in singles:
         _refuse(given, f"{field} has one value a run: leave it out")
         figure = sweep_figure(select(dataset, selection or {}), field)
+    elif field in labelled:
+        _refuse(given | {"component": None}, f"{field} has one value a run: leave it out")
+        figure = sweep_figure(_labelled(dataset, field, component, selection or {}), field)
     else:
         one_run(dataset)  # where no run succeeded there are no fields: say why
-        check_field(field, [*maps, *lines, *singles])
+        check_field(field, [*maps, *lines, *singles, *labelled])
         if field in maps:
             _refuse({"over": over}, f"{field} is a map of one run: leave it out")
             part = _part(dataset, field, selection or {})
@@ -88,6 +97,33 @@ def _refuse(given: Mapping[str, object], allowed: str) -> None:
             raise StudyError(name, value, allowed)
 
 
+def _labelled(
+    dataset: xr.Dataset, field: str, component: str | None, selection: Mapping[str, str | float]
+) -> xr.Dataset:
+    """Return the part of a study that is selected, with `field` at one label of each kind.
+
+    Of labels that are not selected it is the first, of numbers the last.
+    """
+    values = component_of(dataset[field], component)
+    swept = sweep_coordinates(dataset)
+    own = [str(name) for name in values.dims if name not in swept.values()]
+    _known(selection, [*swept, *own])
+    for name in own:
+        number = values[name].dtype.kind in "fiu"
+        usual = -1 if number else 0
+        at = positions(values[name], selection[name])[0] if name in selection else usual
+        values = values.isel({name: at})
+    runs = dataset[["status", "message"]].assign({field: values})
+    return select(runs, {name: selection[name] for name in swept if name in selection})
+
+
+def _known(selection: Mapping[str, object], names: list[str]) -> None:
+    """Refuse to select by what does not exist."""
+    for name, value in selection.items():
+        if name not in names:
+            raise StudyError(name, value, one_of(name, names))
+
+
 def _part(
     dataset: xr.Dataset, field: str, selection: Mapping[str, str | float], over: str | None = None
 ) -> xr.Dataset:
@@ -98,12 +134,9 @@ def _part(
     swept = sweep_coordinates(dataset)
     drawn = {*swept.values(), *MAP, *ALONG, "component"}
     own = [str(name) for name in dataset[field].dims if name not in drawn]
-    known = [*swept, *own]
-    for name, value in selection.items():
-        if name not in known:
-            raise StudyError(name, value, one_of(name, known))
+    _known(selection, [*swept, *own])
     chosen = {name: selection[name] for name in swept if name in selection}
-    run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen)
+    run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen, field)
     return run.isel(
         {name: positions(run[name], selection[name]) for name in own if name in selection}
     )

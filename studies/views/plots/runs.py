@@ -15,9 +15,9 @@ from matplotlib.transforms import Transform
 from studies.definition.cases import USUAL_AXES
 from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
+from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.captions import words
 from studies.views.plots.maps import SIGNED
-from studies.views.reading import flags, sweep_axes, sweep_coordinates
 
 _CATEGORIES = (
     ("o", "#56B4E9"), ("s", "#0072B2"), ("D", "#E69F00"), ("^", "#D55E00"),

@@ -14,11 +14,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.errors import StudyError
+from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.curves import curve_figure
 from studies.views.plots.limits import draw_shakedown_limits
 from studies.views.plots.runs import POINTS, Look, absent, known_values, look_of, standing
-from studies.views.reading import sweep_axes
 
 MOST_PANELS = 6
 

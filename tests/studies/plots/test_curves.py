@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Any
 
+import matplotlib.image
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,6 +15,7 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.lines import Line2D
 
 from studies import StudyError
+from studies.command.cli import main
 from studies.definition.vocabulary import STATUSES
 from studies.storage.dataset import attributes_of
 from studies.views.plots.picture import picture
@@ -136,12 +140,63 @@ def test_lines_of_several_runs_lie_over_one_axis() -> None:
 def test_runs_with_different_grids_are_not_laid_over_each_other() -> None:
     dataset = swept().rename(s="place").drop_vars("place").rename(place="s")
     dataset = dataset.assign_coords(
-        s_fraction=("s", np.linspace(0.0, 1.0, 5)), s=(("load_ratio", "s"), np.ones((3, 5)))
+        s_fraction=("s", np.linspace(0.0, 1.0, 5)),
+        s=(("load_ratio", "s"), np.outer([1.0, 2.0, 3.0], np.arange(5.0))),
     )
     with pytest.raises(StudyError, match="changes s: these runs have no place in common"):
         picture(dataset, "contact_pressure", over="load_ratio")
 
 
-def test_the_resolution_is_that_of_the_file() -> None:
-    dataset = swept(frictions=[0.0])
-    assert picture(dataset, "increments", resolution=300).dpi == 300.0
+def test_the_resolution_is_that_of_the_file(tmp_path: Path) -> None:
+    swept(frictions=[0.0]).to_netcdf(tmp_path / "swept.nc")
+    widths = []
+    for resolution in ("50", "300"):
+        command = ["plot", str(tmp_path / "swept.nc"), "--field", "increments"]
+        command += ["--resolution", resolution, "--out", str(tmp_path / "a.png")]
+        assert main(command) == 0
+        widths.append(matplotlib.image.imread(tmp_path / "a.png").shape[1])
+    assert widths[1] == pytest.approx(6 * widths[0], abs=6)
+
+
+def test_lines_are_laid_over_each_other_where_another_axis_changes_the_grid() -> None:
+    dataset = swept().rename(s="place").drop_vars("place").rename(place="s")
+    grids = np.outer(1.0 + np.arange(2), np.arange(5.0))  # by friction
+    dataset = dataset.assign_coords(
+        s_fraction=("s", np.linspace(0.0, 1.0, 5)), s=(("friction", "s"), grids)
+    )
+    figure = picture(dataset, "contact_pressure", over="load_ratio")
+    assert len(lines_of(figure)) == 3
+    assert max(line.get_xdata().max() for line in lines_of(figure)) == grids[-1, -1]
+    with pytest.raises(StudyError, match="changes s"):
+        picture(dataset, "contact_pressure", over="friction")
+
+
+def test_each_value_of_an_axis_has_its_line() -> None:
+    dataset = swept(loads=list(np.linspace(0.1, 0.8, 8)), frictions=[0.0], laws=["none"])
+    assert len(lines_of(picture(dataset, "contact_pressure", over="load_ratio"))) == 8
+    dataset = swept(loads=list(np.linspace(0.1, 0.8, 13)), frictions=[0.0], laws=["none"])
+    with pytest.raises(StudyError, match="has 13 values, of which 12 can be told apart"):
+        picture(dataset, "contact_pressure", over="load_ratio")
+
+
+def test_one_number_for_each_label_is_drawn_of_the_one_that_is_selected() -> None:
+    dataset = swept(frictions=[0.0], laws=["none"])
+    parts = dataset["increments"] * xr.DataArray(
+        [[1.0, 2.0], [3.0, 4.0]], dims=("body", "component")
+    )
+    labels = {"body": ["punch", "half_plane"], "component": ["xx", "yy"]}
+    dataset["largest"] = parts.assign_coords(labels)
+
+    def drawn(**options: Any) -> list[float]:
+        (line,) = lines_of(picture(dataset, "largest", **options))
+        return list(np.divide(line.get_ydata(), line.get_xdata()))
+
+    assert drawn() == pytest.approx([1.0] * 3)
+    chosen = drawn(component="yy", selection={"body": "half_plane"})
+    assert chosen == pytest.approx([4.0] * 3)
+    with pytest.raises(StudyError, match="must be one of punch, half_plane"):
+        drawn(selection={"body": "rail"})
+    with pytest.raises(StudyError, match="bodi = 'rail': must be one of load_ratio"):
+        drawn(selection={"bodi": "rail"})
+    with pytest.raises(StudyError, match="largest has one value a run: leave it out"):
+        drawn(zoom=1.0)

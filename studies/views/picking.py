@@ -1,0 +1,179 @@
+"""One run, or a part of the sweep, picked out of a data set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from studies.definition.study import Study
+from studies.definition.vocabulary import OK, STATUSES
+from studies.errors import StudyError
+from studies.storage.frame import FRACTION
+from studies.storage.store import Store
+from studies.views.reading import find_study, open_netcdf
+
+
+def flags(variable: xr.DataArray) -> dict[int, str]:
+    """Return what the values of a variable mean, nothing for one that is no flag."""
+    meanings = str(variable.attrs.get("flag_meanings", "")).split()
+    values = np.atleast_1d(variable.attrs.get("flag_values", [])).tolist()
+    return dict(zip(values, meanings, strict=True))
+
+
+def sweep_axes(dataset: xr.Dataset) -> list[str]:
+    """Return the sweep dimensions of a data set, those of size one included."""
+    return [str(name) for name in dataset["status"].dims]
+
+
+def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the coordinates that tell runs apart, each with its sweep dimension.
+
+    These are the dimensions themselves, and after them what linked axes set.
+    """
+    axes = {axis: axis for axis in sweep_axes(dataset)}
+    return axes | {
+        str(name): axis
+        for axis in axes
+        for name, each in dataset.coords.items()
+        if each.dims == (axis,)
+    }
+
+
+def select(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> xr.Dataset:
+    """Return the part of a data set where the sweep has the wanted values, all axes kept.
+
+    Parameters
+    ----------
+    dataset : of a study or of a run
+    selection : axis, or parameter set by a linked axis -> wanted value
+
+    Raises
+    ------
+    StudyError
+        when an axis or a value is unknown
+    """
+    coordinates = sweep_coordinates(dataset)
+    for name, value in selection.items():
+        if name not in coordinates:
+            raise StudyError(name, value, f"must be one of {', '.join(coordinates)}")
+        dataset = dataset.isel({coordinates[name]: positions(dataset[name], value)})
+    return dataset
+
+
+def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = None) -> xr.Dataset:
+    """Return one successful run of a study.
+
+    Parameters
+    ----------
+    dataset : of a study or of a run
+    selection : axis, or parameter set by a linked axis -> wanted value. On an axis that is not
+        named, the largest number or the first label is taken: usually the run with the most
+        residual stress
+
+    Raises
+    ------
+    StudyError
+        when an axis or a value is unknown, or no run that matches succeeded
+    """
+    axes = sweep_axes(dataset)
+    chosen = select(dataset, selection or {})
+    ok = np.argwhere(chosen["status"].to_numpy() == STATUSES.index(OK))
+    if not len(ok):
+        reasons = sorted({str(text) for text in chosen["message"].to_numpy().flat if text})
+        wanted = dict(selection) if selection else "any"
+        raise StudyError("run", wanted, f"no such run succeeded: {'; '.join(reasons) or 'missing'}")
+    numeric = [chosen[axis].dtype.kind in "fiu" for axis in axes]
+    best = max(
+        ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
+    )
+    return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
+
+
+def runs_over(
+    dataset: xr.Dataset, axis: str, selection: Mapping[str, str | float], field: str
+) -> xr.Dataset:
+    """Return for each value of an axis the run that `one_run` takes; failed ones are left out.
+
+    Raises
+    ------
+    StudyError
+        when there is no such axis or value, no run succeeded, or the grids of the field differ
+    """
+    if axis not in sweep_axes(dataset):
+        raise StudyError("over", axis, f"must be one of {', '.join(sweep_axes(dataset))}")
+    others = [name for name in sweep_axes(dataset) if name != axis]
+    best = one_run(dataset, selection)
+    chosen = select(dataset, selection).sel({name: best[name].item() for name in others})
+    chosen = chosen.isel({axis: np.flatnonzero(chosen["status"] == STATUSES.index(OK))})
+    scaled = [str(name) for name in chosen[field].dims if f"{name}{FRACTION}" in chosen.coords]
+    unlike = [name for name in scaled if not _same(chosen[name], axis)]
+    if unlike:
+        allowed = f"changes {', '.join(unlike)}: these runs have no place in common"
+        raise StudyError("over", axis, allowed)
+    for name in scaled:
+        grid = chosen[name].isel({axis: 0}) if axis in chosen[name].dims else chosen[name]
+        own = {name: (name, grid.to_numpy(), grid.attrs)}
+        chosen = chosen.drop_vars(name).assign_coords(own)
+    return _own_grid(chosen) if scaled else chosen
+
+
+def _same(grid: xr.DataArray, axis: str) -> bool:
+    """Whether a grid is the same for all values of an axis."""
+    if axis not in grid.dims:
+        return True
+    values = np.moveaxis(grid.to_numpy(), grid.dims.index(axis), 0)
+    return all(np.array_equal(each, values[0], equal_nan=True) for each in values)
+
+
+def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
+    """Return the file of a run: `path` itself, or that of the run `one_run` takes of a study.
+
+    Raises
+    ------
+    StudyError
+        when there is no such run
+    """
+    found = find_study(path)
+    beside = found.with_name("study.json")
+    if found.name != "dataset.nc" or not beside.is_file():
+        return found
+    store = Store(found.resolve().parents[2])
+    study = Study.known(json.loads(beside.read_text(encoding="utf-8")), store.scene)
+    if study.id != found.parent.name:  # then its runs have other ids, too
+        allowed = "was computed by another version of the solver: give the file of a run"
+        raise StudyError("path", str(path), allowed)
+    with open_netcdf(found) as dataset:
+        run = one_run(dataset, selection)
+        index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
+    return store.run_path(next(case.id for case in study.cases() if case.index == index))
+
+
+def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
+    """Return where a coordinate has the wanted value, or raise a `StudyError` that lists it."""
+    values = axis.to_numpy()
+    try:
+        same = (
+            np.isclose(values.astype(float), float(value), rtol=1e-9)
+            if values.dtype.kind in "fiu"
+            else values == str(value)
+        )
+    except ValueError:
+        same = np.zeros(len(values), dtype=bool)
+    if not same.any():
+        known = ", ".join(dict.fromkeys(str(each) for each in values))
+        raise StudyError(str(axis.name), value, f"must be one of {known}")
+    return np.flatnonzero(same)
+
+
+def _own_grid(run: xr.Dataset) -> xr.Dataset:
+    """Return a run on its own grid, where the study's runs have different ones."""
+    for name in [str(name) for name in run.dims]:
+        if name in run.coords and name not in run.indexes:
+            there = run[name].notnull().to_numpy()
+            run = run.drop_vars(f"{name}{FRACTION}", errors="ignore")
+            run = run.isel({name: there}).set_xindex(name)
+    return run
