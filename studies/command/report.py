@@ -24,7 +24,7 @@ SHOWN = 100
 """Most runs that a report lists; `residua show` prints all."""
 
 _NAME = "report"
-_TEXT, _PICTURE = "report.txt", "residual_stress_xx.png"
+_TEXT = "report.txt"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,14 +85,19 @@ def _warned(dataset: xr.Dataset) -> str:
 
 
 def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
-    """Draw the residual stress of the run with most of it; nothing when no run succeeded."""
+    """Draw the residual stress of the run with most of it, or the stress where none is released.
+
+    Nothing when no run succeeded.
+    """
     from studies.views.picking import one_run
+    from studies.views.plots.fields import usual_field
     from studies.views.plots.maps import map_figure
 
+    field = usual_field(dataset)
     try:
-        drawn = map_figure(one_run(dataset), component="xx")
+        drawn = map_figure(one_run(dataset), field, "xx")
     except StudyError:
         return {}
     picture = io.BytesIO()
     drawn.savefig(picture, format="png")
-    return {_PICTURE: picture.getvalue()}
+    return {f"{field}_xx.png": picture.getvalue()}
