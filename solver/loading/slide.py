@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.candidates import Candidates
+    from solver.contact.state import ContactState
     from solver.contact.system import System
 
+_SPENT = 0.95
+"""Share of friction that is borne, above which a pair is about to slide."""
 _ALONG = 1e-6
 """Share of normal motion in a motion along the contact: the surfaces are as straight as that."""
 
@@ -42,6 +45,18 @@ class Slide:
             f"body {self.body!r} slides on all its contacts: its load is {self.ratio:.4g} times "
             "what friction can bear"
         )
+
+
+def spent(system: System, contacts: Sequence[ContactState]) -> str:
+    """Return a hint on the pairs whose friction was almost spent in the last equilibrium."""
+    found = []
+    for interface, contact in zip(system.interfaces, contacts, strict=True):
+        most = float(interface.friction * contact.normal.sum())
+        share = abs(float(contact.tangential.sum())) / most if most > 0 else 0.0
+        if share > _SPENT:
+            names = [system.all_names[k] for k in (interface.slave, interface.master)]
+            found.append(f"{' and '.join(names)} bears {share:.0%} of what it can")
+    return f"; just before, friction between {', '.join(found)}" if found else ""
 
 
 def slide(

@@ -18,6 +18,7 @@ from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
 from solver.loading.program import ROUNDING
+from solver.loading.slide import spent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -157,7 +158,7 @@ class Stepper:
                 point = replace(point, tally=self._timed(tally), past=())
                 step = (time - state.time) / 2
                 if abs(step) < least * (1 - ROUNDING):
-                    raise PathEnded(self._ended(failure, state.time, time), point) from failure
+                    raise PathEnded(self._ended(failure, point, time), point) from failure
                 continue
             converged = self._worked(point.now, converged)
             past = (*point.past[1 - MEMORY :], state)
@@ -218,12 +219,14 @@ class Stepper:
     def _watched(self, history: tuple[Any, ...], now: Converged) -> tuple[Any, ...]:
         return (*history, self._watch(now)) if self._watch else history
 
-    def _ended(self, failure: IncrementFailed, reached: float, attempted: float) -> NotConverged:
+    def _ended(self, failure: IncrementFailed, point: Point, attempted: float) -> NotConverged:
+        reached = point.now.state.time
         way = f"between {self.place(reached)} and {self.place(attempted)}"
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
         if failure.why.limit and growing:
             return LimitLoad(f"no equilibrium {way}: {failure.why}", reached, attempted)
-        return NotConverged(f"the increment {way} failed: {failure}", reached, attempted)
+        hint = spent(self.system, point.now.state.contacts)
+        return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:
         """Return the tally with the CPU time spent since the last call."""

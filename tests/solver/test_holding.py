@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from solver import (
     Traction,
     solve,
 )
+from solver.loading.slide import spent
 from solver.mesh import grid, mapped
 
 ELASTIC = Material(youngs_modulus=2e5, poisson_ratio=0.3)
@@ -97,3 +99,22 @@ def test_bodies_that_overlap_part_without_friction() -> None:
     contact = found.loaded.state.contacts[0]
     assert contact.normal.sum() > 100.0
     assert np.abs(contact.tangential).max() == 0.0
+
+
+def test_friction_that_is_almost_spent_is_told_with_its_bodies() -> None:
+    def pair(share: float) -> tuple[Any, Any]:
+        normal = np.array([1.0, 3.0, 0.0])
+        contact = SimpleNamespace(normal=normal, tangential=-0.3 * share * normal)
+        return SimpleNamespace(friction=0.3, slave=0, master=1), contact
+
+    for share, told in (
+        (0.9, ""),
+        (0.97, "; just before, friction between pad and plate bears 97%"),
+    ):
+        interface, contact = pair(share)
+        system: Any = SimpleNamespace(interfaces=[interface], all_names=["pad", "plate"])
+        assert spent(system, [contact]).startswith(told)
+        assert bool(spent(system, [contact])) is bool(told)
+    smooth = SimpleNamespace(friction=0.0, slave=0, master=1)
+    system = SimpleNamespace(interfaces=[smooth], all_names=["pad", "plate"])
+    assert spent(system, [contact]) == ""
