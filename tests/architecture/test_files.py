@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.architecture.sources import PACKAGES, ROOT, modules, tracked
-
-MAX_LINES = 300
+from tests.architecture.sources import ROOT, tracked
 
 # Brackets in a pattern keep it from matching its own text here.
 MACHINE_PATH = re.compile(r"(?<![\w.:/-])/(?:root|home|Users|work|mnt)/\w")
@@ -31,13 +29,6 @@ def matches(pattern: re.Pattern[str], paths: list[Path]) -> list[str]:
         for number, line in enumerate((ROOT / path).read_text(errors="replace").splitlines(), 1)
         if pattern.search(line)
     ]
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_a_file_holds_one_idea(package: str) -> None:
-    lengths = {m: len((ROOT / m).read_text().splitlines()) for m in modules(package)}
-    assert lengths, f"{package} has no modules"
-    assert not {str(m): n for m, n in lengths.items() if n > MAX_LINES}
 
 
 @pytest.mark.parametrize("package", ["solver", "studies"])
