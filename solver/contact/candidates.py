@@ -31,17 +31,19 @@ class Candidates:
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
-    friction : (n,) coefficient; zero at a vertex that had no contact before and whose approach
-        is not known, so that it starts without tangential force, unless all vertices grip
+    friction : (n,) coefficient
     limit : (n,) largest tangential force at any normal force [N]
-    cohesion : (n,) tangential force that needs no normal force [N], zero like ``friction``
+    cohesion : (n,) tangential force that needs no normal force [N]
     motion : (n or 2n,) gap, and slip when there is friction [mm]
     apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
     status : (n,) of the current iterate
+    untimed : (n,) whether it touched since then, at a time that is not known
     rows : one per part, None for a part without contact surface
-    covered : for each interface, the share of the hats of its candidates that faces the master
-    gaps : for each interface, the gap of all its vertices, inf where no master faces them [mm]
+    covered, area : for each interface, the share of the hats of its candidates that faces the
+        master, and its size [mm2]
+    gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
+        master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
     """
 
@@ -53,20 +55,18 @@ class Candidates:
     apart: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
+    untimed: NDArray[np.bool_]
     rows: tuple[Rows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
+    area: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
+    slips: tuple[NDArray[np.float64], ...]
     beyond: float
 
     @property
     def n(self) -> int:
         """Number of candidate vertices."""
         return len(self.friction)
-
-    @property
-    def slippery(self) -> bool:
-        """Whether a candidate has no friction where there are slips."""
-        return len(self.motion) > self.n and not (self.friction + self.cohesion).all()
 
     def smooth(self) -> Candidates:
         """Return the same candidates without friction."""
@@ -163,19 +163,13 @@ class Candidates:
 
     def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of time."""
-        out, at = [], 0
-        rate = 1 / span if span else np.nan
         after = self.states(before, self.forces, self.status)
-        for old, new, vertices, gap in zip(before, after, self.vertices, self.gaps, strict=True):
-            here = slice(at, at + len(vertices))
-            at += len(vertices)
-            approach = np.full_like(old.approach, np.nan)
-            approach[0, vertices] = self.motion[: self.n][here]
-            approach[1] = (approach[0] - old.approach[0]) * rate
-            if len(self.motion) > self.n:
-                approach[2, vertices] = (self.motion[self.n :] + self.apart)[here] * rate
-            touching = new.status != OPEN
-            out.append(replace(new, touching=touching, approach=approach, gap=gap))
+        out = []
+        for old, new, gap, slip in zip(before, after, self.gaps, self.slips, strict=True):
+            with np.errstate(invalid="ignore", divide="ignore"):
+                rates = np.stack([gap - old.gap, slip]) / span
+            rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
+            out.append(replace(new, touching=new.status != OPEN, gap=gap, rates=rates))
         return tuple(out)
 
 
@@ -186,8 +180,12 @@ def no_candidates(system: System) -> Candidates:
     rows = tuple(None for _ in system.parts)
     covered = tuple(empty for _ in system.interfaces)
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
+    slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
-    return Candidates(none, *(empty,) * 6, status, rows, covered, gaps, np.inf)
+    known = empty.astype(bool)
+    return Candidates(
+        none, *(empty,) * 6, status, known, rows, covered, covered, gaps, slips, np.inf
+    )
 
 
 def find_candidates(
@@ -196,17 +194,17 @@ def find_candidates(
     u: tuple[NDArray[np.float64], ...],
     contacts: tuple[ContactState, ...],
     span: float = 0.0,
-    *,
-    grip: bool = False,
 ) -> Candidates:
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if the rates of its approach are known from the last increment. Where they are not
-    and the vertices ``grip``, slips count from ``start``, else these have no friction yet.
+    it touched, if the rates of its approach are known from the last increment.
     """
     time = start.time + span
-    pairings = [interface.pairing(u, time) for interface in system.interfaces]
+    pairings = [
+        interface.pairing(u, time, finite=before.finite)
+        for interface, before in zip(system.interfaces, start.contacts, strict=True)
+    ]
     vertices = [
         _near(pairing, contact, interface.floating)
         for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)
@@ -216,7 +214,9 @@ def find_candidates(
     m = 2 * n if frictional else n
     motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
     limit, cohesion = np.zeros((2, n))
+    untimed = np.zeros(n, dtype=bool)
     pieces: list[list[Rows]] = [[] for _ in system.parts]
+    slips: list[NDArray[np.float64]] = []
     first = 0
     for interface, pairing, at, before in zip(
         system.interfaces, pairings, vertices, start.contacts, strict=True
@@ -226,23 +226,24 @@ def find_candidates(
         first += len(at)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        apart[normal] = np.where(before.touching[at], 0.0, _apart(before.approach[:, at], span))
-        known = ~np.isnan(apart[normal]) | grip
-        friction[normal] = np.where(known, interface.friction, 0.0)
-        cohesion[normal] = np.where(known, interface.cohesion * pairing.area[at], 0.0)
+        apart[normal] = np.where(before.touching, 0.0, _apart(before, span))[at]
+        untimed[normal] = np.isnan(apart[normal])
+        friction[normal] = interface.friction
+        cohesion[normal] = interface.cohesion * pairing.area[at]
         apart[normal] = np.nan_to_num(apart[normal])
         limit[normal] = interface.shear_strength * pairing.area[at]
+        slip = np.zeros(len(pairing.gap))
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
                 moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
-                motion[tangent] += block[tangent] @ moved.T.ravel()
+                slip += pairing.tangent[side] @ moved.T.ravel()
             pieces[number].append(Rows(*part.pull_back(surface, u[number], block, n)))
-
-    if frictional:
-        motion[n:] -= apart
+        if frictional:
+            motion[tangent] = slip[at] - apart[normal]
+        slips.append(slip)
 
     def gather(name: str) -> NDArray[np.float64]:
         values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]
@@ -258,21 +259,25 @@ def find_candidates(
         apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
+        untimed=untimed,
         rows=tuple(joined(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
+        area=tuple(p.area[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
+        slips=tuple(slips),
         beyond=float(beyond),
     )
 
 
-def _apart(approach: NDArray[np.float64], span: float) -> NDArray[np.float64]:
-    """Return the slip (n,) before contact, if gap and slip continue at their last rates.
+def _apart(before: ContactState, span: float) -> NDArray[np.float64]:
+    """Return the slip (n,) before contact, if gap and slip continue at their last rates [mm].
 
-    NaN where the gap does not close within ``span``, or its rates are not known.
+    A vertex that would not close within ``span`` touches at its end. NaN where the gap does not
+    close, or its rates are not known.
     """
-    gap, closing, sliding = approach[0], approach[1] * span, approach[2] * span
-    share = np.divide(gap, -closing, out=np.full_like(gap, np.nan), where=closing < 0)
-    return np.asarray(np.where(share < 1.0, sliding * np.maximum(share, 0.0), np.nan))
+    closing, sliding = before.rates * span
+    share = np.divide(before.gap, -closing, out=np.full_like(closing, np.nan), where=closing < 0)
+    return np.asarray(sliding * np.clip(share, 0.0, 1.0))
 
 
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:

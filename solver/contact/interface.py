@@ -64,7 +64,7 @@ class Interface:
 
     @property
     def finite(self) -> bool:
-        """Whether the surfaces are paired anew as they move: what ``auto`` has decided."""
+        """Whether the surfaces are paired anew as they move, from the beginning on."""
         return self.reference is None
 
     @property
@@ -72,14 +72,20 @@ class Interface:
         """Whether contact has to hold a rigid motion of either part."""
         return any(part.rigid.shape[1] for part in self.parts)
 
-    def pairing(self, u: tuple[NDArray[np.float64], ...], time: float = 0.0) -> Pairing:
-        """Return gap, area and derivative rows at displacements ``u`` and a time."""
-        as_meshed = self._as_meshed(u)
+    def pairing(
+        self, u: tuple[NDArray[np.float64], ...], time: float = 0.0, *, finite: bool = False
+    ) -> Pairing:
+        """Return gap, area and derivative rows at displacements ``u`` and a time.
+
+        With ``finite`` the surfaces are paired as they are, else as before loading if the pair is
+        one of small sliding.
+        """
+        as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 
-    def _as_meshed(self, u: tuple[NDArray[np.float64], ...]) -> Pairing:
+    def _as_meshed(self, u: tuple[NDArray[np.float64], ...], finite: bool) -> Pairing:
         motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
-        if self.reference is not None:
+        if self.reference is not None and not finite:
             change = sum(
                 block @ motion.T.ravel()
                 for block, motion in zip(self.reference.normal, motions, strict=True)

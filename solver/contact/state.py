@@ -21,32 +21,33 @@ class ContactState:
 
     ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
     surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` tells
-    whether the vertex had contact, so that its friction has a history. ``approach`` (3, n) is
-    the gap of candidates [mm], and the rates of gap and slip over time in the last increment, NaN
-    where not known; ``gap`` (n,) is the gap of all vertices, inf where no master faces them.
+    whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
+    master faces the vertex [mm]; ``rates`` (2, n) are those of gap and slip over time in the last
+    increment, NaN where not known. ``finite`` tells whether the surfaces are paired anew as they
+    move, or always as before loading.
     """
 
     normal: NDArray[np.float64]
     tangential: NDArray[np.float64]
     status: NDArray[np.int64]
     touching: NDArray[np.bool_]
-    approach: NDArray[np.float64]
     gap: NDArray[np.float64]
+    rates: NDArray[np.float64]
+    finite: bool
 
     @classmethod
-    def at_rest(cls, gap: NDArray[np.float64], touching: NDArray[np.bool_]) -> ContactState:
+    def at_rest(
+        cls, gap: NDArray[np.float64], touching: NDArray[np.bool_], *, finite: bool
+    ) -> ContactState:
         """Return the state of vertices without forces, those that touch sticking."""
         n = len(touching)
         status = np.where(touching, STICK, OPEN)
-        unknown = np.full(n, np.nan)
-        approach = np.stack([np.where(np.isfinite(gap), gap, np.nan), unknown, unknown])
-        return cls(np.zeros(n), np.zeros(n), status, touching, approach, gap)
+        rates = np.full((2, n), np.nan)
+        return cls(np.zeros(n), np.zeros(n), status, touching, gap, rates, finite)
 
     def halted(self) -> ContactState:
         """Return the state without its rates: another motion begins."""
-        approach = self.approach.copy()
-        approach[1:] = np.nan
-        return replace(self, approach=approach)
+        return replace(self, rates=np.full_like(self.rates, np.nan))
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +87,44 @@ class Energy:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """How well increments follow contact in time, at worst since a lap began [N].
+
+    Attributes
+    ----------
+    untimed : friction that is not known, because vertices touched at unknown times: the sum over
+        increments
+    friction : most friction that all contact could bear
+    passed : normal force times way of its contact along a surface in an increment / its width
+    normal : most normal force
+    """
+
+    untimed: float = 0.0
+    friction: float = 0.0
+    passed: float = 0.0
+    normal: float = 0.0
+
+    @property
+    def unknown(self) -> float:
+        """Friction that is not known / most friction."""
+        return self.untimed / self.friction if self.untimed else 0.0
+
+    @property
+    def passage(self) -> float:
+        """Way of a contact in an increment / its width, weighted with its force."""
+        return self.passed / self.normal if self.passed else 0.0
+
+    def then(self, now: Timing) -> Timing:
+        """Return the timing after one more increment."""
+        return Timing(
+            untimed=self.untimed + now.untimed,
+            friction=max(self.friction, now.friction),
+            passed=max(self.passed, now.passed),
+            normal=max(self.normal, now.normal),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Converged:
     """A converged increment, from ``start`` to ``state``.
 
@@ -103,6 +142,7 @@ class Converged:
         blended with the elastic stiffness
     strayed : message that contact has reached the end of a surface; empty if it has not
     energy : work since the lap began
+    timing : how well contact was followed since then
     """
 
     start: State
@@ -118,3 +158,4 @@ class Converged:
     blended: int
     strayed: str = ""
     energy: Energy = field(default_factory=Energy)
+    timing: Timing = field(default_factory=Timing)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from solver.contact.interface import interface_of, surfaces_of
+from solver.contact.slave import with_slaves
 from solver.contact.state import ContactState, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
@@ -54,18 +55,19 @@ class System:
 
     Attributes
     ----------
+    model : the model; slave and master of a pair exchanged where its slave bears no forces
     names : of the meshed bodies
     all_names : of these and of the rigid ones after them, in the order of ``parts``
     """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
-        self.model = model
         round_axis = model.bodies[0].kinematics == "axisymmetric"
         self._wholes = {body.name: Discretisation(body) for body in model.bodies}
         rigid = {body.name: RigidPart(body, round_axis) for body in model.rigid}
         wholes: dict[str, Discretisation | RigidPart] = {**self._wholes, **rigid}
         self._chains = wholes
         surfaces = surfaces_of(model, wholes)
+        self.model = model = with_slaves(model, surfaces)
         own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
         self.names = [body.name for body in model.bodies]
         self.all_names = list(wholes)
@@ -214,8 +216,11 @@ class System:
 
     def at_rest(self, state: State) -> State:
         """Return a state without contact forces; vertices that touch stick."""
-        gaps = [interface.pairing(state.u, state.time).gap for interface in self.interfaces]
-        contacts = (ContactState.at_rest(gap, gap <= self.touching) for gap in gaps)
+        contacts = []
+        for interface in self.interfaces:
+            gap = interface.pairing(state.u, state.time).gap
+            touching = gap <= self.touching
+            contacts.append(ContactState.at_rest(gap, touching, finite=interface.finite))
         return replace(state, contacts=tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:
@@ -235,5 +240,7 @@ class System:
             least = min(gap.min() for gap in gaps)
             u[number] = part.lowered(u[number], least)
             for k, gap in zip(own, gaps, strict=True):
-                contacts[k] = ContactState.at_rest(gap, gap < least + _SET_DOWN * part.radius)
+                touching = gap < least + _SET_DOWN * part.radius
+                finite = self.interfaces[k].finite
+                contacts[k] = ContactState.at_rest(gap, touching, finite=finite)
         return replace(state, time=time, u=tuple(u), contacts=tuple(contacts))

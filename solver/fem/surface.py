@@ -54,6 +54,12 @@ class Surface:
         return shortest(self.X, self.edges)
 
     @property
+    def tributary(self) -> NDArray[np.float64]:
+        """Tributary length (n_edges + 1,) of each vertex: half of the edges at it [mm]."""
+        half = np.linalg.norm(np.diff(self.X[:, self.vertices]), axis=0) / 2
+        return np.append(half, 0.0) + np.append(0.0, half)
+
+    @property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()

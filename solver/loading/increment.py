@@ -24,7 +24,7 @@ import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import strayed
-from solver.contact.state import Converged, State
+from solver.contact.state import Converged, State, Timing
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
@@ -34,6 +34,7 @@ from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.slide import slide
 from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
+from solver.loading.timing import timing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -100,8 +101,8 @@ class Increment:
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.cornered for part in system.parts)  # no tangent there
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
-        # vertices touch without friction, for their slip is not known, unless nothing else holds
-        self._grip = False
+        self._level = 0.0
+        self._first: float | None = None
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -133,16 +134,13 @@ class Increment:
             little = 0 < error < _UNBALANCED * tolerances.residual
             balanced |= little and error * scale <= rounding(self.system, u)
             if balanced and violation < tolerances.contact and candidates.beyond >= 0:
-                return self._commit(u, responses, residuals, candidates, scale, iteration)
+                return self._commit(u, responses, residuals, candidates, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             first = _STIFF if crawled > 1 else int(self._softened)
             first = len(_BLENDS) - 1 if elastic_first else first
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
-                if candidates.slippery and not self._grip:
-                    self._grip = True
-                    continue
                 if error > _UNBALANCED * tolerances.residual:
                     failure.why = softest
                 failure.why = slide(self.system, residuals, candidates) or failure.why
@@ -182,7 +180,7 @@ class Increment:
         if not self.contact:
             return no_candidates(self.system)
         span = self.time - self.start.time
-        found = find_candidates(self.system, self.start, u, contacts, span, grip=self._grip)
+        found = find_candidates(self.system, self.start, u, contacts, span)
         return found if self.friction else found.smooth()
 
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
@@ -193,12 +191,15 @@ class Increment:
         level = external + norm(inner)
         if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
-        scale = max(self.start.force_scale, level)
+        self._level = max(self.start.force_scale, level)
+        violation = candidates.violation(self._stiffness(candidates))
+        if external == 0 and self._first is None:
+            self._first = violation  # free bodies come apart without stress
+        scale = max(self._level, self._first or 0.0)
         if scale == 0:
-            overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
-            return 0.0, float(overlap < -self.system.touching), 0.0
+            return 0.0, float(candidates.beyond < -self.system.touching), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
-        return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
+        return scale, norm(out) / scale, violation / scale
 
     def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
         """Return the elastic stiffness of the contact points [N/mm]: a scale, kept once found."""
@@ -272,7 +273,6 @@ class Increment:
         responses: tuple[Response, ...],
         residuals: Vectors,
         candidates: Candidates,
-        scale: float,
         iterations: int,
     ) -> Converged:
         contacts = candidates.kept(self.start.contacts, self.time - self.start.time)
@@ -291,10 +291,16 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.time, u, tuple(r.state for r in responses), contacts, scale),
+            state=State(self.time, u, tuple(r.state for r in responses), contacts, self._level),
             responses=responses,
             iterations=iterations,
             pivoted=self._pivoted,
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),
+            timing=self._timing(candidates),
         )
+
+    def _timing(self, candidates: Candidates) -> Timing:
+        if not candidates.n:
+            return Timing()
+        return timing(self.system, self.start, candidates, self._stiffness(candidates))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.contact.drift import followed
 from solver.contact.state import Converged, Energy, State
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
@@ -23,7 +24,7 @@ from solver.loading.slide import spent
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from solver.contact.state import ContactState
+    from solver.contact.state import ContactState, Timing
     from solver.contact.system import System
     from solver.loading.control import Control
 
@@ -33,6 +34,14 @@ if TYPE_CHECKING:
 
 _TURN = 0.1
 """Largest rotation of a rigid body in an increment [rad]."""
+
+
+_UNTIMED = 0.02
+"""Friction that is not known / most friction, above which an increment is divided."""
+_PASSAGE = 0.5
+"""Way of a contact in an increment / its width, above which the increment is divided."""
+_SHORTEST = 2.0**-6
+"""Shortest part into which it is divided."""
 
 
 class Stepper:
@@ -130,12 +139,16 @@ class Stepper:
         """Return the point at time ``target`` or raise `PathEnded`.
 
         An increment in which a rigid body turns too far is divided: a friction force that turns
-        with its surface would be missed.
+        with its surface would be missed. One that does not follow contact well is divided too, if
+        its parts converge, and those after it grow again. One after which surfaces have moved too
+        far for small sliding is repeated with surfaces that are paired anew.
         """
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
         step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
-        least = abs(step) / 2**self.control.max_cuts
+        whole, least = step, abs(step) / 2**self.control.max_cuts
+        forces, divided = point.now.timing, False
+        coarse: Converged | None = None
         while point.now.state.time != target:
             state = point.now.state
             close = abs(target - state.time) <= abs(step) * (1 + ROUNDING)
@@ -154,12 +167,28 @@ class Stepper:
                     tolerances=self.control.tolerances,
                 ).solve()
             except IncrementFailed as failure:
-                tally = replace(point.tally, cuts=point.tally.cuts + 1)
-                point = replace(point, tally=self._timed(tally), past=())
-                step = (time - state.time) / 2
-                if abs(step) < least * (1 - ROUNDING):
-                    raise PathEnded(self._ended(failure, point, time), point) from failure
-                continue
+                if coarse is None:
+                    tally = replace(point.tally, cuts=point.tally.cuts + 1)
+                    point = replace(point, tally=self._timed(tally), past=())
+                    step, divided = (time - state.time) / 2, False
+                    if abs(step) < least * (1 - ROUNDING):
+                        raise PathEnded(self._ended(failure, point, time), point) from failure
+                    continue
+                converged = coarse
+                step = converged.state.time - state.time
+            else:
+                following = followed(self.system, state, converged.state)
+                if following is not None:
+                    point = replace(point, now=replace(point.now, state=following))
+                    continue
+                forces = replace(forces.then(converged.timing), untimed=0.0, passed=0.0)
+                half = (time - state.time) / 2
+                if _coarse(converged.timing.then(forces)) and abs(half) >= _SHORTEST * abs(whole):
+                    coarse, step, divided = converged, half, True
+                    continue
+            coarse = None
+            if divided:
+                step = min(2 * step, whole, key=abs)
             converged = self._worked(point.now, converged)
             past = (*point.past[1 - MEMORY :], state)
             point = self._after(point, converged, past)
@@ -187,7 +216,8 @@ class Stepper:
             ).solve()
         except (Yielded, IncrementFailed):
             return None
-        if converged.strayed:  # the walk in steps finds at which load
+        # the walk in steps finds at which load
+        if converged.strayed or followed(self.system, point.now.state, converged.state):
             return None
         converged = self._worked(point.now, converged)
         self._report()
@@ -209,7 +239,8 @@ class Stepper:
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began."""
         with one_thread():
-            return replace(now, energy=worked(self.system, before, now))
+            energy = worked(self.system, before, now)
+        return replace(now, energy=energy, timing=before.timing.then(now.timing))
 
     def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
         """Return the point after one more increment."""
@@ -233,6 +264,11 @@ class Stepper:
         now = clock.process_time()
         spent, self._clock = now - self._clock, now
         return replace(tally, seconds=tally.seconds + spent)
+
+
+def _coarse(timing: Timing) -> bool:
+    """Whether an increment follows contact too coarsely."""
+    return timing.unknown > _UNTIMED or timing.passage > _PASSAGE
 
 
 def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:

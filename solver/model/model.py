@@ -34,8 +34,8 @@ class ContactPair:
     ----------
     slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear belong to the
         vertices of the slave: around each of them the slave must not enter the master on average.
-        Choose as slave the surface that ends at a corner, else the one that is finer or yields;
-        where none of this tells, either will do
+        Choose as slave the surface that ends at a corner, else the one that is finer or yields.
+        They are exchanged where the slave cannot bear the forces (`solver.contact.slave`)
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns
     cohesion : shear that contact carries beyond friction [MPa]: the shear is at most ``friction *
@@ -46,9 +46,9 @@ class ContactPair:
     sliding : which point of the master a point of the slave meets, and along which normal.
         ``small``: always the one it faces before loading, as if nothing moved; consistent with
         small strains, and exactly linear between changes of status. ``finite``: the one it faces
-        as the bodies move and deform, found anew in every iteration; pressure is then force over
-        the deformed area. ``auto`` (default): ``finite`` where either surface is curved or bent
-        before loading, ``small`` where both are straight. Small sliding is wrong where surfaces
+        as the bodies move and deform, found anew in every iteration. ``auto`` (default): ``finite``
+        where either surface is curved or bent before loading, else ``small`` until the surfaces
+        have moved too far for it (`solver.contact.drift`). Small sliding is wrong where surfaces
         move along each other by more than an element, or curved ones by more than a hundredth of
         the contact's length; the audit warns
     gap : by how much the surfaces stand farther apart than they are meshed [mm]

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from solver.materials import Law
 
 _RIGID = Rigid()
+_TURN = 0.1
+"""Largest turn of an edge of an arc [rad]: its curvature is then right to 0.1 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,9 +80,11 @@ def arc(
 ) -> Curve:
     """Return an arc of a circle from one angle to another [rad], a part of a larger surface.
 
-    Counter-clockwise the body is inside the circle.
+    Counter-clockwise the body is inside the circle. There are more than ``edges`` where these would
+    turn so far that they are no circle.
     """
-    angle = np.linspace(*angles, 2 * edges + 1)
+    least = int(np.ceil(abs(angles[1] - angles[0]) / _TURN))
+    angle = np.linspace(*angles, 2 * max(edges, least) + 1)
     points = np.array(centre)[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
     return Curve(points=points, quadratic=True, goes_on=goes_on)
 

@@ -96,7 +96,7 @@ def _radius(system: Any, converged: Any) -> float:
     last = int(closed[-1])
     # the hat of the first open vertex reaches into the contact
     here = slice(last + 2, last + 4)
-    gap = interface.pairing(state.u, state.time).gap[order][here]
+    gap = interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap[order][here]
     if len(gap) < 2 or not (np.isfinite(gap).all() and 0 < gap[0] < gap[1]):
         return float(x[last])
     near, far = gap ** (2 / 3)

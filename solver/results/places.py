@@ -70,7 +70,12 @@ PAIR_Y = declare("pair_y", "position along y of a point of the slave", "mm", dim
 PAIR_DISTANCE = declare(
     "pair_distance", "distance along the slave from its start", "mm", dims=_PAIR
 )
-PAIR_PRESSURE = declare("pair_pressure", "contact pressure", "MPa", dims=_PAIRS)
+PAIR_PRESSURE = declare(
+    "pair_pressure", "contact pressure over the area before loading", "MPa", dims=_PAIRS
+)
+PAIR_SHARED = declare(
+    "pair_pressure_deformed", "contact pressure over the deformed area", "MPa", dims=_PAIRS
+)
 PAIR_SHEAR = declare(
     "pair_shear", "contact shear on the slave along its surface", "MPa", dims=_PAIRS
 )
@@ -210,6 +215,7 @@ def on_pairs(fields: Fields, names: Sequence[str], samples: int) -> Values:
         PAIR_Y: np.stack([y for _, y in X]),
         PAIR_DISTANCE: np.stack(at),
         PAIR_PRESSURE: spread("pressure"),
+        PAIR_SHARED: spread("pressure_deformed"),
         PAIR_SHEAR: spread("shear"),
         PAIR_GAP: spread("gap"),
         PAIR_SLIP: spread("slip"),

@@ -20,13 +20,16 @@ if TYPE_CHECKING:
 class Slave(NamedTuple):
     """What acts on the slave of a pair, at its vertices (n,): s from its start, X (2, n).
 
-    ``closed`` tells where the bodies touch.
+    ``pressure`` and ``shear`` are over the area before loading, to which the stress of the body
+    refers, ``pressure_deformed`` is over the deformed area, which both surfaces share. ``closed``
+    tells where the bodies touch.
     """
 
     s: Array
     X: Array
     pressure: Array
     shear: Array
+    pressure_deformed: Array
     gap: Array
     slip: Array
     closed: NDArray[np.bool_]
@@ -63,11 +66,12 @@ def on_slave(system: System, at: Converged, pair: int) -> Slave:
     chain = interface.slave_surface
     X = chain.X[:, chain.vertices]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X), axis=0))])
-    pressure, shear = contact_pressure(system, state, pair, deformed=True)
-    pairing = interface.pairing(state.u, state.time)
+    pressure, shear = contact_pressure(system, state, pair)
+    shared, _ = contact_pressure(system, state, pair, deformed=True)
+    pairing = interface.pairing(state.u, state.time, finite=state.contacts[pair].finite)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
     slip = np.zeros(len(s))
     for (number, part, surface), block in zip(interface.sides, pairing.tangent, strict=True):
         slip += block @ part.motion(surface, state.u[number]).T.ravel()
     slip = np.where(np.isfinite(gap), slip, np.nan)
-    return Slave(s, X, pressure, shear, gap, slip, state.contacts[pair].normal > 0)
+    return Slave(s, X, pressure, shear, shared, gap, slip, state.contacts[pair].normal > 0)

@@ -133,16 +133,17 @@ class Solution:
         return on_slave(self.system, self._at(stage), pair)
 
     def contact(
-        self, pair: int = 0, stage: str = "loaded"
+        self, pair: int = 0, stage: str = "loaded", *, deformed: bool = False
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave.
 
-        Positions are those before loading. Under finite sliding the forces are over the deformed
-        area, which both surfaces share; under small sliding over the area before loading.
+        Positions and area are those before loading, to which the stress of the body refers. With
+        ``deformed`` the force is over the deformed area, which both surfaces share; under small
+        sliding that is the same.
         """
         chain = self.system.interfaces[pair].slave_surface
         state = self._at(stage).state
-        pressure, shear = contact_pressure(self.system, state, pair, deformed=True)
+        pressure, shear = contact_pressure(self.system, state, pair, deformed=deformed)
         return chain.X[:, chain.vertices], pressure, shear
 
     def motion(self, body: str, stage: str = "loaded") -> RigidMotion:

@@ -94,7 +94,7 @@ class Contact:
         """See `Touch`."""
         state, order = converged.state, np.argsort(self._x)
         pressure, shear = contact_pressure(self._system, state, 0)
-        gap = self._interface.pairing(state.u, state.time).gap
+        gap = self._interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap
         if not state.contacts[0].normal.any():
             gap = np.full_like(gap, np.nan)
 

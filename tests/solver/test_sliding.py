@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 
 from solver import (
+    Amplitude,
     Body,
     ContactPair,
+    Displacement,
     Material,
     Model,
     ModelError,
     Moved,
+    Pressure,
     Pushed,
     RigidBody,
     Solution,
+    Stage,
     System,
     solve,
 )
@@ -87,11 +91,42 @@ def slid(way: float, sliding: str = "auto") -> Solution:
 
 def test_surfaces_that_slide_by_more_than_an_element_are_warned_of() -> None:
     """Elements of 0.5 mm."""
-    (text,) = slid(0.8).audit().warnings
+    (text,) = slid(0.8, "small").audit().warnings
     assert text.startswith("block.top moved 0.8 mm along plate.base: 1.6 sides of an element")
     assert text.endswith('give this pair sliding = "finite"')
-    assert slid(0.1).audit().warnings == ()
+    assert slid(0.1, "small").audit().warnings == ()
     assert slid(0.8, "finite").audit().warnings == ()
+
+
+@pytest.mark.parametrize("way", [0.01, 0.8, 9.0])
+def test_straight_surfaces_are_paired_anew_once_they_move_far(way: float) -> None:
+    """Half an element is far. What is pressed under the block moves with it."""
+
+    def moved(sliding: str) -> Solution:
+        x = np.linspace(-2.0, 2.0, 9)
+        loads = (
+            Pressure(boundary="top", value=100.0, amplitude=Amplitude([0, 1, 2], [0, 1, 1])),
+            Displacement(boundary="top", x=way, amplitude=Amplitude([0, 1, 2], [0, 0, 1])),
+        )
+        pad = Body(name="pad", mesh=grid(x, np.linspace(0.0, 3.0, 7)), material=STEEL, loads=loads)
+        base = Body(name="base", mesh=grid(np.linspace(-4.0, 16.0, 41), np.linspace(-5.0, 0.0, 9)),
+                    material=STEEL, supports={"bottom": "xy"})  # fmt: skip
+        pair = ContactPair(
+            slave=("pad", "bottom"), master=("base", "top"), friction=0.2, sliding=sliding
+        )
+        stages = (
+            Stage(name="pressed", target=1.0, steps=2),
+            Stage(name="loaded", target=2.0, steps=4),
+        )
+        return solve(Model(bodies=(pad, base), contacts=(pair,)), stages=stages)
+
+    found, asked = moved("auto"), moved("finite")
+    assert found.loaded.state.contacts[0].finite == (way > 0.25)
+    assert found.audit().passed
+    assert not found.audit().warnings
+    for body in ("pad", "base"):
+        stress = asked.stress(body, "loaded")
+        assert np.linalg.norm(found.stress(body, "loaded") - stress) < 0.01 * np.linalg.norm(stress)
 
 
 @pytest.mark.parametrize("slave", ["ball", "space"])

@@ -103,7 +103,10 @@ def test_a_body_on_one_point_is_held_by_its_friction(gap, sliding):
     push = 50.0 * 2 * 2.0 * math.sin(1.2)  # pressure times the width of the bore's chord
     assert solution.loaded.state.contacts[0].normal.sum() == pytest.approx(push, rel=1e-3)
     # small sliding keeps the normals the arc had afar, and contact off by 2e-4 of the way down
-    assert solution.audit().passed or (sliding, gap) == ("small", 0.5)
+    allowed = {"audit_contact_resolution"}  # a single vertex bears it
+    if (sliding, gap) == ("small", 0.5):
+        allowed |= {"audit_closed_gap", "audit_overlap"}
+    assert {text.split()[0] for text in solution.audit().violations} <= allowed
 
 
 # -- limits ------------------------------------------------------------------------------------

@@ -20,7 +20,19 @@ _DECLARED = [
         "audit_overlap", "mean overlap of the deformed bodies, or mean gap where they press", "mm"
     ),
     declare("audit_closed_gap", "mean gap or overlap where the bodies press", "mm"),
+    declare(
+        "audit_contact_resolution",
+        "longest edge in the contact of curved surfaces / width of the contact",
+    ),
     declare("audit_slip", "friction work missing in slip / friction work"),
+    declare(
+        "audit_touch_time",
+        "friction of vertices that touched at unknown times, summed / largest friction of contact",
+    ),
+    declare(
+        "audit_slip_resolution",
+        "normal force times way of its contact in an increment / width / largest normal force",
+    ),
     declare("audit_energy", "work missing in the energy balance / work"),
     declare("audit_tension", "largest tensile contact force", "N"),
     declare("audit_friction_excess", "largest tangential force above the friction bound", "N"),

@@ -30,6 +30,11 @@ _STRAY = (1.0, 0.01, 5e-3)
 """What small sliding may leave out: motion along the partner / side of an element and, where a
 surface is curved, / length of the contact; error of the gap / elastic approach. Means weighted with
 the force."""
+_COARSE = 0.36
+"""Largest edge allowed / width of the contact of curved surfaces: three vertices across it, which
+tell Hertz's pressure to 4 %."""
+_LITTLE = 0.01
+"""Force / force level, below which it does not count how well a contact is resolved."""
 _STILL = 1e-3
 """Least slip / elastic approach, in the work that wrong slip is compared with."""
 
@@ -48,8 +53,9 @@ class AuditedPair:
         self._pair: ContactPair = system.model.contacts[number]
         contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
         self.normal, self.tangential = contact.normal, contact.tangential
+        self._state = converged.state
         self._closed = self.normal > _PRESSED * converged.state.force_scale
-        self.surfaces = Surfaces(system, number)
+        self.surfaces = Surfaces(system, number, finite=contact.finite)
         self.touching: Touching = self.surfaces.touching(
             converged.state, converged.start, self.normal, self.tangential
         )
@@ -82,11 +88,15 @@ class AuditedPair:
 
     @property
     def limits(self) -> dict[str, float]:
-        """The largest gap and overlap allowed for this pair [mm]."""
+        """The largest gap and overlap allowed for this pair [mm], and its coarsest contact."""
         edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
         touching = self._system.touching
         overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
-        return {"audit_closed_gap": max(_GAP * self.approach, touching), "audit_overlap": overlap}
+        return {
+            "audit_closed_gap": max(_GAP * self.approach, touching),
+            "audit_overlap": overlap,
+            "audit_contact_resolution": _COARSE,
+        }
 
     def warnings(self) -> tuple[str, ...]:
         """Return what small sliding leaves out, where it matters."""
@@ -138,7 +148,15 @@ class AuditedPair:
                 (np.abs(self.tangential) - self._bound).max(initial=0.0)
             ),
             "audit_slip": self._wrong_slip(),
+            "audit_contact_resolution": self._coarseness(),
         }
+
+    def _coarseness(self) -> float:
+        """Return the longest edge in a contact of curved surfaces / its width; 0 where flat."""
+        little = _LITTLE * self._state.force_scale
+        if not self.surfaces.curved or self.force <= little:
+            return 0.0
+        return self.surfaces.coarseness(self._state, np.where(self._closed, self.normal, 0.0))
 
     def _wrong_slip(self) -> float:
         """Return the friction work that is missing in slip / the work it should do.

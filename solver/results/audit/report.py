@@ -32,6 +32,8 @@ _LIMITS = {
     "audit_law": 1e-6,
     "audit_yield": 1e-6,
     "audit_slip": 0.03,
+    "audit_touch_time": 0.1,
+    "audit_slip_resolution": 0.5,
     "audit_energy": 1e-5,
 }
 _TURNING = 0.02  # energy error where the directions of contact turn within an increment
@@ -70,7 +72,7 @@ def audit(
     pairs = [AuditedPair(system, k, loaded) for k in range(len(system.interfaces))]
     broken, beyond = _laws(bodies, released)
     names = ("audit_overlap", "audit_closed_gap", "audit_tension", "audit_friction_excess",
-             "audit_slip")  # fmt: skip
+             "audit_slip", "audit_contact_resolution")  # fmt: skip
     figures = {
         "audit_residual": _largest(
             imbalance(system, bodies, loaded), imbalance(system, released, states[1])
@@ -82,6 +84,8 @@ def audit(
         "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_energy": _energy_error(bodies, loaded),
+        "audit_touch_time": loaded.timing.unknown,
+        "audit_slip_resolution": loaded.timing.passage,
         "audit_dissipation": least_dissipation,
         "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
     }  # fmt: skip
@@ -156,7 +160,7 @@ def _violations(
     pairs: Sequence[AuditedPair],
 ) -> tuple[str, ...]:
     limits = limits_at(loaded.state.force_scale or 1.0)
-    if any(interface.finite for interface in system.interfaces):
+    if any(contact.finite for contact in loaded.state.contacts):
         limits["audit_energy"] = _TURNING
     if any(body.travelling for body in system.model.bodies):
         limits["audit_reactions"] = TRAVELLING

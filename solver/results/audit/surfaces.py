@@ -34,6 +34,8 @@ _BLOCK = 1000
 """Points treated at once, each with every edge."""
 _CORNER = float(np.radians(40.0))  # turn between edges that meet in a corner
 _OPPOSED = 0.25  # least cosine of the angle between surfaces that face each other
+_SHARE = 0.05
+"""Share of the force of a pair, below which a patch of its contact does not count."""
 _BESIDE = 1e-9
 """Distance / length of an edge, by which a line may miss the edge and still count as meeting it."""
 
@@ -90,10 +92,10 @@ class Touching:
 class Surfaces:
     """The two surfaces of a contact pair, on the whole bodies."""
 
-    def __init__(self, system: System, number: int) -> None:
+    def __init__(self, system: System, number: int, *, finite: bool) -> None:
         self._system = system
         self.pair: ContactPair = system.model.contacts[number]
-        self.finite = system.interfaces[number].finite
+        self.finite = finite
         pair = self.pair
         self.slave, self.master = (
             system.chain(name, boundary) for name, boundary in (pair.slave, pair.master)
@@ -109,6 +111,45 @@ class Surfaces:
         (slave, _), (master, _) = self.pair.slave, self.pair.master
         xs, xm = (deformed(self._system, name, state)[0] for name in (slave, master))
         return _on(self.slave, xs), _on(self.master, xm)
+
+    def coarseness(self, state: State, normal: Array) -> float:
+        """Return the longest edge that contact forces (n,) act on / the width of their contact.
+
+        The worst of all patches of vertices in contact that bear more than a share of the force. At
+        the axis, or a support, the other half of a patch counts.
+        """
+        xs, xm = self._at(state)
+        mirrored = self._mirrored()
+        closed = normal > 0
+        closed[[0, -1]] |= closed[[1, -2]] & mirrored  # next to the axis hats are small
+        ends = np.flatnonzero(np.diff(np.pad(closed.astype(int), 1)))
+        worst = 0.0
+        for first, last in zip(ends[::2], ends[1::2] - 1, strict=True):
+            patch = slice(first, last + 1)
+            if normal[patch].sum() < _SHARE * normal.sum():
+                continue
+            edges = [0.0]
+            sides = ((self.pair.slave, self.slave, xs), (self.pair.master, self.master, xm))
+            for (name, _), chain, x in sides:
+                if name in self._system.names:  # rigid surfaces are what they are
+                    own, at = x[:, chain.vertices], xs[:, self.slave.vertices[patch]]
+                    near = np.linalg.norm(own[:, :, None] - at[:, None], axis=0).argmin(axis=0)
+                    edges.append(float(_edge_lengths(chain)[near].max()))
+            halved = (mirrored & [first == 0, last == len(closed) - 1]).any()
+            width = float(self.slave.tributary[patch].sum()) * (2 if halved else 1)
+            worst = max(worst, max(edges) / width)
+        return worst
+
+    def _mirrored(self) -> NDArray[np.bool_]:
+        """Return whether the axis or a support stands for another half beyond either end (2,)."""
+        name, _ = self.pair.slave
+        if name not in self._system.names:
+            return np.zeros(2, dtype=bool)
+        whole = self._system.full(name)
+        held = np.ones(whole.n, dtype=bool)
+        held[whole.free] = False
+        ends = self.slave.nodes[self.slave.vertices[[0, -1]]]
+        return np.asarray(held.reshape(-1, 2)[ends].any(axis=1))
 
     def touching(self, state: State, start: State, normal: Array, tangential: Array) -> Touching:
         """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""

@@ -1,0 +1,58 @@
+"""What small sliding leaves out as bodies move: when ``auto`` pairs straight surfaces anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from solver.contact.interface import Interface
+    from solver.contact.state import ContactState, State
+    from solver.contact.system import System
+
+_WAY = 0.5
+"""Motion along the partner / side of an element, above which surfaces are paired anew."""
+_GAP = 2.5e-3
+"""Error of the gap / elastic approach, above which they are."""
+
+
+def followed(system: System, before: State, after: State) -> State | None:
+    """Return the state before an increment with those pairs finite that drift in it.
+
+    None where small sliding does for all pairs.
+    """
+    each = zip(system.interfaces, after.contacts, strict=True)
+    drifting = [_drifts(interface, after, contact) for interface, contact in each]
+    if not any(drifting):
+        return None
+    pairs = zip(before.contacts, drifting, strict=True)
+    return replace(
+        before, contacts=tuple(replace(c, finite=c.finite or drifts) for c, drifts in pairs)
+    )
+
+
+def _drifts(interface: Interface, state: State, contact: ContactState) -> bool:
+    """Whether a pair that may choose leaves out too much; means weighted with the force."""
+    pressed = contact.normal > 0
+    small = interface.reference
+    if small is None or contact.finite or interface.declared.sliding != "auto":
+        return False
+    if not pressed.any():
+        return False
+    share = contact.normal[pressed] / contact.normal[pressed].sum()
+    way = np.zeros(len(contact.normal))
+    for (number, part, chain), block in zip(interface.sides, small.tangent, strict=True):
+        way += block @ part.motion(chain, state.u[number]).T.ravel()
+    if np.abs(way[pressed]) @ share > _WAY * (small.length[pressed] @ share):
+        return True
+    now, then = (
+        interface.pairing(state.u, state.time, finite=f).gap[pressed] for f in (True, False)
+    )
+    compliance = sum(
+        1 / part.body.material.elasticity.plane_strain_modulus for part in interface.parts
+    )
+    pressure = float((contact.normal[pressed] / small.area[pressed]).max())
+    approach = pressure * compliance * float(small.length[pressed].sum())
+    return bool(np.abs(now - then) @ share > _GAP * approach)

@@ -1,0 +1,70 @@
+"""How well one increment follows contact in time.
+
+Friction counts the slip since a vertex touched. Where the rates of its approach are known, the time
+of touch is that at which the gap closes; in the first increment of a contact it is not known, and
+slip counts from the beginning of the increment. And a contact that moves farther along a surface
+than it is wide has passed vertices that never felt it. Smaller increments mend both.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.state import Timing
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.candidates import Candidates
+    from solver.contact.interface import Interface
+    from solver.contact.state import ContactState, State
+    from solver.contact.system import System
+
+    Array = NDArray[np.float64]
+
+
+def timing(system: System, start: State, candidates: Candidates, stiffness: Array) -> Timing:
+    """Return the timing of an increment from ``start``.
+
+    ``stiffness`` is that of the contact points, elastic [N/mm]: no vertex has more friction than
+    its slip strains out of the bodies around it.
+    """
+    found, first, n = Timing(), 0, candidates.n
+    for k, (interface, at) in enumerate(zip(system.interfaces, candidates.vertices, strict=True)):
+        here = slice(first, first + len(at))
+        first += len(at)
+        normal, slip = np.maximum(candidates.forces[:n][here], 0.0), candidates.slips[k]
+        untimed, friction = 0.0, 0.0
+        if interface.rough:
+            bound = interface.friction * normal + interface.cohesion * candidates.area[k] * (
+                normal > 0
+            )
+            strained = stiffness[n:][here] * np.abs(slip[at])
+            friction = float(bound.sum())
+            untimed = float(np.minimum(bound, strained) @ candidates.untimed[here])
+        found = Timing(
+            untimed=found.untimed + untimed,
+            friction=found.friction + friction,
+            passed=max(found.passed, _passed(interface, start.contacts[k], at, normal, slip)),
+            normal=found.normal + float(normal.sum()),
+        )
+    return found
+
+
+def _passed(
+    interface: Interface, before: ContactState, at: NDArray[np.int64], normal: Array, slip: Array
+) -> float:
+    """Return the force of a contact times its way along a surface / its width [N].
+
+    Along the slave that is the force that has gone from some vertices to others, which is none
+    where contact grows or shrinks; along the master it is the slip.
+    """
+    after = np.zeros_like(before.normal)
+    after[at] = normal
+    if not (after.any() and before.normal.any()):
+        return 0.0
+    new, lost = after @ (before.normal == 0), before.normal @ (after == 0)
+    width = interface.slave_surface.tributary @ (after > 0)
+    return max(float(min(new, lost)), float(np.abs(slip) @ after / width))

@@ -1,0 +1,148 @@
+"""Contact that begins or moves within an increment: friction since touch, divided increments."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from solver import (
+    Amplitude,
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    Moved,
+    Pushed,
+    RigidBody,
+    Solution,
+    Stage,
+    Traction,
+    solve,
+)
+from solver.loading import stepper
+from solver.mesh import graded, grid, mapped
+from solver.model.rigid import arc
+
+STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
+RADIUS, FRICTION = 20.0, 0.3
+
+
+def pressed(
+    fine: np.ndarray, slave: str, stages: tuple[Stage, ...], **motions: Moved | Pushed
+) -> Solution:
+    """Press a rigid cylinder on a plane whose elements are fine along a part of its top."""
+    size = float(fine[1] - fine[0])
+    far = graded(20.0, size, 1.3, 4.0)[1:]
+    x = np.concatenate([fine[0] - far[::-1], fine, fine[-1] + far])
+    plane = Body(name="plane", mesh=grid(x, -graded(20.0, size, 1.3, 4.0)[::-1]), material=STEEL,
+                 supports={"bottom": "xy"})  # fmt: skip
+    span = (-np.pi / 2 - 0.15, -np.pi / 2 + 0.15)
+    cylinder = RigidBody(name="cylinder", surfaces={"rim": arc((0.0, RADIUS), RADIUS, span, 60)},
+                         centre=(0.0, RADIUS), **motions)  # fmt: skip
+    sides = {"plane": ("plane", "top"), "cylinder": ("cylinder", "rim")}
+    master = sides["cylinder" if slave == "plane" else "plane"]
+    pair = ContactPair(slave=sides[slave], master=master, friction=FRICTION)
+    return solve(Model(bodies=(plane,), rigid=(cylinder,), contacts=(pair,)), stages=stages)
+
+
+def ratio(solution: Solution) -> float:
+    """Return the tangential force of contact over the normal one."""
+    contact = solution.stages["loaded"].state.contacts[0]
+    return abs(float(contact.tangential.sum() / contact.normal.sum()))
+
+
+@cache
+def oblique(increments: int) -> Solution:
+    """Press the cylinder down by a force while it moves aside in proportion."""
+    fine = np.arange(-1.5, 1.51, 0.1)
+    return pressed(fine, "plane", (Stage(name="loaded", target=1.0, steps=increments),),
+                   x=Moved(value=0.006), y=Pushed(value=-2000.0))  # fmt: skip
+
+
+def test_friction_of_an_oblique_press_hardly_depends_on_increments() -> None:
+    """It was nothing in one increment, and a fifth too little in four.
+
+    The increment in which the first vertices touch is divided, the slip of those that touch later
+    counts from then on: the error falls faster than the increments.
+    """
+    exact = ratio(oblique(128))
+    error = {n: abs(ratio(oblique(n)) / exact - 1) for n in (1, 4, 16)}
+    assert 0.4 * FRICTION < exact < FRICTION
+    assert error[1] < 0.02
+    assert error[4] < 0.008
+    assert error[16] < 0.001
+    for n in error:
+        audit = oblique(n).audit("loaded")
+        assert audit.passed
+        assert audit.figures["audit_touch_time"] < 0.05
+
+
+def dragged(slave: str, increments: int) -> Solution:
+    """Press the cylinder on the plane, then drag it by 6 mm, six times the width of its contact."""
+    stages = (
+        Stage(name="pressed", target=1.0, steps=4),
+        Stage(name="loaded", target=2.0, steps=increments),
+    )
+    return pressed(
+        np.arange(-1.5, 8.05, 0.15), slave, stages,
+        x=Moved(value=6.0, amplitude=Amplitude([0, 1, 2], [0, 0, 1])),
+        y=Pushed(value=-2000.0, amplitude=Amplitude([0, 1, 2], [0, 1, 1])),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("slave", ["plane", "cylinder"])
+def test_what_is_dragged_slides_by_coulomb_however_far_in_an_increment(slave: str) -> None:
+    for increments in (1, 8):
+        found = dragged(slave, increments)
+        assert ratio(found) == pytest.approx(FRICTION, rel=1e-6)
+        audit = found.audit("loaded")
+        assert audit.passed, audit.violations
+        assert audit.figures["audit_slip_resolution"] <= 0.5
+
+
+def test_a_drag_that_is_not_divided_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stepper, "_SHORTEST", 1.0)
+    audit = dragged("plane", 2).audit("loaded")
+    assert any(text.startswith("audit_slip_resolution") for text in audit.violations)
+
+
+def test_an_unknown_time_of_touch_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of the force of a single increment is on vertices that touched within it."""
+    monkeypatch.setattr(stepper, "_SHORTEST", 1.0)
+    oblique.cache_clear()
+    audit = oblique(1).audit("loaded")
+    oblique.cache_clear()
+    assert [text.split()[0] for text in audit.violations] == ["audit_touch_time"]
+
+
+@pytest.mark.parametrize("sliding", ["auto", "small"])
+@pytest.mark.parametrize("slave", ["wheel", "block"])
+@pytest.mark.parametrize("gap", [0.0, 0.01, -0.003])
+def test_a_free_curved_body_is_held_by_its_first_contact(
+    slave: str, sliding: str, gap: float
+) -> None:
+    """It stands on a single vertex, or not yet; friction has to hold it as soon as it touches."""
+    for aside, turn in ((0.0, 0.0), (2.0, 0.017)):
+        angles = np.linspace(-np.pi / 2 - 0.9, -np.pi / 2 + 0.9, 81) + turn
+
+        def ring(p: np.ndarray) -> np.ndarray:
+            return np.stack([p[0] * np.cos(p[1]), 10 + gap + p[0] * np.sin(p[1])])
+
+        wheel = Body(
+            name="wheel",
+            mesh=mapped(grid(np.linspace(4.0, 10.0, 13), angles), ring),
+            material=STEEL,
+            loads=(Traction(boundary="left", x=aside, y=-20.0),),
+        )
+        x, y = np.linspace(-5.0, 5.0, 61), -graded(6.0, 0.17, 1.2, 1.0)[::-1]
+        block = Body(name="block", mesh=grid(x, y), material=STEEL, supports={"bottom": "xy"})
+        sides = {"wheel": ("wheel", "right"), "block": ("block", "top")}
+        master = sides["block" if slave == "wheel" else "wheel"]
+        pair = ContactPair(slave=sides[slave], master=master, friction=FRICTION, sliding=sliding)
+        found = solve(Model(bodies=(wheel, block), contacts=(pair,)),
+                      stages=(Stage(name="loaded", target=1.0, steps=5),))  # fmt: skip
+        across, up, _ = found.history[-1].reactions["block"]
+        assert up == pytest.approx(20.0 * 1.8 * 4.0, rel=1e-3)  # chords of the inner circle
+        assert across == pytest.approx(-aside / 20.0 * up, abs=1e-6 * up)
