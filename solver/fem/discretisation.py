@@ -77,16 +77,12 @@ class Discretisation(Nodes, Part):
         self.moves = body.travelling is not None
         self.loads = nodal_forces(self)
         self._eigenstrains, self.heat = eigenstrains(self), Heat.of(self)
-        self.driven, self._prescribed = prescribed(self)
+        self.driven, self._held = prescribed(self)
         self._hold()
 
     def _hold(self) -> None:
-        """Find the supported unknowns, the rigid motions left, and one pin for each of these."""
-        fixed = self._prescribed.copy()
-        for boundary, axes in self.body.supports.items():
-            nodes = self.boundary_nodes(boundary)
-            for axis in axes:
-                fixed[2 * nodes + "xy".index(axis)] = True
+        """Find the free unknowns, the rigid motions left, and one pin for each of these."""
+        fixed = self._held.copy()
         fixed[self.copied[fixed]] = True
         motions = kinematics.rigid_motions(self.X, self.body.kinematics)
         copies = self.copied != np.arange(self.n)
@@ -197,7 +193,7 @@ class Discretisation(Nodes, Part):
         """
         if not self.driven.cases:
             return u
-        change = np.where(self._prescribed, self.driven.at(time) - u, 0.0)
+        change = np.where(self._held, self.driven.at(time) - u, 0.0)
         if not change.any():
             return u
         force = self.elastic_matrix() @ change
