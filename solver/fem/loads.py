@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Push = Callable[[Array, Array], Array]
 
 _SAME = 1e-9
-"""Difference / size of two prescribed displacements, below which they are the same."""
+"""Difference / size of what is given, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -177,8 +177,19 @@ def eigenstrains(part: Nodes) -> Superposed:
             each.append((load, strain))
         elif isinstance(load, InitialStress):
             compliance = np.linalg.inv(part.body.material.stiffness(4))
-            each.append((load, -compliance @ to_mandel(load.at(x))))
+            stress = load.at(x)
+            if part.body.kinematics == "plane_stress":
+                _check_plane(stress)
+            each.append((load, -compliance @ to_mandel(stress)))
     return Superposed.of(4 * x.shape[1], each)
+
+
+def _check_plane(stress: Array) -> None:
+    """Raise `ModelError` where an initial stress (4, n_points) acts across plane stress [MPa]."""
+    across = np.abs(stress[2])
+    if across.max(initial=0.0) > _SAME * np.abs(stress).max(initial=0.0):
+        worst = float(stress[2, across.argmax()])
+        raise ModelError("initial_stress.zz", worst, "must be zero in plane stress [MPa]")
 
 
 def travelling_forces(

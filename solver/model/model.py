@@ -94,7 +94,7 @@ class Model:
     ----------
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
-    contacts : pairs of boundaries that may touch
+    contacts : pairs of boundaries that may touch, of bodies of one thickness
     """
 
     bodies: tuple[Body, ...]
@@ -128,9 +128,14 @@ class Model:
         self._check_pairs()
 
     def _check_pairs(self) -> None:
-        """Refuse a surface paired with itself, and two surfaces paired twice."""
+        """Refuse two thicknesses, a surface paired with itself, and two surfaces paired twice."""
         pairs = [(contact.slave, contact.master) for contact in self.contacts]
+        plane = self.bodies[0].kinematics != "axisymmetric"
         for i, (slave, master) in enumerate(pairs):
+            thickness = {name: self.body(name).thickness for name, _ in (slave, master)}
+            if plane and len(set(thickness.values())) > 1:
+                allowed = "must join bodies of one thickness [mm]: both feel the same pressure"
+                raise ModelError(f"contacts[{i}]", thickness, allowed)
             if self._overlap(slave, master):
                 allowed = f"shares facets with slave {slave}: must be another surface"
                 raise ModelError(f"contacts[{i}].master", master, allowed)

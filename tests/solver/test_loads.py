@@ -264,6 +264,18 @@ def test_what_equilibrium_makes_of_an_initial_stress_is_told() -> None:
             InitialStress.on_grid(np.array(x_), y_, stress)
 
 
+@pytest.mark.parametrize("condense", [True, False])
+def test_initial_stress_across_plane_stress_is_refused(condense: bool) -> None:
+    """It would be lost: no equilibrium in the plane holds it."""
+    across = InitialStress(stress=lambda x: np.array([[0.0], [0.0], [50.0], [0.0]]))
+    with pytest.raises(
+        ModelError, match=r"initial_stress\.zz = 50.0: must be zero in plane stress"
+    ):
+        System(Model(bodies=(bar(loads=(across,), condense=condense),)))
+    rounded = InitialStress(stress=lambda x: np.array([[50.0], [0.0], [1e-12], [0.0]]))
+    System(Model(bodies=(bar(loads=(rounded,), condense=condense),)))
+
+
 def test_initial_stress_above_the_strength_yields_before_any_load() -> None:
     soft = replace(STEEL, hardening="none", hardening_ratio=0.0)
     held = {"left": "x", "right": "x", "bottom": "y"}
