@@ -134,6 +134,11 @@ class Discretisation(Nodes, Part):
             places[0] = start + (places[0] - start) % self.period
         return same_unknowns(self.nodes, places)[self.copied]
 
+    @property
+    def travels(self) -> bool:
+        """Whether it may move as a whole: only contact holds it, or a side of it is moved."""
+        return super().travels or bool(self.driven.fields.any())
+
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
         travelling = self.body.travelling

@@ -140,6 +140,11 @@ class Part(ABC):
         del time
         return np.zeros((4, len(self.volumes)))
 
+    @property
+    def travels(self) -> bool:
+        """Whether it may move as a whole: only contact holds it, or its motion is prescribed."""
+        return self.rigid.shape[1] > 0
+
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
         return self.loads.grows(before, after)

@@ -69,7 +69,7 @@ class Stepper:
         each = zip(self.system.parts, state.u, at_rest.responses, strict=True)
         stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
         now = replace(at_rest, state=state, energy=Energy(stored=stored))
-        return Point(now, (), tally or Tally(), self._watched((), now))
+        return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
@@ -123,7 +123,8 @@ class Stepper:
         state = point.now.state
         if self.system.moves:
             begun = self.begin(state, time, point.tally)
-            return replace(begun, history=(*point.history, *begun.history))
+            history, met = (*point.history, *begun.history), point.met | begun.met
+            return replace(begun, history=history, met=met)
         return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
@@ -214,7 +215,8 @@ class Stepper:
     def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
         """Return the point after one more increment."""
         history = self._watched(point.history, converged)
-        return Point(converged, past, self._timed(point.tally.plus(converged)), history)
+        met = point.met | _facing(converged.state)
+        return Point(converged, past, self._timed(point.tally.plus(converged)), history, met)
 
     def _watched(self, history: tuple[Any, ...], now: Converged) -> tuple[Any, ...]:
         return (*history, self._watch(now)) if self._watch else history
@@ -233,6 +235,12 @@ class Stepper:
         now = clock.process_time()
         spent, self._clock = now - self._clock, now
         return replace(tally, seconds=tally.seconds + spent)
+
+
+def _facing(state: State) -> frozenset[int]:
+    """Return the numbers of the contact pairs whose surfaces face each other."""
+    each = enumerate(state.contacts)
+    return frozenset(k for k, contact in each if np.isfinite(contact.gap).any())
 
 
 def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:
