@@ -77,11 +77,11 @@ class Discretisation(Nodes, Part):
         self.moves = body.travelling is not None
         self.loads = nodal_forces(self)
         self._eigenstrains, self.heat = eigenstrains(self), Heat.of(self)
-        self.driven, self._held = prescribed(self)
         self._hold()
 
     def _hold(self) -> None:
-        """Find the free unknowns, the rigid motions left, and one pin for each of these."""
+        """Find the held unknowns, the rigid motions left, and one pin for each of these."""
+        self.driven, self._held = prescribed(self)
         fixed = self._held.copy()
         fixed[self.copied[fixed]] = True
         motions = kinematics.rigid_motions(self.X, self.body.kinematics)
@@ -190,6 +190,26 @@ class Discretisation(Nodes, Part):
         if not self._eigenstrains.cases:
             return super().force_level(time)
         return float(np.linalg.norm(self.condensable.at(time)))
+
+    def resisted(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] if each element by itself resisted what is given.
+
+        That is heat, initial stress and prescribed displacements. Forces of elements that cancel
+        at a node are added up here: a body that gives way bears none of them.
+        """
+        nodal, energy = np.zeros(self.n), 0.0
+        if self._eigenstrains.cases:
+            strain = self.eigenstrain(time)
+            stress = self.body.law.stiffness(len(strain)) @ strain
+            energy += float((stress * strain).sum(axis=0) @ self.volumes) / 2
+            size = np.linalg.norm(stress, axis=0) * self.volumes
+            each = np.linalg.norm(self.B, axis=2) * size.reshape(self.weights.shape)[..., None]
+            nodal += np.bincount(self.dofs.ravel(), each.sum(axis=1).ravel(), self.n)
+        if self.driven.cases:
+            moved = self.driven.at(time)
+            nodal += np.abs(self._diagonal * moved)
+            energy += float(moved @ (self._diagonal * moved)) / 2
+        return float(np.linalg.norm(nodal)), energy
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return ``u`` with prescribed displacements at their values for a time.

@@ -130,6 +130,14 @@ class Part(ABC):
         """Return the size of the forces that load the part at a time [N]."""
         return float(np.linalg.norm(self.external(time)))
 
+    def resisted(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] if each element by itself resisted what is given.
+
+        Loads are not part of it.
+        """
+        del time
+        return 0.0, 0.0
+
     def law(self, time: float) -> Law:
         """Return the law of its points at a time: heat may change it."""
         del time

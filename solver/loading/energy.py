@@ -30,13 +30,22 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
     work -= _heat(parts, before, now)
     work -= _spread(system, before, now)
     so_far = before.energy
-    return Energy(
-        stored=so_far.stored,
-        external=so_far.external + work,
-        plastic=so_far.plastic + _plastic_work(parts, before, now),
-        friction=so_far.friction + now.contact_work[0],
-        contact=so_far.contact + now.contact_work[1],
-    )
+    terms = {
+        "external": so_far.external + work,
+        "plastic": so_far.plastic + _plastic_work(parts, before, now),
+        "friction": so_far.friction + now.contact_work[0],
+        "contact": so_far.contact + now.contact_work[1] + _released(before, now),
+    }
+    scale = max(so_far.scale, system.least(now.state.time)[1], *map(abs, terms.values()))
+    return Energy(stored=so_far.stored, scale=scale, **terms)
+
+
+def _released(before: Converged, now: Converged) -> float:
+    """Return the work of bodies on contact forces that vanish as they are taken apart [N mm]."""
+    if not now.apart:
+        return 0.0
+    moves = zip(before.state.u, now.state.u, before.contact_forces, strict=True)
+    return -sum(float(force @ (u1 - u0)) / 2 for u0, u1, force in moves)
 
 
 def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:

@@ -97,6 +97,7 @@ class Increment:
         materials = [part.body.material for part in system.parts]
         self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
+        self._least, _ = system.least(time)
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.cornered for part in system.parts)  # no tangent there
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
@@ -193,7 +194,7 @@ class Increment:
         level = external + norm(inner)
         if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
-        scale = max(self.start.force_scale, level)
+        scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             return 0.0, float(overlap < -self.system.touching), 0.0
@@ -297,4 +298,5 @@ class Increment:
             pivoted=self._pivoted,
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),
+            apart=not self.contact,
         )

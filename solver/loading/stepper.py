@@ -68,7 +68,8 @@ class Stepper:
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         each = zip(self.system.parts, state.u, at_rest.responses, strict=True)
         stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
-        now = replace(at_rest, state=state, energy=Energy(stored=stored))
+        scale = max(stored, self.system.least(state.time)[1])
+        now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale))
         return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:

@@ -264,6 +264,36 @@ def test_what_equilibrium_makes_of_an_initial_stress_is_told() -> None:
             InitialStress.on_grid(np.array(x_), y_, stress)
 
 
+@pytest.mark.parametrize("material", [ELASTIC, STEEL])
+@pytest.mark.parametrize("slope", [0.0, 1.0])
+def test_initial_stress_across_plane_strain_is_in_equilibrium(
+    material: Material, slope: float
+) -> None:
+    """No force in the plane belongs to it: what is out of balance is rounding."""
+    across = InitialStress(
+        stress=lambda x: 80.0 * np.stack([0 * x[0], 0 * x[0], 1 + slope * x[1], 0 * x[0]])
+    )
+    body = bar(material, kinematics="plane_strain", loads=(across,))
+    for loads in ((), (Pressure(boundary="right", value=10.0),)):
+        found = loaded(replace(body, loads=(across, *loads)))
+        _, given, left = found.initial_stress("bar")
+        assert left == pytest.approx(given, abs=1e-9)
+        assert found.audit().passed, found.audit().violations
+
+
+@pytest.mark.parametrize("side", [{"left": "x"}, {}])
+@pytest.mark.parametrize("material", [ELASTIC, STEEL])
+def test_a_body_that_is_moved_as_a_whole_bears_nothing(
+    material: Material, side: dict[str, str]
+) -> None:
+    """Forces are rounding of the stiffness times the motion: of 2e5 MPa for 1 mm."""
+    loads = (Displacement(boundary="right", y=1.0, x=None if side else 0.3),)
+    found = loaded(bar(material, supports=side, loads=loads))
+    assert np.abs(found.stress("bar", "loaded")).max() < 2e5 * 1e-11
+    assert found.displacement("bar", "loaded")[1] == pytest.approx(1.0)
+    assert found.audit().passed, found.audit().violations
+
+
 @pytest.mark.parametrize("condense", [True, False])
 def test_initial_stress_across_plane_stress_is_refused(condense: bool) -> None:
     """It would be lost: no equilibrium in the plane holds it."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.system import LEAST
 from solver.model.model import effective_friction
 from solver.results.audit.surfaces import Surfaces
 
@@ -48,7 +49,8 @@ class AuditedPair:
         self._pair: ContactPair = system.model.contacts[number]
         contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
         self.normal, self.tangential = contact.normal, contact.tangential
-        self._closed = self.normal > _PRESSED * converged.state.force_scale
+        self._force_level = converged.state.force_scale
+        self._closed = self.normal > _PRESSED * self._force_level
         self.surfaces = Surfaces(system, number)
         self.touching: Touching = self.surfaces.touching(
             converged.state, converged.start, self.normal, self.tangential
@@ -68,12 +70,21 @@ class AuditedPair:
         closed, area = self._closed & (self.touching.area > 0), self.touching.area
         if not closed.any():
             return 0.0
-        compliance = sum(
-            1 / self._system.model.body(name).material.elasticity.plane_strain_modulus
-            for name in self.bodies
-        )
         pressure = float((self.normal[closed] / area[closed]).max())
-        return pressure * compliance * float(self.touching.edge[closed].sum())
+        return pressure * self._compliance * float(self.touching.edge[closed].sum())
+
+    @property
+    def _compliance(self) -> float:
+        """One over the contact modulus E* [1/MPa]."""
+        moduli = (self._system.model.body(name).material.elasticity for name in self.bodies)
+        return sum(1 / elasticity.plane_strain_modulus for elasticity in moduli)
+
+    @property
+    def rounding(self) -> float:
+        """Gap or slip that is nothing to speak of for the forces that act in the model [mm]."""
+        depth = self.touching.area.sum() / self.touching.edge.sum()
+        closer = self._force_level * self._compliance / depth if depth else 0.0
+        return max(LEAST * closer, self._system.touching)
 
     @property
     def force(self) -> float:
@@ -84,9 +95,11 @@ class AuditedPair:
     def limits(self) -> dict[str, float]:
         """The largest gap and overlap allowed for this pair [mm]."""
         edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
-        touching = self._system.touching
-        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
-        return {"audit_closed_gap": max(_GAP * self.approach, touching), "audit_overlap": overlap}
+        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()))
+        return {
+            "audit_closed_gap": max(_GAP * self.approach, self.rounding),
+            "audit_overlap": max(overlap, self.rounding),
+        }
 
     def warnings(self) -> tuple[str, ...]:
         """Return what small sliding leaves out, where it matters."""
@@ -149,7 +162,7 @@ class AuditedPair:
         """
         judged = self._closed & self._start.touching & (self.touching.area > 0)
         bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
-        least = _STILL * self.approach
+        least = max(_STILL * self.approach, self.rounding)
         should = float(bound @ np.maximum(np.abs(slip), least))
         if should == 0.0:
             return 0.0
