@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from solver.model.model import Model
 
 
-LEAST = 1e-6
+LEAST = 1e-7
 """Force, or energy / that of elements that resist what is given, from which on ratios are told."""
 _TOUCHING = 1e-9
 """Gap / length of the longest contact surface, below which vertices touch."""
