@@ -32,7 +32,7 @@ from solver.loading.control import Tolerances
 from solver.loading.flow import Flow, adrift, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
-from solver.loading.slide import slide
+from solver.loading.slide import Slide, slide
 from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
 
 if TYPE_CHECKING:
@@ -119,6 +119,8 @@ class Increment:
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
+            if iteration == 0:
+                begin = residuals, candidates
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
             # bodies that overlap or are moved can begin in balance: later residuals are not
@@ -146,7 +148,7 @@ class Increment:
                     continue
                 if error > _UNBALANCED * tolerances.residual:
                     failure.why = softest
-                failure.why = slide(self.system, residuals, candidates) or failure.why
+                failure.why = self._slide((residuals, candidates), begin) or failure.why
                 raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
@@ -161,12 +163,18 @@ class Increment:
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
+        # to stop at rounding is no flow; what flows without resistance is in balance, but moves
+        flows = moving or best > _UNBALANCED * tolerances.residual
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            # to stop at rounding is no flow; what flows without resistance is in balance, but moves
-            softest if moving or best > _UNBALANCED * tolerances.residual else None,
+            self._slide(begin) or (softest if flows else None),
         )
+
+    def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
+        """Return how a body slides at one of the places: a step may take it off its contacts."""
+        found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
+        return next((each for each in found if each is not None), None)
 
     # -- 1, 2: where we are ------------------------------------------------------------------
 
