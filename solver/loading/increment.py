@@ -18,6 +18,7 @@ plastic tangent of the step before would diverge.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +30,7 @@ from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
-from solver.loading.flow import Flow, adrift, softer
+from solver.loading.flow import Flow, adrift, collapses, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.slide import Slide, slide
@@ -98,6 +99,7 @@ class Increment:
         self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
         self._least, _ = system.least(time)
+        self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.cornered for part in system.parts)  # no tangent there
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
@@ -119,8 +121,7 @@ class Increment:
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
-            if iteration == 0:
-                begin = residuals, candidates
+            self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
             # bodies that overlap or are moved can begin in balance: later residuals are not
@@ -148,7 +149,7 @@ class Increment:
                     continue
                 if error > _UNBALANCED * tolerances.residual:
                     failure.why = softest
-                failure.why = self._slide((residuals, candidates), begin) or failure.why
+                failure.why = self._slide((residuals, candidates)) or failure.why
                 raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
@@ -168,13 +169,38 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._slide(begin) or (softest if flows else None),
+            self._slide() or (self._judged(softest, u, responses, contacts) if flows else None),
         )
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
-        """Return how a body slides at one of the places: a step may take it off its contacts."""
+        """Return how a body slides at one of the places, or where the increment began.
+
+        A step may have taken the body off its contacts.
+        """
+        places = (*places, self._began) if self._began else places
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
         return next((each for each in found if each is not None), None)
+
+    def _judged(
+        self,
+        flow: Flow,
+        u: Vectors,
+        responses: Sequence[Response],
+        contacts: tuple[ContactState, ...],
+    ) -> Flow:
+        """Return a flow with what the motion since the start of the increment proves of it.
+
+        Nothing where a motion is prescribed: the work of what prescribes it is not known.
+        """
+        parts = self.system.parts
+        moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
+        if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
+            return flow
+        candidates = self._candidates(u, contacts)
+        inner = on_parts(self.system, candidates, candidates.forces)
+        forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
+        proven = collapses(parts, self.time, moved, forces, responses)
+        return replace(flow, proves=flow.proves or proven)
 
     # -- 1, 2: where we are ------------------------------------------------------------------
 
