@@ -228,6 +228,8 @@ class Increment:
         level = external + norm(inner)
         if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
+        if external == 0 and self.start.force_scale == 0:  # bodies may have been set apart
+            level += rounding(self.system, self.start.u) / self.tolerances.residual
         scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.contact.parting import parted
 from solver.contact.state import Converged, Energy, State
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
@@ -80,7 +81,10 @@ class Stepper:
         load. Raises `PathEnded` where overlapping bodies find no equilibrium, and `ModelError`
         where an initial stress finds none.
         """
-        point = self.rest(self.system.set_down(self.balanced(state), time), tally)
+        state = self.system.set_down(self.balanced(state), time)
+        if self.system.overlaps(state):
+            state = parted(self.system, state)
+        point = self.rest(state, tally)
         if not self.system.overlaps(point.now.state):
             return point
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -154,3 +155,22 @@ def test_friction_that_is_almost_spent_is_told_with_its_bodies() -> None:
     smooth = SimpleNamespace(friction=0.0, slave=0, master=1)
     system = SimpleNamespace(interfaces=[smooth], all_names=["pad", "plate"])
     assert spent(system, [contact]) == ""
+
+
+@pytest.mark.parametrize("overlap", [1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("material", [ELASTIC, replace(ELASTIC, yield_stress=400.0)])
+def test_a_block_that_friction_holds_may_be_meshed_a_little_too_deep(
+    overlap: float, material: Material
+) -> None:
+    """Nothing but friction holds it, and before loading there is none: it is set on the base."""
+    block = Body(name="block", mesh=grid(np.linspace(0, 10, 6), np.linspace(-overlap, 2, 3)),
+                 material=ELASTIC, pressure={"top": 10.0},
+                 loads=(Traction(boundary="right", x=5.0),))  # fmt: skip
+    base = Body(name="base", mesh=grid(np.linspace(-4, 14, 13), np.linspace(-6, 0, 5)),
+                material=material, supports={"bottom": "xy"})  # fmt: skip
+    pair = ContactPair(slave=("block", "bottom"), master=("base", "top"), friction=0.3)
+    found = solve(Model(bodies=(block, base), contacts=(pair,)))
+    contact = found.loaded.state.contacts[0]
+    assert contact.normal.sum() == pytest.approx(100.0)
+    assert contact.tangential.sum() == pytest.approx(-10.0 - 5.0 * overlap, rel=1e-3)
+    assert found.audit().passed, found.audit().violations
