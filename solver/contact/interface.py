@@ -139,9 +139,11 @@ def interface_of(
     sizes = [float(part.body.box.max()) for part in both]
     reference, reach = None, sizes[0] if np.isfinite(sizes[0]) else sizes[1]
     curved = any(is_curved(chain) for _, chain in sides)
-    if contact.sliding == "small" or (contact.sliding == "auto" and not curved):
-        at_rest = [np.zeros_like(chain.X) for _, chain in sides]
+    small = contact.sliding == "small" or (contact.sliding == "auto" and not curved)
+    if small:
         reach = largest_overlap(both[0].body, both[1].body)
+    if small or not any(part.travels for part in both):
+        at_rest = [np.zeros_like(chain.X) for _, chain in sides]
         reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
         if not reference.area.any():
             raise ModelError(
@@ -160,5 +162,5 @@ def interface_of(
         shear_strength=contact.shear_limit * strength,
         parts=both,
         reach=reach,
-        reference=reference,
+        reference=reference if small else None,
     )

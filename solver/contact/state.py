@@ -76,7 +76,8 @@ class Energy:
     plastic : work of stress on plastic strain, by the mean of stress before and after
     friction : work of friction on slip, positive
     contact : work against contact where points open or close within an increment: an error of
-        integration
+        integration; and work on contact forces that are taken away with the bodies apart
+    scale : the largest of these terms so far, or what is rounding of what acts (`System.least`)
     """
 
     stored: float = 0.0
@@ -84,6 +85,7 @@ class Energy:
     plastic: float = 0.0
     friction: float = 0.0
     contact: float = 0.0
+    scale: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,6 +143,7 @@ class Converged:
     pivoted, blended : iterations whose contact problem needed pivoting, or whose tangent was
         blended with the elastic stiffness
     strayed : message that contact has reached the end of a surface; empty if it has not
+    apart : whether the bodies were taken apart in the increment
     energy : work since the lap began
     timing : how well contact was followed since then
     """
@@ -157,5 +160,6 @@ class Converged:
     pivoted: int
     blended: int
     strayed: str = ""
+    apart: bool = False
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)

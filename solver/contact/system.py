@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from solver.model.model import Model
 
 
+LEAST = 1e-7
+"""Force, or energy / that of elements that resist what is given, from which on ratios are told."""
 _TOUCHING = 1e-9
 """Gap / length of the longest contact surface, below which vertices touch."""
 _SET_DOWN = 1e-9
@@ -110,6 +112,15 @@ class System:
                     getattr(part.body, "supports", {}),
                     f"body {part.body.name!r} can move freely: support it, or hold it by contact",
                 )
+
+    def least(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] below which all is rounding of what acts.
+
+        A body may give way to heat, initial stress and prescribed motion: of large forces of its
+        elements, which cancel, nothing but their rounding is left.
+        """
+        force, energy = np.array([part.resisted(time) for part in self.parts]).T
+        return LEAST * float(np.linalg.norm(force)), LEAST * float(energy.sum())
 
     @property
     def n_unknowns(self) -> int:

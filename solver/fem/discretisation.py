@@ -77,16 +77,12 @@ class Discretisation(Nodes, Part):
         self.moves = body.travelling is not None
         self.loads = nodal_forces(self)
         self._eigenstrains, self.heat = eigenstrains(self), Heat.of(self)
-        self.driven, self._prescribed = prescribed(self)
         self._hold()
 
     def _hold(self) -> None:
-        """Find the supported unknowns, the rigid motions left, and one pin for each of these."""
-        fixed = self._prescribed.copy()
-        for boundary, axes in self.body.supports.items():
-            nodes = self.boundary_nodes(boundary)
-            for axis in axes:
-                fixed[2 * nodes + "xy".index(axis)] = True
+        """Find the held unknowns, the rigid motions left, and one pin for each of these."""
+        self.driven, self._held = prescribed(self)
+        fixed = self._held.copy()
         fixed[self.copied[fixed]] = True
         motions = kinematics.rigid_motions(self.X, self.body.kinematics)
         copies = self.copied != np.arange(self.n)
@@ -137,6 +133,11 @@ class Discretisation(Nodes, Part):
             start = self.nodes[0].min()
             places[0] = start + (places[0] - start) % self.period
         return same_unknowns(self.nodes, places)[self.copied]
+
+    @property
+    def travels(self) -> bool:
+        """Whether it may move as a whole: only contact holds it, or a side of it is moved."""
+        return super().travels or bool(self.driven.fields.any())
 
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
@@ -190,6 +191,26 @@ class Discretisation(Nodes, Part):
             return super().force_level(time)
         return float(np.linalg.norm(self.condensable.at(time)))
 
+    def resisted(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] if each element by itself resisted what is given.
+
+        That is heat, initial stress and prescribed displacements. Forces of elements that cancel
+        at a node are added up here: a body that gives way bears none of them.
+        """
+        nodal, energy = np.zeros(self.n), 0.0
+        if self._eigenstrains.cases:
+            strain = self.eigenstrain(time)
+            stress = self.body.law.stiffness(len(strain)) @ strain
+            energy += float((stress * strain).sum(axis=0) @ self.volumes) / 2
+            size = np.linalg.norm(stress, axis=0) * self.volumes
+            each = np.linalg.norm(self.B, axis=2) * size.reshape(self.weights.shape)[..., None]
+            nodal += np.bincount(self.dofs.ravel(), each.sum(axis=1).ravel(), self.n)
+        if self.driven.cases:
+            moved = self.driven.at(time)
+            nodal += np.abs(self._diagonal * moved)
+            energy += float(moved @ (self._diagonal * moved)) / 2
+        return float(np.linalg.norm(nodal)), energy
+
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return ``u`` with prescribed displacements at their values for a time.
 
@@ -197,7 +218,7 @@ class Discretisation(Nodes, Part):
         """
         if not self.driven.cases:
             return u
-        change = np.where(self._prescribed, self.driven.at(time) - u, 0.0)
+        change = np.where(self._held, self.driven.at(time) - u, 0.0)
         if not change.any():
             return u
         force = self.elastic_matrix() @ change

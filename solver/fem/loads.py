@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.fem.surface import edges_of
 from solver.mesh.shapes import shape_derivatives, shape_functions
 from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
 from solver.tensors import to_mandel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Push = Callable[[Array, Array], Array]
+
+_SAME = 1e-9
+"""Difference / size of what is given, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -75,19 +79,88 @@ def _push(load: Pressure | Traction) -> Push:
 
 
 def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
-    """Return the displacements (n,) that loads prescribe [mm], and which unknowns they hold."""
+    """Return the displacements (n,) that loads prescribe [mm], and which unknowns are held at all.
+
+    Loads on one boundary add up. Where boundaries meet, each must prescribe the same at all times;
+    a support prescribes no displacement. Raises `ModelError` where they do not.
+    """
     loads = [load for load in part.body.every_load if isinstance(load, Displacement)]
-    held = np.zeros(part.n, dtype=bool)
-    each = []
-    for load in loads:
-        field, nodes = np.zeros(part.n), part.boundary_nodes(load.boundary)
-        for axis, value in load.components.items():
-            # where two boundaries meet, the first that holds a component keeps it
-            own = nodes[~held[2 * nodes + axis]]
-            field[2 * own + axis] = value
-            held[2 * own + axis] = True
-        each.append((load, field))
+    each, held = [(load, np.zeros(part.n)) for load in loads], np.zeros(part.n, dtype=bool)
+    for axis in (0, 1):
+        courses = _courses(part, loads, axis)
+        for k, course in enumerate(courses):
+            for other in courses[:k]:
+                course.check(other, part)
+            own = course.dofs[~held[course.dofs]]
+            for load, field in each:
+                if load in course.loads:
+                    field[own] = load.components[axis]
+            held[own] = True
     return Superposed.of(part.n, each), held
+
+
+def _courses(part: Nodes, loads: Sequence[Displacement], axis: int) -> list[_Course]:
+    """Return what supports and loads prescribe along an axis, one for each boundary."""
+    still = [b for b, axes in part.body.supports.items() if "xy"[axis] in axes]
+    moved: dict[str, list[Displacement]] = {}
+    for load in loads:
+        if axis in load.components:
+            moved.setdefault(load.boundary, []).append(load)
+    both: list[tuple[str, str, list[Displacement]]] = [("supports", b, []) for b in still]
+    both += [("displacement", b, own) for b, own in moved.items()]
+    return [
+        _Course(f"{kind}.{boundary}", 2 * part.boundary_nodes(boundary) + axis, tuple(own), axis)
+        for kind, boundary, own in both
+    ]
+
+
+@dataclass(frozen=True)
+class _Course:
+    """The displacement over time of unknowns along one axis: the sum of loads, none if supported.
+
+    ``name`` is that of what prescribes it.
+    """
+
+    name: str
+    dofs: NDArray[np.int64]
+    loads: tuple[Displacement, ...]
+    axis: int
+
+    def at(self, times: Array) -> Array:
+        """Return the displacement (n,) at times (n,) [mm]."""
+        each = (load.components[self.axis] * np.array([load.factor(t) for t in times])
+                for load in self.loads)  # fmt: skip
+        return sum(each, np.zeros(len(times)))
+
+    def check(self, other: _Course, part: Nodes) -> None:
+        """Raise `ModelError` where the two differ on unknowns that they share."""
+        shared = np.intersect1d(self.dofs, other.dofs)
+        if not len(shared):
+            return
+        times = _telling([*self.loads, *other.loads])
+        mine, others = self.at(times), other.at(times)
+        apart = np.abs(mine - others)
+        worst = int(apart.argmax())
+        if apart[worst] <= _SAME * max(np.abs(mine).max(), np.abs(others).max()):
+            return
+        x, y = part.X[:, shared[0] // 2]
+        raise ModelError(
+            f"{self.name}.{'xy'[self.axis]}", float(f"{mine[worst]:g}"),
+            f"must be {others[worst]:g} mm at time {times[worst]:g}, as {other.name} of body "
+            f"{part.body.name!r} has it: "
+            f"they meet at ({x:g}, {y:g}) mm; let one of the boundaries end before",
+        )  # fmt: skip
+
+
+def _telling(loads: Sequence[Load]) -> Array:
+    """Return times (n,) at which sums of amplitudes are equal only if they are so at all times.
+
+    They are linear between knots, at which they may jump: two times between each two knots tell.
+    """
+    knots = [load.amplitude.time for load in loads if load.amplitude is not None]
+    at = np.unique(np.concatenate([[0.0], *knots]))
+    at = np.append(at, at[-1] + 1.0)
+    return np.concatenate([at, *(at[:-1] + share * np.diff(at) for share in (0.25, 0.75))])
 
 
 def eigenstrains(part: Nodes) -> Superposed:
@@ -104,8 +177,19 @@ def eigenstrains(part: Nodes) -> Superposed:
             each.append((load, strain))
         elif isinstance(load, InitialStress):
             compliance = np.linalg.inv(part.body.material.stiffness(4))
-            each.append((load, -compliance @ to_mandel(load.at(x))))
+            stress = load.at(x)
+            if part.body.kinematics == "plane_stress":
+                _check_plane(stress)
+            each.append((load, -compliance @ to_mandel(stress)))
     return Superposed.of(4 * x.shape[1], each)
+
+
+def _check_plane(stress: Array) -> None:
+    """Raise `ModelError` where an initial stress (4, n_points) acts across plane stress [MPa]."""
+    across = np.abs(stress[2])
+    if across.max(initial=0.0) > _SAME * np.abs(stress).max(initial=0.0):
+        worst = float(stress[2, across.argmax()])
+        raise ModelError("initial_stress.zz", worst, "must be zero in plane stress [MPa]")
 
 
 def travelling_forces(

@@ -130,6 +130,14 @@ class Part(ABC):
         """Return the size of the forces that load the part at a time [N]."""
         return float(np.linalg.norm(self.external(time)))
 
+    def resisted(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] if each element by itself resisted what is given.
+
+        Loads are not part of it.
+        """
+        del time
+        return 0.0, 0.0
+
     def law(self, time: float) -> Law:
         """Return the law of its points at a time: heat may change it."""
         del time
@@ -139,6 +147,11 @@ class Part(ABC):
         """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""
         del time
         return np.zeros((4, len(self.volumes)))
+
+    @property
+    def travels(self) -> bool:
+        """Whether it may move as a whole: only contact holds it, or its motion is prescribed."""
+        return self.rigid.shape[1] > 0
 
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""

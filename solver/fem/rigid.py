@@ -132,6 +132,11 @@ class RigidPart(Part):
         """Return ``u`` with prescribed motions at their values for a time."""
         return np.where(self._held, self._driven.at(time), u)
 
+    @property
+    def travels(self) -> bool:
+        """Whether it is pushed or moved."""
+        return super().travels or bool(self._driven.fields.any())
+
     def turn(self, before: float, after: float) -> float:
         """Return by how much it is turned between two times [rad], 0 where it is free to turn."""
         if not self._held[2]:

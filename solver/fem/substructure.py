@@ -113,6 +113,10 @@ class Substructure(Part):
         nodes = np.searchsorted(self._condensed.nodes, surface.nodes)
         return replace(surface, nodes=nodes)
 
+    def resisted(self, time: float) -> tuple[float, float]:
+        """See `Discretisation.resisted`."""
+        return self.whole.resisted(time)
+
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the operator of an elastic part, which never changes."""
         del surfaces, linear_solver

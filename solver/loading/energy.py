@@ -12,7 +12,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from solver.contact.state import Energy
+from solver.fem.rigid import RigidPart
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,14 +32,24 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
     work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
     work -= _heat(parts, before, now)
     work -= _spread(system, before, now)
+    work += _turned(system, before, now)
     so_far = before.energy
-    return Energy(
-        stored=so_far.stored,
-        external=so_far.external + work,
-        plastic=so_far.plastic + _plastic_work(parts, before, now),
-        friction=so_far.friction + now.contact_work[0],
-        contact=so_far.contact + now.contact_work[1],
-    )
+    terms = {
+        "external": so_far.external + work,
+        "plastic": so_far.plastic + _plastic_work(parts, before, now),
+        "friction": so_far.friction + now.contact_work[0],
+        "contact": so_far.contact + now.contact_work[1] + _released(before, now),
+    }
+    scale = max(so_far.scale, system.least(now.state.time)[1], *map(abs, terms.values()))
+    return Energy(stored=so_far.stored, scale=scale, **terms)
+
+
+def _released(before: Converged, now: Converged) -> float:
+    """Return the work of bodies on contact forces that vanish as they are taken apart [N mm]."""
+    if not now.apart:
+        return 0.0
+    moves = zip(before.state.u, now.state.u, before.contact_forces, strict=True)
+    return -sum(float(force @ (u1 - u0)) / 2 for u0, u1, force in moves)
 
 
 def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
@@ -68,6 +81,33 @@ def _spread(system: System, before: Converged, now: Converged) -> float:
         offset = interface.declared.offset
         force = before.state.contacts[k].normal.sum() + now.state.contacts[k].normal.sum()
         work += float(force) / 2 * (offset(now.state.time) - offset(before.state.time))
+    return work
+
+
+def _turned(system: System, before: Converged, now: Converged) -> float:
+    """Return the work on turned rigid bodies less that of their moments [N mm].
+
+    Under small sliding contact forces keep their directions while a body turns: their work is that
+    of the mean forces on the motion of the surface. The mean of the moments misses some of it.
+    """
+    work = 0.0
+    for k, interface in enumerate(system.interfaces):
+        for side, (number, part, surface) in enumerate(interface.sides):
+            small = None if now.state.contacts[k].finite else interface.reference
+            if small is None or not isinstance(part, RigidPart):
+                continue
+            u0, u1 = before.state.u[number], now.state.u[number]
+            rows = small.normal[side], small.tangent[side]
+            forces = [
+                contacts.normal @ rows[0] + contacts.tangential @ rows[1]
+                for contacts in (before.state.contacts[k], now.state.contacts[k])
+            ]
+            moved = (part.motion(surface, u1) - part.motion(surface, u0)).T.ravel()
+            resultants = [
+                force @ part.pull_back(surface, u, np.eye(len(force)), 0)[1]
+                for force, u in zip(forces, (u0, u1), strict=True)
+            ]
+            work -= float(np.sum(forces, 0) @ moved - np.sum(resultants, 0) @ (u1 - u0)) / 2
     return work
 
 

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.fem.discretisation import Discretisation
+from solver.tensors import deviator
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -31,7 +34,8 @@ class Flow:
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
     ``place`` (x, y) [mm] say what it strained most, ``proves`` whether its material can have no
-    other reason for it than a limit load: it hardens no more, and its stress meets no corner.
+    other reason for it than a limit load: it hardens no more, and its stress meets no corner; or
+    the kinematic theorem says so (`collapses`).
     """
 
     stiffness: float = 1.0
@@ -86,6 +90,41 @@ def _exhausted(law: Law, state: PlasticState, point: int) -> bool:
     bound = law.ultimate_shear_stress
     strength = law.shear_strength(state.at(np.array([point])))[0] if np.isfinite(bound) else bound
     return bool(strength >= _EXHAUSTED * bound)
+
+
+def collapses(
+    parts: Sequence[Part],
+    time: float,
+    moved: Sequence[NDArray[np.float64]],
+    forces: Sequence[NDArray[np.float64]],
+    responses: Sequence[Response],
+) -> bool:
+    """Whether forces out of balance do more work on a motion than stress can ever take.
+
+    This is the kinematic theorem of limit analysis, which holds at corners of a yield surface too:
+    where more is done than the strongest stress inside takes beyond the present one, there is no
+    equilibrium. Where volume changes, a mean stress that differs by the tensile strength may help.
+
+    Parameters
+    ----------
+    moved : displacements of each part, with little strain where it does not flow [mm]
+    forces : nodal forces out of balance, those of contact included [N]
+    """
+    elastic = _forms(parts, moved, responses)[:, 1]
+    excess = sum(float(force @ u) for force, u in zip(forces, moved, strict=True))
+    for part, u, response, share in zip(parts, moved, responses, elastic, strict=True):
+        law = part.law(time)
+        if share <= _MOVES * elastic.sum():
+            continue
+        if not isinstance(part, Discretisation) or np.isinf(law.ultimate_shear_stress):
+            return False
+        strain = part.strain(u)
+        if part.body.kinematics == "plane_stress":
+            strain[2] = -strain[0] - strain[1]
+        strength = law.ultimate_shear_stress / law.surface.shear(1.0)
+        most = strength * (law.surface.power(strain) + np.abs(strain[:3].sum(axis=0)))
+        excess -= float((most - (response.stress * deviator(strain)).sum(axis=0)) @ part.volumes)
+    return excess > 0
 
 
 def adrift(

@@ -18,6 +18,7 @@ plastic tangent of the step before would diverge.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,10 +30,10 @@ from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
-from solver.loading.flow import Flow, adrift, softer
+from solver.loading.flow import Flow, adrift, collapses, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
-from solver.loading.slide import slide
+from solver.loading.slide import Slide, slide
 from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
 from solver.loading.timing import timing
 
@@ -54,6 +55,8 @@ _PATIENCE = 15
 """Iterations without a smaller residual before an increment is given up."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
+_ROUNDED = 10.0
+"""Force level of bodies that bear nothing / that at which their rounding is out of balance."""
 _MOVING = 0.01
 """Last step / displacements of the increment, above which the bodies are still moving."""
 _LATE = 1
@@ -98,11 +101,11 @@ class Increment:
         materials = [part.body.material for part in system.parts]
         self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
+        self._least, _ = system.least(time)
+        self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.cornered for part in system.parts)  # no tangent there
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
-        self._level = 0.0
-        self._first: float | None = None
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -119,6 +122,7 @@ class Increment:
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
+            self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
             # bodies that overlap or are moved can begin in balance: later residuals are not
@@ -134,7 +138,7 @@ class Increment:
             little = 0 < error < _UNBALANCED * tolerances.residual
             balanced |= little and error * scale <= rounding(self.system, u)
             if balanced and violation < tolerances.contact and candidates.beyond >= 0:
-                return self._commit(u, responses, residuals, candidates, iteration)
+                return self._commit(u, responses, residuals, candidates, scale, iteration)
             elastic_first = iteration == 0 and self.elastic_first
             first = _STIFF if crawled > 1 else int(self._softened)
             first = len(_BLENDS) - 1 if elastic_first else first
@@ -143,7 +147,7 @@ class Increment:
             except IncrementFailed as failure:
                 if error > _UNBALANCED * tolerances.residual:
                     failure.why = softest
-                failure.why = slide(self.system, residuals, candidates) or failure.why
+                failure.why = self._slide((residuals, candidates)) or failure.why
                 raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
@@ -158,12 +162,43 @@ class Increment:
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
+        # to stop at rounding is no flow; what flows without resistance is in balance, but moves
+        flows = moving or best > _UNBALANCED * tolerances.residual
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            # to stop at rounding is no flow; what flows without resistance is in balance, but moves
-            softest if moving or best > _UNBALANCED * tolerances.residual else None,
+            self._slide() or (self._judged(softest, u, responses, contacts) if flows else None),
         )
+
+    def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
+        """Return how a body slides at one of the places, or where the increment began.
+
+        A step may have taken the body off its contacts.
+        """
+        places = (*places, self._began) if self._began else places
+        found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
+        return next((each for each in found if each is not None), None)
+
+    def _judged(
+        self,
+        flow: Flow,
+        u: Vectors,
+        responses: Sequence[Response],
+        contacts: tuple[ContactState, ...],
+    ) -> Flow:
+        """Return a flow with what the motion since the start of the increment proves of it.
+
+        Nothing where a motion is prescribed: the work of what prescribes it is not known.
+        """
+        parts = self.system.parts
+        moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
+        if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
+            return flow
+        candidates = self._candidates(u, contacts)
+        inner = on_parts(self.system, candidates, candidates.forces)
+        forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
+        proven = collapses(parts, self.time, moved, forces, responses)
+        return replace(flow, proves=flow.proves or proven)
 
     # -- 1, 2: where we are ------------------------------------------------------------------
 
@@ -191,15 +226,14 @@ class Increment:
         level = external + norm(inner)
         if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
-        self._level = max(self.start.force_scale, level)
-        violation = candidates.violation(self._stiffness(candidates))
-        if external == 0 and self._first is None:
-            self._first = violation  # free bodies come apart without stress
-        scale = max(self._level, self._first or 0.0)
+        if external == 0 and self.start.force_scale == 0:  # bodies may have been set apart
+            level += _ROUNDED * rounding(self.system, self.start.u) / self.tolerances.residual
+        scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
-            return 0.0, float(candidates.beyond < -self.system.touching), 0.0
+            overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
+            return 0.0, float(overlap < -self.system.touching), 0.0
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
-        return scale, norm(out) / scale, violation / scale
+        return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
 
     def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
         """Return the elastic stiffness of the contact points [N/mm]: a scale, kept once found."""
@@ -273,6 +307,7 @@ class Increment:
         responses: tuple[Response, ...],
         residuals: Vectors,
         candidates: Candidates,
+        scale: float,
         iterations: int,
     ) -> Converged:
         contacts = candidates.kept(self.start.contacts, self.time - self.start.time)
@@ -291,13 +326,14 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.time, u, tuple(r.state for r in responses), contacts, self._level),
+            state=State(self.time, u, tuple(r.state for r in responses), contacts, scale),
             responses=responses,
             iterations=iterations,
             pivoted=self._pivoted,
             blended=self._blended,
             strayed=strayed(self.system, u, candidates),
             timing=self._timing(candidates),
+            apart=not self.contact,
         )
 
     def _timing(self, candidates: Candidates) -> Timing:

@@ -62,13 +62,15 @@ class Tally:
 class Point:
     """A converged state, those before it in their order, to predict from, and the cost so far.
 
-    ``history`` is what was kept of every increment up to it.
+    ``history`` is what was kept of every increment up to it, ``met`` are the numbers of the contact
+    pairs whose surfaces have faced each other.
     """
 
     now: Converged
     past: tuple[State, ...]
     tally: Tally
     history: tuple[Any, ...] = ()
+    met: frozenset[int] = frozenset()
 
 
 class PathEnded(Exception):

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 _SPENT = 0.95
 """Share of friction that is borne, above which a pair is about to slide."""
-_ALONG = 1e-6
-"""Share of normal motion in a motion along the contact: the surfaces are as straight as that."""
+_ALONG = 0.05
+"""Share of normal motion in a motion along the contact: bodies in contact are bent as little."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +65,7 @@ def slide(
     """Return how a floating body slides under the normal forces of the candidates, if it does.
 
     Looked at are motions along all closed contacts, which do not change normal forces at once.
+    Deformed surfaces are not quite straight: normal forces then take power too.
 
     Parameters
     ----------
@@ -80,11 +81,14 @@ def slide(
         motion = candidates.of_part(i, part.rigid)
         if len(motion) == n or not motion.size:
             continue
-        along = linalg.null_space(motion[:n][closed], rcond=_ALONG)
+        _, apart, ways = linalg.svd(motion[:n][closed])
+        apart = np.append(apart, np.zeros(len(ways) - len(apart)))
+        along = ways[apart <= _ALONG * np.linalg.norm(motion, 2)].T
         load = along.T @ (part.rigid.T @ residuals[i])
         for way in (*np.eye(len(load)), load):
             power = abs(float(load @ way))
-            most = float(bound @ np.abs(motion[n:] @ along @ way))
+            moved = motion @ along @ way
+            most = float(bound @ np.abs(moved[n:])) + abs(float(N @ moved[:n]))
             if power > most > 0:
                 return Slide(body=part.body.name, ratio=power / most)
     return None

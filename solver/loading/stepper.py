@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.contact.drift import followed
+from solver.contact.parting import parted
 from solver.contact.state import Converged, Energy, State
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
@@ -77,8 +78,9 @@ class Stepper:
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         each = zip(self.system.parts, state.u, at_rest.responses, strict=True)
         stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
-        now = replace(at_rest, state=state, energy=Energy(stored=stored))
-        return Point(now, (), tally or Tally(), self._watched((), now))
+        scale = max(stored, self.system.least(state.time)[1])
+        now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale))
+        return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
 
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
@@ -88,7 +90,10 @@ class Stepper:
         load. Raises `PathEnded` where overlapping bodies find no equilibrium, and `ModelError`
         where an initial stress finds none.
         """
-        point = self.rest(self.system.set_down(self.balanced(state), time), tally)
+        state = self.system.set_down(self.balanced(state), time)
+        if self.system.overlaps(state):
+            state = parted(self.system, state)
+        point = self.rest(state, tally)
         if not self.system.overlaps(point.now.state):
             return point
         try:
@@ -132,7 +137,8 @@ class Stepper:
         state = point.now.state
         if self.system.moves:
             begun = self.begin(state, time, point.tally)
-            return replace(begun, history=(*point.history, *begun.history))
+            history, met = (*point.history, *begun.history), point.met | begun.met
+            return replace(begun, history=history, met=met)
         return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
@@ -245,7 +251,8 @@ class Stepper:
     def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
         """Return the point after one more increment."""
         history = self._watched(point.history, converged)
-        return Point(converged, past, self._timed(point.tally.plus(converged)), history)
+        met = point.met | _facing(converged.state)
+        return Point(converged, past, self._timed(point.tally.plus(converged)), history, met)
 
     def _watched(self, history: tuple[Any, ...], now: Converged) -> tuple[Any, ...]:
         return (*history, self._watch(now)) if self._watch else history
@@ -269,6 +276,12 @@ class Stepper:
 def _coarse(timing: Timing) -> bool:
     """Whether an increment follows contact too coarsely."""
     return timing.unknown > _UNTIMED or timing.passage > _PASSAGE
+
+
+def _facing(state: State) -> frozenset[int]:
+    """Return the numbers of the contact pairs whose surfaces face each other."""
+    each = enumerate(state.contacts)
+    return frozenset(k for k, contact in each if np.isfinite(contact.gap).any())
 
 
 def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import LimitLoad, ModelError
+from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.loading.bearing import unbearable
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged
     from solver.contact.system import System
-    from solver.errors import NotConverged
     from solver.loading.control import Control
     from solver.loading.outcome import Point
     from solver.loading.program import Program, Target
@@ -115,9 +114,22 @@ class Walker:
                 points=walk.points,
                 traces=walk.traces,
                 history=walk.point.history,
-                error=walk.error,
+                error=walk.error or self._strangers(walk.point),
                 settled=settled,
             )
+
+    def _strangers(self, point: Point) -> NotConverged | None:
+        """Return the error that the surfaces of a pair have never faced each other."""
+        for k, contact in enumerate(self._system.model.contacts):
+            if k not in point.met:
+                slave, master = (".".join(side) for side in (contact.slave, contact.master))
+                time = point.now.state.time
+                return NotConverged(
+                    f"{slave} and {master} have not faced each other at any time: no normal of the "
+                    "slave has met the master from outside, so that no contact was possible; check "
+                    "the boundaries, where the bodies are, and how they move", time, time,
+                )  # fmt: skip
+        return None
 
     def _start(self, program: Program, tally: Tally | None = None) -> _Walk:
         """Return the walk at the beginning of a program."""

@@ -41,13 +41,13 @@ class BackStress(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ChabocheState(PlasticState):
-    """Internal variables, with the back stresses (n_back, n_components, n_points) [MPa]."""
+    """Internal variables, with the back stresses (n_back, n_components, n_points) [MPa].
+
+    Each is 2/3 C times a strain, that of the plastic flow which is not forgotten, and is stretched
+    like it.
+    """
 
     back: Array
-
-    def stretched(self, factor: Array) -> ChabocheState:
-        """Return the internal variables with all strains multiplied by factors (n_points,)."""
-        return ChabocheState(self.plastic_strain * factor, self.accumulated * factor, self.back)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -225,6 +225,10 @@ class Chaboche(Law):
             return q - self.curve.flow_stress(p) - stiff * growth, -slope
 
         first, _ = excess(np.zeros(s.shape[1]))
+        # what heat has left of a back stress beyond C / gamma fades in favour of the excess
+        for X, (modulus, recall) in zip(state.back, self.back_stresses, strict=True):
+            if recall:
+                first = first + np.maximum(von_mises(X) - modulus / recall, 0.0)
         growth = multiplier(excess, first / (3 * G) * (1 + 1e-9), von_mises(s))
         _, xi, turn = relative(growth)
         size = np.sqrt((xi**2).sum(axis=0))

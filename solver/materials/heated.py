@@ -5,8 +5,9 @@ With Young's modulus e E and the yield stress r Re the response follows from tha
     stress(strain) = r stress0(strain e / r),   tangent = e tangent0
 
 Every slope of the curve falls with Young's modulus then, and its stresses with the yield stress.
-Plastic strain stays what it is while the temperature changes. The back stresses of `Chaboche` fall
-with the yield stress.
+Plastic strain stays what it is while the temperature changes, and so do the strains that back
+stresses belong to: Prager's back stress is 2/3 e H times the plastic strain at any temperature, and
+those of `Chaboche` fall with Young's modulus too.
 """
 
 from __future__ import annotations
@@ -129,11 +130,11 @@ class Heated(Law):
     def respond(self, strain: Array, state: PlasticState) -> Response:
         """Return stress, tangent and new state; no softened tangent is the elastic stiffness."""
         k = self._stretch
-        own = self.law.respond(strain * k, state.stretched(k))
+        before = state.stretched(k)
+        own = self.law.respond(strain * k, before)
         return Response(
             stress=self.strong * own.stress,
             tangent=self.stiff * own.tangent,
-            # there and back again, rounding would look like flow
-            state=own.state.stretched(1 / k).where(own.yielding, state),
+            state=state.stepped(before, own.state, k, own.yielding),
             yielding=own.yielding | (self.stiff != 1.0),
         )

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Points = NDArray[np.bool_]
+
 
 @dataclass(frozen=True, slots=True)
 class PlasticState:
@@ -39,15 +41,29 @@ class PlasticState:
         """Return the internal variables of some points."""
         return replace(self, **{f.name: getattr(self, f.name)[..., points] for f in fields(self)})
 
-    def where(self, points: NDArray[np.bool_], other: PlasticState) -> Self:
-        """Return these internal variables at some points (n_points,), others at the rest."""
-        names = [f.name for f in fields(self)]
-        mixed = {n: np.where(points, getattr(self, n), getattr(other, n)) for n in names}
-        return replace(self, **mixed)
-
     def stretched(self, factor: NDArray[np.float64]) -> Self:
         """Return the internal variables with all strains multiplied by factors (n_points,)."""
         return replace(self, **{f.name: getattr(self, f.name) * factor for f in fields(self)})
+
+    def stepped(
+        self, own: PlasticState, after: PlasticState, factor: NDArray[np.float64], flows: Points
+    ) -> Self:
+        """Return these internal variables after a step of what they are when stretched.
+
+        What the step has left as it was keeps every bit: there and back again, rounding would look
+        like flow.
+
+        Parameters
+        ----------
+        own, after : the internal variables stretched by ``factor`` (n_points,), before and after
+        flows : (n_points,) points at which anything flows in the step
+        """
+        back = after.stretched(1 / factor)
+        kept = {}
+        for name in (f.name for f in fields(self)):
+            changed = flows & (getattr(after, name) != getattr(own, name))
+            kept[name] = np.where(changed, getattr(back, name), getattr(self, name))
+        return replace(self, **kept)
 
 
 class Response(NamedTuple):

@@ -31,6 +31,12 @@ class YieldSurface(Protocol):
     def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivative (n_components, n_points) of `equivalent` by Mandel stress."""
 
+    def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the most work (n_points,) on the deviator of Mandel strain by stress inside.
+
+        It is that of a surface whose tensile stress is 1.
+        """
+
 
 @dataclass(frozen=True, slots=True)
 class VonMises:
@@ -48,6 +54,10 @@ class VonMises:
         """Return 3/2 s / q (n_components, n_points); zero where there is no deviator."""
         s = deviator(stress)
         return np.asarray(1.5 * s / np.maximum(np.sqrt(1.5 * (s**2).sum(axis=0)), _NOTHING))
+
+    def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return sqrt(2/3 e:e) (n_points,) of the deviator e of Mandel strain."""
+        return np.asarray(np.sqrt(2 / 3 * (deviator(strain) ** 2).sum(axis=0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +81,11 @@ class Tresca:
         """Return e1 e1 - e3 e3 (n_components, n_points), on an edge that of one of its faces."""
         _, directions = principal(stress)
         return dyad(directions, 0, 0, len(stress)) - dyad(directions, 2, 2, len(stress))
+
+    def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest principal value in size (n_points,) of the deviator of strain."""
+        values, _ = principal(deviator(strain))
+        return np.asarray(np.abs(values).max(axis=0))
 
     def stray(
         self,

@@ -7,7 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Material, Model, PathControl, solve
+from solver import (
+    Amplitude,
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    PathControl,
+    Pressure,
+    Stage,
+    Temperature,
+    solve,
+)
 from solver.materials import PlaneStress
 from solver.mesh import grid, mapped
 from solver.results.audit.law import increment_error
@@ -150,6 +161,25 @@ def test_the_work_of_the_loads_is_found_again(solution):
     assert judged(solution, solution.loaded).figures["audit_energy"] < 1e-9
 
 
+def test_released_and_unloaded_states_pass_by_themselves():
+    """Bodies that were taken apart give up what friction had locked in; no load is left."""
+    there = Amplitude([0, 1, 2], [0, 1, 0])
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=400.0)
+    pad = block("pad", np.linspace(0, 10, 6), np.linspace(0, 2, 3), supports={"left": "x"},
+                loads=(Pressure(boundary="top", value=500.0, amplitude=there),))  # fmt: skip
+    base = block("base", np.linspace(-4, 14, 13), np.linspace(-6, 0, 5), material=steel,
+                 supports={"bottom": "xy"})  # fmt: skip
+    pair = ContactPair(slave=("pad", "bottom"), master=("base", "top"), friction=0.3)
+    for apart in (True, False):
+        stages = (Stage(name="pressed", target=1.0, steps=4),
+                  Stage(name="free", target=2.0, steps=4, apart=apart))  # fmt: skip
+        solution = solve(Model(bodies=(pad, base), contacts=(pair,)), stages=stages)
+        for stage in ("pressed", "free"):
+            check = solution.audit(stage)
+            assert check.passed, check.violations
+            assert check.figures["audit_energy"] < 1e-9
+
+
 def test_lost_work_is_noticed(solution):
     energy = solution.loaded.energy
     short = replace(energy, plastic=0.9 * energy.plastic)
@@ -185,3 +215,40 @@ def test_work_is_found_again_where_contact_spreads(element, friction):
                   control=PathControl(load_step=0.25)).audit()  # fmt: skip
     assert check.passed, check.violations
     assert check.figures["audit_energy"] < 1e-9
+
+
+# -- where nothing acts ----------------------------------------------------------------------------
+
+
+def expanding(yield_stress, kinematics, **heat):
+    """A bar that grows by 0.012 mm in heat, without a force."""
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=yield_stress)
+    rise = Temperature(rise=100.0, expansion=1.2e-5, **heat)
+    bar = block("bar", np.linspace(0, 10, 6), np.linspace(0, 2, 3), material=steel,
+                supports={"left": "x", "bottom": "y"}, kinematics=kinematics,
+                loads=(rise,))  # fmt: skip
+    return solve(Model(bodies=(bar,)))
+
+
+@pytest.mark.parametrize("yield_stress", [np.inf, 400.0])
+@pytest.mark.parametrize("kinematics", ["plane_stress", "axisymmetric"])
+@pytest.mark.parametrize("heat", [{}, {"modulus_drop": 5e-4, "yield_drop": 5e-4}])
+def test_free_expansion_passes(yield_stress, kinematics, heat):
+    """Stress, forces and work are rounding of what they would be in a held bar."""
+    check = expanding(yield_stress, kinematics, **heat).audit()
+    assert check.passed, check.violations
+    assert check.figures["audit_error_loaded"] < 1e-3
+
+
+@pytest.mark.parametrize("stage", ["loaded", "unloaded"])
+def test_a_little_stress_in_free_expansion_is_noticed(stage):
+    """A hundred-thousandth of the stress of a held bar is no rounding."""
+    solution = expanding(400.0, "plane_stress")
+    (response,) = solution.loaded.responses
+    little = np.zeros_like(response.stress)
+    little[0] = 1e-5 * 2e5 * 1.2e-5 * 100.0
+    spoiled = replace(getattr(solution, stage),
+                      responses=(response._replace(stress=response.stress + little),))  # fmt: skip
+    states = {"loaded": solution.loaded, "unloaded": solution.unloaded} | {stage: spoiled}
+    check = audit(solution.system, states["loaded"], states["unloaded"], 0.0)
+    assert any("audit_residual" in text for text in check.violations)

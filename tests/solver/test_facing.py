@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver import (
+    Amplitude,
     Body,
     ContactPair,
     Material,
     Model,
     ModelError,
+    Moved,
     NotConverged,
     PathControl,
+    RigidBody,
+    Stage,
     System,
     solve,
 )
 from solver.fem.discretisation import Discretisation
 from solver.fem.surface import extract
 from solver.mesh import grid, mapped
+from solver.model.rigid import arc
 from solver.scenes.rolling import ROLLING
 from tests.verification.bodies import block
 
@@ -52,12 +59,38 @@ def test_an_edge_behind_the_slave_is_no_partner(sliding):
     """A block below the plate turns its bottom away from it: the plate's top is behind."""
     x, y = np.linspace(2.0, 8.0, 7), np.linspace(-12.0, -6.0, 7)
     low = block("low", x, y, supports={"top": "xy"}, pressure={"left": 1.0})
-    model = pressed(low, jaw(), master="outline", sliding=sliding)
-    if sliding == "small":
-        with pytest.raises(ModelError, match="do not face each other"):
-            System(model)
-    else:
-        assert not solve(model).loaded.state.contacts[0].normal.any()
+    with pytest.raises(ModelError, match="do not face each other"):
+        System(pressed(low, jaw(), master="outline", sliding=sliding))
+
+
+def roller(**motions):
+    """A rigid roller of radius 2 mm, 3 mm beside the jaw's end and 1 mm above its top."""
+    around = arc((17.0, 3.0), 2.0, (-np.pi + 0.3, -0.3), 24)
+    body = RigidBody(name="roller", surfaces={"face": around}, centre=(17.0, 3.0), **motions)
+    pair = ContactPair(slave=("jaw", "seat"), master=("roller", "face"))
+    mesh = named(jaw().mesh, seat=lambda x: (x[1] > -1e-9) & (x[0] < 10.0))
+    plate = replace(jaw(), mesh=mesh.with_boundaries({"left": lambda x: x[0] < 1e-9}))
+    return Model(bodies=(plate,), rigid=(body,), contacts=(pair,))
+
+
+STAGES = (Stage(name="across", target=1.0, steps=2), Stage(name="down", target=2.0, steps=4))
+FIRST, THEN = Amplitude([0, 1], [0, 1]), Amplitude([1, 2], [0, 1])
+
+
+def test_surfaces_that_come_to_face_each_other_later_are_a_pair():
+    model = roller(x=Moved(value=-12.0, amplitude=FIRST), y=Moved(value=-1.1, amplitude=THEN))
+    solution = solve(model, stages=STAGES)
+    across, down = (solution.stages[name].state.contacts[0] for name in ("across", "down"))
+    assert np.isfinite(across.gap).any() and not across.normal.any()
+    assert down.normal.sum() > 10.0
+
+
+@pytest.mark.parametrize("away", [12.0, 0.0])
+def test_surfaces_that_never_face_each_other_are_not_ok(away):
+    """Whether the body that is to come goes away, or only down beside the other."""
+    model = roller(x=Moved(value=away, amplitude=FIRST), y=Moved(value=-1.1, amplitude=THEN))
+    with pytest.raises(NotConverged, match=r"jaw\.seat and roller\.face have not faced each other"):
+        solve(model, stages=STAGES)
 
 
 @pytest.mark.parametrize("sliding", ["small", "finite"])

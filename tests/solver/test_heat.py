@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,46 @@ def test_a_heated_law_is_the_law_of_its_constants(name: str) -> None:
             rel=1e-6, abs=1e-5,
         )  # fmt: skip
     assert state.accumulated.min() > 3 * RE / E
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_what_does_not_flow_keeps_every_bit_while_the_temperature_changes(name: str) -> None:
+    """There and back again, rounding would look like flow: of a layer that is far from yielding."""
+    cold, state = LAWS[name](1.0, 1.0), LAWS[name](1.0, 1.0).initial(40, 4)
+    rng = np.random.default_rng(7)
+    for strain in path(40):
+        e, r = rng.uniform(0.5, 1.0, (2, 40))
+        heated = Heated(law=cold, stiff=e, strong=r)
+        found = heated.respond(strain, state)
+        assert heated.misfit(strain, found.stress, state, found.state).max() < 1e-6 * RE
+        still = ~(found.state.accumulated > state.accumulated)
+        for field in fields(state):
+            before, after = (getattr(s, field.name) for s in (state, found.state))
+            assert np.array_equal(before[..., still], after[..., still])
+        state = found.state
+
+
+@pytest.mark.parametrize("plane", [False, True])
+def test_prager_hardening_has_one_meaning_under_changing_temperature(plane: bool) -> None:
+    """The back stress is 2/3 H(T) times the plastic strain: a function of state, in both laws."""
+    prager = linear(1.0, 1.0, "kinematic")
+    flat = Voce(yield_stress=RE, saturation=0.0, rate=1.0)
+    unfading = Chaboche(elasticity=elastic(1.0), curve=flat,
+                        back_stresses=(BackStress(prager.plastic_modulus),))  # fmt: skip
+    laws: list[Law] = [prager, unfading]
+    if plane:
+        laws = [PlaneStress(law) for law in laws]
+    rng, states = np.random.default_rng(11), [law.initial(30, 4) for law in laws]
+    for strain in path(30):
+        e, r = rng.uniform(0.5, 1.0, (2, 30))
+        hot = [Heated(law=law, stiff=e, strong=r) for law in laws]
+        found = [law.respond(strain, state) for law, state in zip(hot, states, strict=True)]
+        assert found[1].stress == pytest.approx(found[0].stress, rel=1e-9, abs=1e-9 * RE)
+        states = [one.state for one in found]
+        for law, state in zip(hot, states, strict=True):
+            X = 2 / 3 * e * prager.plastic_modulus * state.plastic_strain
+            assert law.back_stress(state) == pytest.approx(X, rel=1e-9, abs=1e-9 * RE)
+    assert states[0].accumulated.min() > 2 * RE / E
 
 
 def bar(rise: Any, heat: dict[str, float], material: Any = None, **own: Any) -> Solution:

@@ -82,6 +82,83 @@ def test_a_displacement_in_one_step_finds_the_same_stress_as_in_many() -> None:
     assert stresses[0] == pytest.approx(stresses[1], rel=1e-7, abs=1e-6)
 
 
+def test_displacements_of_one_boundary_add_up() -> None:
+    """Press, then slide, then press further: each load has its own course."""
+    rise, later = Amplitude([0, 1], [0, 1]), Amplitude([1, 2], [0, 1])
+    body = bar(loads=(
+        Displacement(boundary="right", x=-0.010, y=0.0, amplitude=rise),
+        Displacement(boundary="right", x=-0.030, amplitude=later),
+        Displacement(boundary="right", y=0.004, amplitude=later),
+    ), supports={"left": "xy"})  # fmt: skip
+    stages = (Stage(name="pressed", target=1.0, steps=2), Stage(name="both", target=2.0, steps=2))
+    found = solve(Model(bodies=(body,)), stages=stages)
+    tip = found.nodes("bar")[0] == 10.0
+    for stage, x, y in (("pressed", -0.010, 0.0), ("both", -0.040, 0.004)):
+        moved = found.displacement("bar", stage)[:, tip]
+        assert moved[0] == pytest.approx(x, abs=1e-15)
+        assert moved[1] == pytest.approx(y, abs=1e-15)
+        assert found.audit(stage).passed
+
+
+def test_a_displacement_given_twice_counts_twice() -> None:
+    half = Displacement(boundary="right", x=0.01)
+    moved = loaded(bar(loads=(half, half))).displacement("bar", "loaded")
+    assert moved[0].max() == pytest.approx(0.02)
+
+
+RISE = Amplitude([0, 1], [0, 1])
+
+
+@pytest.mark.parametrize(
+    ("supports", "loads", "message"),
+    [
+        (
+            {"left": "x"},
+            (Displacement(boundary="right", y=0.01), Displacement(boundary="top", y=0.02)),
+            r"displacement\.top\.y = 0.02: must be 0.01 mm at time 1, as displacement\.right",
+        ),
+        (
+            {"left": "x"},
+            (Displacement(boundary="right", y=0.01),
+             Displacement(boundary="top", y=0.01, amplitude=RISE)),
+            r"displacement\.top\.y = .* as displacement\.right of body 'bar' has it",
+        ),
+        (
+            {"bottom": "xy"},
+            (Displacement(boundary="right", x=0.01),),
+            r"displacement\.right\.x = .*: must be 0 mm .* supports\.bottom .*\(10, 0\) mm",
+        ),
+        (
+            {"left": "x", "bottom": "y", "top": "y"},
+            (Displacement(boundary="top", y=0.01),),
+            r"displacement\.top\.y = .*: must be 0 mm at time 1, as supports\.top",
+        ),
+    ],
+    ids=["values", "courses", "support", "support of the same boundary"],
+)  # fmt: skip
+def test_boundaries_that_meet_and_contradict_each_other_are_refused(
+    supports: dict[str, str], loads: tuple[Displacement, ...], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        System(Model(bodies=(bar(supports=supports, loads=loads),)))
+
+
+def test_boundaries_that_meet_and_agree_are_held_together() -> None:
+    """Two sides that meet are moved alike; one course is written as two."""
+    lift = (
+        Displacement(boundary="half", y=0.02),
+        Displacement(boundary="right", y=0.005),
+        Displacement(boundary="right", y=0.015),
+    )
+    fixed = bar(supports={"left": "xy"})
+    tip = {"half": lambda x: (x[1] > 2.0 - 1e-9) & (x[0] > 8.0)}
+    found = loaded(replace(fixed, mesh=fixed.mesh.with_boundaries(tip), loads=lift))
+    x, y = found.nodes("bar")
+    corner = (x == 10.0) & (y == 2.0)
+    assert found.displacement("bar", "loaded")[1, corner] == pytest.approx(0.02)
+    assert found.audit().passed
+
+
 def test_a_free_body_expands_without_stress() -> None:
     heat = Temperature(rise=100.0, expansion=ALPHA)
     found = loaded(bar(loads=(heat,)))
@@ -185,6 +262,48 @@ def test_what_equilibrium_makes_of_an_initial_stress_is_told() -> None:
     for x_, y_, stress in (([0, 1], y, field[:, 1:]), ([1, 1], y, field)):
         with pytest.raises(ModelError, match=r"initial_stress\.stress = "):
             InitialStress.on_grid(np.array(x_), y_, stress)
+
+
+@pytest.mark.parametrize("material", [ELASTIC, STEEL])
+@pytest.mark.parametrize("slope", [0.0, 1.0])
+def test_initial_stress_across_plane_strain_is_in_equilibrium(
+    material: Material, slope: float
+) -> None:
+    """No force in the plane belongs to it: what is out of balance is rounding."""
+    across = InitialStress(
+        stress=lambda x: 80.0 * np.stack([0 * x[0], 0 * x[0], 1 + slope * x[1], 0 * x[0]])
+    )
+    body = bar(material, kinematics="plane_strain", loads=(across,))
+    for loads in ((), (Pressure(boundary="right", value=10.0),)):
+        found = loaded(replace(body, loads=(across, *loads)))
+        _, given, left = found.initial_stress("bar")
+        assert left == pytest.approx(given, abs=1e-9)
+        assert found.audit().passed, found.audit().violations
+
+
+@pytest.mark.parametrize("side", [{"left": "x"}, {}])
+@pytest.mark.parametrize("material", [ELASTIC, STEEL])
+def test_a_body_that_is_moved_as_a_whole_bears_nothing(
+    material: Material, side: dict[str, str]
+) -> None:
+    """Forces are rounding of the stiffness times the motion: of 2e5 MPa for 1 mm."""
+    loads = (Displacement(boundary="right", y=1.0, x=None if side else 0.3),)
+    found = loaded(bar(material, supports=side, loads=loads))
+    assert np.abs(found.stress("bar", "loaded")).max() < 2e5 * 1e-11
+    assert found.displacement("bar", "loaded")[1] == pytest.approx(1.0)
+    assert found.audit().passed, found.audit().violations
+
+
+@pytest.mark.parametrize("condense", [True, False])
+def test_initial_stress_across_plane_stress_is_refused(condense: bool) -> None:
+    """It would be lost: no equilibrium in the plane holds it."""
+    across = InitialStress(stress=lambda x: np.array([[0.0], [0.0], [50.0], [0.0]]))
+    with pytest.raises(
+        ModelError, match=r"initial_stress\.zz = 50.0: must be zero in plane stress"
+    ):
+        System(Model(bodies=(bar(loads=(across,), condense=condense),)))
+    rounded = InitialStress(stress=lambda x: np.array([[50.0], [0.0], [1e-12], [0.0]]))
+    System(Model(bodies=(bar(loads=(rounded,), condense=condense),)))
 
 
 def test_initial_stress_above_the_strength_yields_before_any_load() -> None:

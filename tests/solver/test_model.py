@@ -109,6 +109,23 @@ def test_a_pair_given_twice_is_refused(surface, swapped):
     assert caught.value.allowed == "pairs surfaces that contacts[1] pairs: give each pair once"
 
 
+@pytest.mark.parametrize("slave", ["pad", "plate"])
+def test_bodies_of_different_thickness_are_no_pair(slave):
+    """The pressure would be that on the area of the slave, whichever that is."""
+    sides = {"pad": ("pad", "bottom"), "plate": ("plate", "top")}
+    pair = ContactPair(slave=sides.pop(slave), master=sides.popitem()[1])
+    bodies = plate(thickness=1.5), plate("pad", 2.0, thickness=0.5)
+    with pytest.raises(ModelError) as caught:
+        Model(bodies=bodies, contacts=(pair,))
+    assert caught.value.field == "contacts[0]"
+    assert caught.value.value == {"pad": 0.5, "plate": 1.5}
+    assert caught.value.allowed.startswith("must join bodies of one thickness")
+    Model(bodies=bodies)
+    round_axis = [plate(n, y, thickness=t, kinematics="axisymmetric")
+                  for n, y, t in (("plate", 0.0, 1.5), ("pad", 2.0, 0.5))]  # fmt: skip
+    Model(bodies=tuple(round_axis), contacts=(pair,))
+
+
 def test_one_surface_may_be_paired_with_several_others():
     bodies = (plate(), plate("one", 2.0), plate("two", 2.0))
     pairs = [

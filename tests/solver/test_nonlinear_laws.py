@@ -20,8 +20,9 @@ from solver import (
 )
 from solver.materials import BackStress, Chaboche, Elasticity, Layered, PlaneStress, Table, Voce
 from solver.materials.tresca import TrescaMaterial
-from solver.materials.yield_surface import Tresca
+from solver.materials.yield_surface import Tresca, VonMises
 from solver.mesh import grid
+from solver.tensors import identity
 from tests.solver.laws import CURVES, LAYERED, SOFT, STEEL, chaboche, steel
 
 RE, E, G = 350.0, 2e5, STEEL.shear_modulus
@@ -417,3 +418,54 @@ def test_only_a_curve_at_its_end_proves_a_limit_load(pull, iterations, ends):
     with pytest.raises(NotConverged) as caught:
         solve(Model(bodies=(bar,)), control=control)
     assert type(caught.value) is ends
+
+
+IDEAL = TrescaMaterial(
+    elasticity=STEEL, curve=Voce(yield_stress=RE, saturation=0.0, rate=1.0)
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
+def test_a_bar_of_tresca_ends_at_its_limit_load(kinematics):
+    """Stress is on an edge; the kinematic theorem proves the limit, which is the yield stress."""
+    x = np.linspace(0.0, 4.0, 5)
+    bar = Body(name="bar", mesh=grid(x, x), material=IDEAL, kinematics=kinematics,
+               supports={"left": "x", "bottom": "y"}, pressure={"top": -RE})  # fmt: skip
+    with pytest.raises(LimitLoad, match="body 'bar' flows") as caught:
+        solve(Model(bodies=(bar,)), load=1.3)
+    assert caught.value.reached < 1.0 < caught.value.attempted < 1.01
+
+
+def test_a_tube_of_tresca_ends_at_its_limit_load():
+    """Under a pressure of RE ln(outer / inner radius)."""
+    tube = Body(name="tube", mesh=grid(np.linspace(10.0, 20.0, 9), np.array([0.0, 1.0, 2.0])),
+                material=IDEAL, kinematics="axisymmetric", supports={"bottom": "y", "top": "y"},
+                pressure={"left": RE * np.log(2.0)})  # fmt: skip
+    with pytest.raises(LimitLoad, match="body 'tube' flows") as caught:
+        solve(Model(bodies=(tube,)), load=1.3)
+    # the last point to yield is not at the outer side
+    assert 0.99 < caught.value.reached < caught.value.attempted < 1.01
+
+
+def test_an_increment_given_up_below_the_limit_proves_none():
+    """At three quarters of the limit load, after two iterations."""
+    tube = Body(name="tube", mesh=grid(np.linspace(10.0, 20.0, 9), np.array([0.0, 1.0, 2.0])),
+                material=IDEAL, kinematics="axisymmetric", supports={"bottom": "y", "top": "y"},
+                pressure={"left": RE * np.log(2.0)})  # fmt: skip
+    for load in (0.75, 0.99):
+        control = PathControl(load_step=1.0, max_cuts=0, tolerances=Tolerances(iterations=2))
+        with pytest.raises(NotConverged) as caught:
+            solve(Model(bodies=(tube,)), load=load, control=control)
+        assert type(caught.value) is NotConverged
+
+
+@pytest.mark.parametrize("surface", [VonMises(), Tresca()])
+def test_no_stress_inside_does_more_work_than_the_power_of_its_surface(surface):
+    """And the stress of flow along the strain does as much."""
+    rng = np.random.default_rng(1864)
+    stress, strain = rng.normal(size=(2, 4, 500))
+    stress /= surface.equivalent(stress)
+    strain -= identity(4)[:, None] * strain[:3].sum(axis=0) / 3
+    assert ((stress * strain).sum(axis=0) <= surface.power(strain) * (1 + 1e-12)).all()
+    flow = surface.normal(stress)
+    assert surface.power(flow) == pytest.approx((stress * flow).sum(axis=0))

@@ -236,3 +236,32 @@ def test_a_ball_that_is_moved_comes_and_goes_in_any_number_of_increments(steps: 
     assert found.tally.cuts == 0
     assert found.plastic_strain("block").max() > 0.05
     assert found.audit().passed, found.audit().violations
+
+
+@pytest.mark.parametrize(
+    ("down", "turning", "centre"),
+    [
+        (Moved(value=-2e-3), Moved(value=1e-4), 0.0),
+        (Pushed(value=-200.0), Moved(value=1e-4), 0.0),
+        (Pushed(value=-5000.0), Moved(value=1e-2), 0.0),
+        (Pushed(value=-5000.0), Pushed(value=0.0), 2.0),
+    ],
+    ids=["moved", "pushed", "far", "free"],
+)
+def test_the_work_of_a_plate_that_turns_is_found_again(
+    down: Moved | Pushed, turning: Moved | Pushed, centre: float
+) -> None:
+    """Under small sliding contact forces keep their directions: the balance is exact."""
+    x = np.linspace(-5.0, 5.0, 11)
+    block = Body(name="block", mesh=grid(x, x / 2 - 2.5), supports={"bottom": "xy"},
+                 material=Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=800.0,
+                                   hardening="isotropic", hardening_ratio=0.1))  # fmt: skip
+    face = Curve(points=np.array([[-6.0, 0.0], [6.0, 0.0]]).T)
+    plate = RigidBody(name="plate", surfaces={"face": face}, centre=(centre, 0.0), y=down,
+                      rotation=turning)  # fmt: skip
+    pair = ContactPair(slave=("block", "top"), master=("plate", "face"), friction=0.3,
+                       sliding="small")  # fmt: skip
+    found = solve(Model(bodies=(block,), rigid=(plate,), contacts=(pair,)),
+                  control=PathControl(load_step=0.25))  # fmt: skip
+    assert abs(found.motion("plate").rotation) > 0.9e-4
+    assert found.audit().figures["audit_energy"] < 1e-9

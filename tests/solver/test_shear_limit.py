@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Material, Model, ModelError, NotConverged, solve
+from solver import Body, ContactPair, Material, Model, ModelError, NotConverged, Temperature, solve
 from solver.contact.problem import STICK
 from solver.mesh import grid
 from solver.scenes.punch import PunchParameters
@@ -46,6 +48,22 @@ def pushed_block(push, *, block=WEAK, base=STRONG, shear_limit=SHARE, thickness=
         slave=("block", "bottom"), master=("base", "top"), friction=2.0, shear_limit=shear_limit
     )
     return Model(bodies=bodies, contacts=(pair,))
+
+
+@pytest.mark.parametrize("hot", ["block", "base"])
+def test_a_share_of_the_cold_strength_is_no_limit_in_heat(hot):
+    """Heat may make either body the weaker one."""
+    model = pushed_block(0.5 * FULL)
+    heat = Temperature(rise=300.0, expansion=0.0, yield_drop=1e-3)
+
+    def heated(load, contacts):
+        bodies = (replace(b, loads=(load,) if b.name == hot else ()) for b in model.bodies)
+        return Model(bodies=tuple(bodies), contacts=contacts)
+
+    with pytest.raises(ModelError, match=f"shear_limit = .*: must be inf where heat .* of '{hot}'"):
+        heated(heat, model.contacts)
+    heated(heat, tuple(replace(pair, shear_limit=np.inf) for pair in model.contacts))
+    heated(replace(heat, yield_drop=0.0, modulus_drop=1e-3), model.contacts)
 
 
 FULL = STRENGTH * LENGTH / HEIGHT

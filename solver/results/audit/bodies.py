@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.system import LEAST
 from solver.model.loads import Displacement
 from solver.results.audit.law import increment_error
 
@@ -127,9 +128,16 @@ class AuditedBody:
 
     @property
     def strength(self) -> float:
-        """The yield stress, or the largest stress of a body that cannot yield [MPa]."""
+        """The yield stress, or the largest stress of a body that cannot yield [MPa].
+
+        At least what is rounding where the body moves, but is not strained.
+        """
         law = self.plain.body.law
-        return float(np.abs(self.stress).max()) if law.elastic else law.yield_stress
+        if not law.elastic:
+            return law.yield_stress
+        u = self._system.displacement(self.name, self._converged.state)
+        rounded = LEAST * law.elasticity.youngs_modulus * self.plain.steepest * np.abs(u).max()
+        return float(max(np.abs(self.stress).max(), rounded))
 
     def law(self) -> tuple[float, float]:
         """Return how far the increment is from its law, and its stress beyond yield [MPa]."""

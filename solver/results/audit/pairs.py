@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.system import LEAST
 from solver.model.model import effective_friction
 from solver.results.audit.surfaces import Surfaces
 
@@ -74,12 +75,21 @@ class AuditedPair:
         closed, area = self._closed & (self.touching.area > 0), self.touching.area
         if not closed.any():
             return 0.0
-        compliance = sum(
-            1 / self._system.model.body(name).material.elasticity.plane_strain_modulus
-            for name in self.bodies
-        )
         pressure = float((self.normal[closed] / area[closed]).max())
-        return pressure * compliance * float(self.touching.edge[closed].sum())
+        return pressure * self._compliance * float(self.touching.edge[closed].sum())
+
+    @property
+    def _compliance(self) -> float:
+        """One over the contact modulus E* [1/MPa]."""
+        moduli = (self._system.model.body(name).material.elasticity for name in self.bodies)
+        return sum(1 / elasticity.plane_strain_modulus for elasticity in moduli)
+
+    @property
+    def rounding(self) -> float:
+        """Gap or slip that is nothing to speak of for the forces that act in the model [mm]."""
+        depth = self.touching.area.sum() / self.touching.edge.sum()
+        closer = self._state.force_scale * self._compliance / depth if depth else 0.0
+        return max(LEAST * closer, self._system.touching)
 
     @property
     def force(self) -> float:
@@ -90,11 +100,10 @@ class AuditedPair:
     def limits(self) -> dict[str, float]:
         """The largest gap and overlap allowed for this pair [mm], and its coarsest contact."""
         edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
-        touching = self._system.touching
-        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()), touching)
+        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()))
         return {
-            "audit_closed_gap": max(_GAP * self.approach, touching),
-            "audit_overlap": overlap,
+            "audit_closed_gap": max(_GAP * self.approach, self.rounding),
+            "audit_overlap": max(overlap, self.rounding),
             "audit_contact_resolution": _COARSE,
         }
 
@@ -167,7 +176,7 @@ class AuditedPair:
         """
         judged = self._closed & self._start.touching & (self.touching.area > 0)
         bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
-        least = _STILL * self.approach
+        least = max(_STILL * self.approach, self.rounding)
         should = float(bound @ np.maximum(np.abs(slip), least))
         if should == 0.0:
             return 0.0

@@ -52,6 +52,11 @@ class PlainBody:
         """(n_element_nodes, 2, n_elements, n_points) [1/mm]."""
         return np.array([np.asarray(b[0].grad) for b in self.part.basis.basis])
 
+    @property
+    def steepest(self) -> float:
+        """Largest strain of an element if one of its nodes moves by a unit [1/mm]."""
+        return float(np.abs(self._gradients).max())
+
     @cached_property
     def _round(self) -> Array:
         """Hoop strain of unit radial displacements (n_element_nodes, n_elements, n_points)."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
+from solver.contact.system import LEAST
 from solver.fem.error import error_estimate
 from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
@@ -89,7 +90,8 @@ def audit(
         "audit_dissipation": least_dissipation,
         "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
     }  # fmt: skip
-    figures |= _strength(system, loaded) | _discretisation(system, states)
+    figures |= _strength(system, loaded)
+    figures |= _discretisation(system, states, loaded.energy.scale)
     largest = max(float(p.accumulated.max(initial=0.0)) for p in states[1].state.plastic)
     violations = _violations(system, figures, loaded, pairs)
     strayed = tuple(text for pair in pairs for text in pair.warnings())
@@ -108,13 +110,13 @@ def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tup
 
 
 def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
-    """Return the work missing in the energy balance / the largest term of the balance."""
+    """Return the work missing in the energy balance / the largest term of the balance so far."""
     work = loaded.energy
     terms = np.array([
         sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
         work.contact, -work.external,
     ])  # fmt: skip
-    level = float(np.abs(terms).max())
+    level = max(float(np.abs(terms).max()), work.scale)
     return abs(float(terms.sum())) / level if level else 0.0
 
 
@@ -133,24 +135,36 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
     return {"audit_surface_shear": shear, "audit_friction_over_strength": friction}
 
 
-def _discretisation(system: System, states: tuple[Converged, Converged]) -> dict[str, float]:
-    """Return the estimated relative errors of stress in the energy norm."""
+def _discretisation(
+    system: System, states: tuple[Converged, Converged], scale: float
+) -> dict[str, float]:
+    """Return the estimated relative errors of stress in the energy norm.
+
+    That of stress whose energy is rounding of the run's is none.
+    """
     names = [body.name for body in system.model.bodies]
     return {
         f"audit_error_{kind}": estimated_error(
-            (system.full(name), system.response(name, converged).stress) for name in names
+            ((system.full(name), system.response(name, converged).stress) for name in names),
+            LEAST**2 * scale,
         )
         for kind, converged in zip(("loaded", "residual"), states, strict=True)
     }
 
 
-def estimated_error(bodies: Iterable[tuple[Discretisation, NDArray[np.float64]]]) -> float:
-    """Return the estimated relative error of the stress of bodies in the energy norm."""
+def estimated_error(
+    bodies: Iterable[tuple[Discretisation, NDArray[np.float64]]], least: float = 0.0
+) -> float:
+    """Return the estimated relative error of the stress of bodies in the energy norm.
+
+    An energy below ``least`` [N mm] counts as that.
+    """
     error, energy = 0.0, 0.0
     for body, stress in bodies:
         here = error_estimate(body, stress)
         error, energy = error + here[0], energy + here[1]
-    return float(np.sqrt(error / energy)) if energy else 0.0
+    level = max(energy, least)
+    return float(np.sqrt(error / level)) if level else 0.0
 
 
 def _violations(

@@ -52,7 +52,7 @@ def random_column(number: int, rng: np.random.Generator) -> Column:
         pressure=min(YIELD * float(rng.choice([1e-6, 0.01, 0.5, 0.9999])), strained),
         state=state,
         element=ELEMENTS[number % 5],
-        thickness=(float(thickness := 10 ** rng.uniform(-3, 3)), float(thickness)),
+        thickness=float(10 ** rng.uniform(-3, 3)),
         heights=(height, height * float(rng.uniform(0.5, 2.0))),
         cells=(cells[0], cells[1]),
         sliding="finite" if finite else "small",

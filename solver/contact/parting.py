@@ -1,0 +1,57 @@
+"""Bodies that overlap before loading, moved apart as a whole where nothing holds them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import nnls
+
+if TYPE_CHECKING:
+    from solver.contact.state import State
+    from solver.contact.system import System
+
+_ROUNDS = 5
+"""Times the motion is found anew: curved surfaces do not move apart along straight lines."""
+_HELD = 1e-9
+"""Residual of the dual problem, below which no motion parts the bodies."""
+
+
+def parted(system: System, state: State) -> State:
+    """Return the state with floating bodies moved until nothing overlaps, else the same state.
+
+    The smallest rigid motion q for which ``gap + A q >= 0`` is that of least distance (Lawson and
+    Hanson 1974, chapter 23): of r, the residual of ``min |E y - f|, y >= 0`` with the rows of
+    ``E' = [A, -gap]`` and f the last unit vector, ``q = -r / r_last``. There is none where r is
+    zero: bodies that are clamped press each other apart.
+    """
+    sizes = [part.rigid.shape[1] for part in system.parts]
+    ends = np.cumsum(sizes)
+    moved = state
+    for _ in range(_ROUNDS):
+        rows, gaps = [], []
+        for interface in system.interfaces:
+            pairing = interface.pairing(moved.u, moved.time)
+            at = np.flatnonzero(np.isfinite(pairing.gap))
+            A = np.zeros((len(at), ends[-1]))
+            for (number, part, chain), block in zip(interface.sides, pairing.normal, strict=True):
+                columns = slice(ends[number] - sizes[number], ends[number])
+                dofs, on = part.pull_back(chain, moved.u[number], block, len(block))
+                A[:, columns] += on[at] @ part.rigid[dofs]
+            rows.append(A)
+            gaps.append(pairing.gap[at])
+        A, gap = np.vstack(rows), np.concatenate(gaps)
+        if not (gap < -system.touching).any():
+            return system.at_rest(moved)
+        scale = float(np.abs(gap).max())
+        E = np.vstack([A.T, -gap / scale])
+        f = np.append(np.zeros(ends[-1]), 1.0)
+        y, _ = nnls(E, f)
+        r = E @ y - f
+        if np.linalg.norm(r) < _HELD:
+            return state
+        q = -scale * r[:-1] / r[-1]
+        each = zip(system.parts, moved.u, np.split(q, ends[:-1]), strict=True)
+        moved = replace(moved, u=tuple(u + part.rigid @ own for part, u, own in each))
+    return state
