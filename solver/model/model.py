@@ -11,6 +11,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.model.body import Body
 from solver.model.rigid import Pushed, RigidBody
+from solver.model.singular import SingularPoint
 
 if TYPE_CHECKING:
     from solver.model.amplitude import Amplitude
@@ -49,8 +50,8 @@ class ContactPair:
         as the bodies move and deform, found anew in every iteration; pressure is then force over
         the deformed area. ``auto`` (default): ``finite`` where either surface is curved or bent
         before loading, ``small`` where both are straight. Small sliding is wrong where surfaces
-        move along each other by more than an element, or curved ones by more than a hundredth of
-        the contact's length; the audit warns
+        move along each other by more than an element, which the audit calls outside small-strain
+        theory, or curved ones by more than a hundredth of the contact's length, of which it warns
     gap : by how much the surfaces stand farther apart than they are meshed [mm]
     interference : by how much they overlap at load factor one, more than they are meshed [mm]: a
         load, which pushes the bodies apart under friction
@@ -95,11 +96,13 @@ class Model:
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
     contacts : pairs of boundaries that may touch
+    singular : points beside which large strain does not put a result outside small-strain theory
     """
 
     bodies: tuple[Body, ...]
     contacts: tuple[ContactPair, ...] = ()
     rigid: tuple[RigidBody, ...] = ()
+    singular: tuple[SingularPoint, ...] = ()
 
     def __post_init__(self) -> None:
         names = [body.name for body in self.bodies] + [body.name for body in self.rigid]
