@@ -42,7 +42,7 @@ FIGURES: Mapping[str, str] = {
     "audit_plastic_strain": "away from singular points",
     "increments": "increments",
     "cut_increments": "cut",
-    "median_iterations": "median iterations",
+    "median_iterations": "median Newton steps",
     "cpu_seconds": "cpu",
 }
 """Variables a table of runs shows, where the scene gives them, and their headings. One over bodies
@@ -66,7 +66,7 @@ def runs_table(dataset: xr.Dataset) -> str:
     """Return a line for each run: where it lies in the sweep, its status, its main figures.
 
     Beside the labels of a linked axis stands what they set. Residual stresses and plastic strain
-    are what contact left; increments, those cut, and the median of Newton's iterations tell how
+    are what contact left; increments, those cut if any, and the median of Newton's steps tell how
     hard it was to find.
     """
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
@@ -105,6 +105,8 @@ def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray, xr.DataAr
         yield name.replace("_", " "), dataset[name], _spoiled(dataset, name)
     for name, heading in FIGURES.items():
         if name not in dataset or (name == _AWAY and "singular" not in dataset.dims):
+            continue
+        if name == "cut_increments" and not (dataset[name] > 0).any():
             continue
         values, spoiled = dataset[name], _spoiled(dataset, name)
         for k in range(values.sizes.get("body", 1)):
