@@ -42,7 +42,6 @@ FIGURES: Mapping[str, str] = {
     "audit_plastic_strain": "away from singular points",
     "increments": "increments",
     "cut_increments": "cut",
-    "median_iterations": "median Newton steps",
     "cpu_seconds": "cpu",
 }
 """Variables a table of runs shows, where the scene gives them, and their headings. One over bodies
@@ -66,8 +65,8 @@ def runs_table(dataset: xr.Dataset) -> str:
     """Return a line for each run: where it lies in the sweep, its status, its main figures.
 
     Beside the labels of a linked axis stands what they set. Residual stresses and plastic strain
-    are what contact left; increments, those cut if any, and the median of Newton's steps tell how
-    hard it was to find.
+    are what contact left; increments, and those cut if any, tell how hard it was to find. What was
+    taken at a singular point is marked.
     """
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
     keys = sum(name == axis for name, axis in places.items())
