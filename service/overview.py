@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ from service.job import Job
 from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
+from studies.definition.vocabulary import taken
 
 KEPT = 100
 """Most answers that are kept."""
@@ -77,7 +78,10 @@ class Details:
 
     def _look_up(self, job: Job, window: Window) -> StudyDetail:
         study = self.jobs.study(job.id)
-        counts = self.store.catalogue.counts(self.jobs.runs(job.id))
+        allow = study.get("allow", [])
+        counts = Counter[str]()
+        for status, number in self.store.catalogue.counts(self.jobs.runs(job.id)).items():
+            counts[taken(status, allow)] += number
         if pending := job.size - sum(counts.values()):
             counts[PENDING] = pending
         axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of a table, its labels
@@ -87,12 +91,12 @@ class Details:
             **_columns(job),
             parameters=study["parameters"],
             sweep=study["sweep"],
-            **{"note": "", "tags": [], "keep": "", **_own_words(study)},
+            **{"note": "", "tags": [], "keep": "", "allow": [], **_own_words(study)},
             counts=counts,
             runs=[
                 StudyRun(
                     id=run_id,
-                    status=rows[run_id]["status"] if run_id in rows else PENDING,
+                    status=taken(rows[run_id]["status"], allow) if run_id in rows else PENDING,
                     message=rows[run_id]["message"] if run_id in rows else "",
                     at=point(axes, position),
                 )
@@ -111,7 +115,7 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
 
 
 def _own_words(study: dict[str, Any]) -> dict[str, Any]:
-    return {name: study[name] for name in ("note", "tags", "keep") if name in study}
+    return {name: study[name] for name in ("note", "tags", "keep", "allow") if name in study}
 
 
 def _columns(job: Job) -> dict[str, Any]:

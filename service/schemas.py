@@ -104,7 +104,10 @@ class StudyDetail(StudySummary):
     note: str = Field(description="what its author wrote of it")
     tags: list[str]
     keep: str = Field(description="``fields`` where the runs keep the fields at the nodes")
-    counts: dict[str, int] = Field(description="runs by status")
+    allow: list[str] = Field(
+        description="``large_strain`` where runs outside small-strain theory are taken as ok"
+    )
+    counts: dict[str, int] = Field(description="runs by status, as the study takes them")
     runs: list[StudyRun] = Field(description="a page of its runs")
 
 

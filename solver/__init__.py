@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import Moved, Pushed, RigidBody
+    from solver.model.singular import SingularPoint
     from solver.results.audit.report import Audit
     from solver.results.record import Record, Status
     from solver.results.solution import Solution, solve
@@ -58,6 +59,7 @@ _HOMES = {
     "RigidBody": "model.rigid",
     "Scene": "scenes",
     "SCENES": "scenes",
+    "SingularPoint": "model.singular",
     "Solution": "results.solution",
     "solve": "results.solution",
     "SolverError": "errors",
@@ -94,6 +96,7 @@ __all__ = [
     "Record",
     "RigidBody",
     "Scene",
+    "SingularPoint",
     "Solution",
     "SolverError",
     "Stage",

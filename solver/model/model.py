@@ -12,6 +12,7 @@ from solver.errors import ModelError
 from solver.model.body import Body
 from solver.model.loads import Temperature
 from solver.model.rigid import Pushed, RigidBody
+from solver.model.singular import SingularPoint
 
 if TYPE_CHECKING:
     from solver.model.amplitude import Amplitude
@@ -51,8 +52,8 @@ class ContactPair:
         as the bodies move and deform, found anew in every iteration. ``auto`` (default): ``finite``
         where either surface is curved or bent before loading, else ``small`` until the surfaces
         have moved too far for it (`solver.contact.drift`). Small sliding is wrong where surfaces
-        move along each other by more than an element, or curved ones by more than a hundredth of
-        the contact's length; the audit warns
+        move along each other by more than an element, which the audit calls outside small-strain
+        theory, or curved ones by more than a hundredth of the contact's length, of which it warns
     gap : by how much the surfaces stand farther apart than they are meshed [mm]
     interference : by how much they overlap at load factor one, more than they are meshed [mm]: a
         load, which pushes the bodies apart under friction
@@ -97,11 +98,13 @@ class Model:
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
     contacts : pairs of boundaries that may touch, of bodies of one thickness
+    singular : points beside which large strain does not put a result outside small-strain theory
     """
 
     bodies: tuple[Body, ...]
     contacts: tuple[ContactPair, ...] = ()
     rigid: tuple[RigidBody, ...] = ()
+    singular: tuple[SingularPoint, ...] = ()
 
     def __post_init__(self) -> None:
         names = [body.name for body in self.bodies] + [body.name for body in self.rigid]

@@ -21,6 +21,12 @@ class Status(Enum):
     LIMIT_LOAD = "there is no equilibrium at this load"
     NOT_CONVERGED = "an increment did not converge"
     AUDIT_FAILED = "the run converged, but its audit found a violated condition"
+    OUTSIDE_THEORY = "the run converged and passed its audit, but strain or sliding is not small"
+
+    @property
+    def solved(self) -> bool:
+        """Whether the run converged and passed its audit, small-strain theory apart."""
+        return self in (Status.OK, Status.OUTSIDE_THEORY)
 
     @property
     def code(self) -> int:

@@ -24,6 +24,7 @@ from annotated_types import Interval, Unit
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.grids import cells
 from solver.model.model import Model
+from solver.model.singular import SingularPoint
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, profiles, surfaces
@@ -56,6 +57,8 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
 }
 """What an accuracy sets; errors: docs/accuracy.md."""
 _LARGEST = 0.08  # of a, under the punch
+_NEAREST = 0.005  # of a: the distance from the corner at which the first published number is read
+_MEETING = 1.5  # sides of an element: how far those reach that meet in the corner, sqrt(2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +104,16 @@ class PunchParameters(ContactParameters):
             largest=_LARGEST * a,
         )
 
+    @property
+    def corner(self) -> SingularPoint:
+        """The corner of the punch.
+
+        Stress is judged from the nearest place at which the publication reads it. There strain
+        settles as the mesh is refined, inside it does not.
+        """
+        radius = max(_NEAREST, _MEETING * self.smallest_element) * self.half_width
+        return SingularPoint(at=(self.half_width, 0.0), radius=radius)
+
     def usual(self) -> Mapping[str, float]:
         """Return the mesh and the increments of an accuracy."""
         return _USUAL[self.accuracy]
@@ -116,7 +129,7 @@ def model(parameters: PunchParameters) -> Model:
         pressure=parameters.yield_stress,
     )
     contact = parameters.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
-    return Model(bodies=bodies, contacts=(contact,))
+    return Model(bodies=bodies, contacts=(contact,), singular=(parameters.corner,))
 
 
 def program(parameters: PunchParameters) -> Program:
@@ -187,7 +200,7 @@ MAX_PLASTIC_STRAIN = {
 }
 FREE_SURFACE = declare("audit_free_surface", "residual stress across the free side / yield stress")
 SELF_EQUILIBRIUM = declare("audit_self_equilibrium", "net residual force on a cut plane, relative")
-_INSIDE = {"half_plane": 0.005, "punch": 0.028}
+_INSIDE = {"half_plane": _NEAREST, "punch": 0.028}
 """Distance from the corner / a, at which residual stress is read, as in the publication."""
 
 

@@ -18,6 +18,7 @@ from solver.results.look import Look, Output, Values
 from solver.results.mesh_fields import mesh_fields
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
+from solver.results.singular_points import singular_points
 from solver.results.view import View
 from solver.scenes.effort import Effort
 
@@ -65,6 +66,8 @@ class Scene:
     advice : for an outcome, what the user can do
     quantities : numbers that only this scene has
     source : digest of the data it was made from, if any; it counts in the ids of runs
+    allow : what every study of it allows: ``large_strain`` takes runs outside small-strain theory
+        as ok
     """
 
     name: str
@@ -86,6 +89,7 @@ class Scene:
     advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
     quantities: tuple[Quantity, ...] = ()
     source: str = ""
+    allow: tuple[str, ...] = ()
 
     def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
         """Yield one record for each value of the branch parameter, in increasing order.
@@ -112,14 +116,15 @@ class Scene:
             messages = (*look.notes, str(look.outcome.error))
             return self._labelled(look, status, messages, cost)
         check = look.check()
+        status = Status.OUTSIDE_THEORY if check.outside else Status.OK
         states = {stage: look.outcome.points[stage] for stage in look.view.stages}
         own = self.warnings(look) if self.warnings else ()
         figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
         found = self._labelled(
             look,
-            Status.OK if check.passed else Status.AUDIT_FAILED,
-            check.violations + look.notes + check.warnings + own,
-            {**cost, **figures, **_merged(look, self.outputs)},
+            status if check.passed else Status.AUDIT_FAILED,
+            check.violations + check.outside + look.notes + check.warnings + own,
+            {**cost, **figures, **_merged(look, (singular_points, *self.outputs))},
         )
         return replace(found, mesh=partial(mesh_fields, look.system, states))
 
@@ -185,7 +190,14 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
             return audit(system, loaded, unloaded, outcome.tally.dissipation)
 
-        yield Look(parameters=run, samples=samples, touch=touch, outcome=outcome, check=check)
+        yield Look(
+            parameters=run,
+            samples=samples,
+            touch=touch,
+            outcome=outcome,
+            check=check,
+            singular=system.model.singular,
+        )
 
 
 def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:

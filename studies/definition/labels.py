@@ -1,18 +1,18 @@
-"""What a study says of itself, and what it keeps, beside the problem and the sweep."""
+"""What a study says of itself, what it keeps and allows, beside the problem and the sweep."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from studies.definition.sweep import checked_text
-from studies.definition.vocabulary import FIELDS
+from studies.definition.vocabulary import FIELDS, LARGE_STRAIN
 from studies.errors import StudyError
 
 _MOST_TAGS, _LONGEST_NOTE = 20, 4000
 
 
 def checked_labels(content: dict[str, Any]) -> dict[str, Any]:
-    """Return those of ``note``, ``tags`` and ``keep`` that a study has.
+    """Return those of ``note``, ``tags``, ``keep`` and ``allow`` that a study has.
 
     Raises
     ------
@@ -23,10 +23,14 @@ def checked_labels(content: dict[str, Any]) -> dict[str, Any]:
         "note": _note(content.get("note", "")),
         "tags": _tags(content.get("tags", [])),
         "keep": content.get("keep", ""),
+        "allow": content.get("allow", []),
     }
     if found["keep"] not in ("", FIELDS):
         allowed = f'must be "{FIELDS}", or absent'
         raise StudyError("keep", found["keep"], allowed)
+    if found["allow"] not in ([], [LARGE_STRAIN]):
+        allowed = f'must be ["{LARGE_STRAIN}"], or absent'
+        raise StudyError("allow", found["allow"], allowed)
     return {name: value for name, value in found.items() if value}
 
 

@@ -31,6 +31,7 @@ from studies.definition.sweep import (
     linked_values,
     owners,
 )
+from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 from studies.toml import read_toml
@@ -50,6 +51,8 @@ class Study(BaseModel):
         and set several parameters by label; see `checked_axes` for their order
     note, tags : words of the user's own, shown with the study; studies can be found by a tag
     keep : ``fields`` keeps the fields at all nodes in the file of each run
+    allow : ``large_strain`` takes runs outside small-strain theory as ok, as `taken` does; what
+        the scene allows is among it
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -61,6 +64,7 @@ class Study(BaseModel):
     note: str = ""
     tags: list[str] = Field(default_factory=list)
     keep: Literal["", "fields"] = ""
+    allow: list[Literal["large_strain"]] = Field(default_factory=list)
     _problem: Scene = PrivateAttr()
 
     @classmethod
@@ -138,7 +142,7 @@ class Study(BaseModel):
         parameters = {
             key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
         }
-        labels = checked_labels(content)
+        labels = checked_labels(content) | ({"allow": [*scene.allow]} if scene.allow else {})
         own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
         return own | labels
 
@@ -162,7 +166,7 @@ class Study(BaseModel):
 
         The name counts, because it is the title of what the study writes: a copy under
         another name is another data set. That costs nothing, since the two share every run. So do
-        note, tags and what is kept, where there are any.
+        note, tags, what is kept and what is allowed, where there are any.
         The order of values counts, and so does that of labels.
         """
         axes = {
@@ -170,7 +174,7 @@ class Study(BaseModel):
             for name, axis in self.sweep.items()
         }
         source = self.expansion.source
-        labels = checked_labels(self.model_dump(include={"note", "tags", "keep"}))
+        labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
         beside = [labels] if labels else []
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
@@ -209,6 +213,10 @@ class Study(BaseModel):
         """Return the value, or the label, of a run of the study on each axis."""
         pairs = zip(self.axes.items(), case.index, strict=True)
         return {name: values[position] for (name, values), position in pairs}
+
+    def taken(self, status: str) -> str:
+        """Return the outcome of a run as this study takes it: ok where it allows large strain."""
+        return taken(status, self.allow)
 
     def paths(self) -> Iterator[LoadingPath]:
         """Yield the loading paths of the study: the cases that one task computes together."""

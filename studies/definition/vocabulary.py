@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,21 @@ STATUSES = (*(status.name.lower() for status in Status), "error", "missing")
 """Outcomes by flag value: the solver's, then a run that broke, then one not computed."""
 
 OK = STATUSES[Status.OK.code]
+OUTSIDE_THEORY = Status.OUTSIDE_THEORY.name.lower()
+SOLVED = tuple(status.name.lower() for status in Status if status.solved)
+"""Outcomes of runs that have their numbers, which another try would not change."""
+
+LARGE_STRAIN = "large_strain"
+"""What a study or a scene may allow: that runs outside small-strain theory are taken as ok."""
+
 ERROR = "error"
 MISSING = "missing"
+
+
+def taken(status: str, allow: Collection[str]) -> str:
+    """Return the outcome of a run as a study takes it that allows this."""
+    return OK if status == OUTSIDE_THEORY and LARGE_STRAIN in allow else status
+
 
 KEEP = "keep"
 """Attribute of a run's file, and entry of a study: what is kept beyond the scene's results."""

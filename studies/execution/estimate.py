@@ -11,7 +11,7 @@ import numpy as np
 
 from studies.definition.cases import LoadingPath
 from studies.definition.study import Study
-from studies.definition.vocabulary import OK
+from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.pace import pace_of
 from studies.storage.store import Store
@@ -158,7 +158,7 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
         ids = (case.id for path in batch for case in path.cases)
-        done = store.catalogue.having(OK, ids, study.keep)
+        done = store.catalogue.having(SOLVED, ids, study.keep)
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing

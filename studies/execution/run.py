@@ -16,7 +16,7 @@ from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
-from studies.definition.vocabulary import KEEP, OK
+from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
@@ -157,9 +157,9 @@ def run_study(
         while some := list(islice(ids, _BATCH)):
             wanted.update(some)
             for run_id, row in store.sound(some).items():
-                ok = row["status"] == OK
+                solved = row["status"] in SOLVED
                 kept = study.keep in ("", row[KEEP])
-                if (ok and kept) or (not ok and resume and row["modified"] >= since):
+                if (solved and kept) or (not solved and resume and row["modified"] >= since):
                     wanted.discard(run_id)
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
@@ -263,8 +263,9 @@ class _Work:
         for row in fresh:
             self.computed.add(row["id"])
             self._tell(
-                "run", path=path, run=row["id"], status=row["status"], message=row["message"]
-            )
+                "run", path=path, run=row["id"], status=self.study.taken(row["status"]),
+                message=row["message"],
+            )  # fmt: skip
 
     def _tell(self, kind: str, **content: Any) -> None:
         self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))

@@ -29,7 +29,10 @@ if TYPE_CHECKING:
     from solver.model.rigid import RigidBody
 
 T = TypeVar("T")
-_BESIDE = ("name", "summary", "parameters.", "derived.", "stages", "loading", "look.", "outputs.")
+_BESIDE = (
+    "name", "summary", "parameters.", "derived.", "stages", "loading", "look.", "outputs.",
+    "singular", "allow",
+)  # fmt: skip
 """Entries of which the bodies and how they are held do not depend."""
 
 
@@ -57,6 +60,7 @@ class Builder:
         What is told of one table hides nothing of the others.
         """
         from solver.model.model import Model
+        from solver.model.singular import SingularPoint
 
         t = self.scene
         laws = {name: self._law(name, table) for name, table in t.materials.items()}
@@ -71,6 +75,7 @@ class Builder:
                 bodies=tuple(filter(None, bodies)),
                 rigid=tuple(filter(None, rigid)),
                 contacts=tuple(filter(None, contacts)),
+                singular=tuple(SingularPoint(**each.model_dump()) for each in t.singular),
             ),
         )
 

@@ -30,6 +30,7 @@ _STAND_INS: dict[Where, _StandIn] = {
     ("loads",): _stand_in(
         "body boundary amplitude", kind="pressure", body="", boundary="", value=0
     ),
+    ("singular",): _stand_in("", at=[0, 0], radius=1.0),
     ("stages",): _stand_in("name", name="stage"),
     ("look", "lines"): _stand_in("body", body=""),
     ("look", "points"): _stand_in("body", body="", at=[0, 0]),

@@ -98,6 +98,7 @@ def _made(description: Description, scene: tables.SceneFile) -> FileScene:
         effort=partial(_effort, description),
         quantities=tuple(q for number in asked(scene) for q in number.quantities),
         source=description.digest,
+        allow=scene.allow,
         description=description,
     )
 

@@ -160,6 +160,13 @@ class Contact(Table):
     amplitude: Amplitude | None = None
 
 
+class Singular(Table):
+    """A point at which strain has no bound; see `solver.SingularPoint`."""
+
+    at: Place
+    radius: Length
+
+
 class Stage(Table):
     """A part of the loading, in equal increments.
 
@@ -284,6 +291,8 @@ class SceneFile(Table):
     bodies: Annotated[dict[Label, Body], Field(min_length=1)]
     rigid: dict[Label, Rigid] = Field(default_factory=dict)
     contacts: tuple[Contact, ...] = ()
+    singular: tuple[Singular, ...] = ()
+    allow: tuple[Literal["large_strain"], ...] = ()
     loads: tuple[Load, ...] = ()
     stages: tuple[Stage, ...] = ()
     loading: Loading | None = None

@@ -110,14 +110,14 @@ class Catalogue:
             )
             return dict(found.fetchall())
 
-    def having(self, status: str, run_ids: Iterable[str], keep: str = "") -> set[str]:
-        """Return those of `run_ids` that have this status, and keep what is to be kept."""
-        wanted = json.dumps(list(run_ids))
+    def having(self, statuses: Iterable[str], run_ids: Iterable[str], keep: str = "") -> set[str]:
+        """Return those of `run_ids` that have such a status, and keep what is to be kept."""
+        wanted, these = json.dumps(list(run_ids)), json.dumps(list(statuses))
         with self._reading() as connection:
             found = connection.execute(
-                "SELECT id FROM runs WHERE id IN (SELECT value FROM json_each(?)) AND status = ? "
-                "AND ? IN ('', keep)",
-                [wanted, status, keep],
+                "SELECT id FROM runs WHERE id IN (SELECT value FROM json_each(?)) "
+                "AND status IN (SELECT value FROM json_each(?)) AND ? IN ('', keep)",
+                [wanted, these, keep],
             )
             return {row[0] for row in found}
 

@@ -62,7 +62,8 @@ def _combined(
         with opened(store.run_path(run_id)) as run:
             frame.learn(run, at)
             code, message = (frame.small[name][0][at] for name in ("status", "message"))
-            outcomes[run_id] = STATUSES[code], str(message)
+            outcomes[run_id] = study.taken(STATUSES[code]), str(message)
+            frame.small["status"][0][at] = STATUSES.index(outcomes[run_id][0])
             ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))

@@ -51,11 +51,12 @@ def held(study: Study, store: Store) -> tuple[str, Combined]:
         for run_id in some:
             row = rows.get(run_id, {"status": MISSING})
             digest.update(f"{run_id} {row.get('size')} {row.get('modified')}\n".encode())
-            counts[row["status"]] += 1
-            if row["status"] == MISSING:
+            status = study.taken(row["status"])
+            counts[status] += 1
+            if status == MISSING:
                 missing.append(run_id)
-            elif row["status"] != OK:
-                failed.append((run_id, row["status"], row["message"]))
+            elif status != OK:
+                failed.append((run_id, status, row["message"]))
     path = store.dataset_path(study.id)
     ended = Combined(path=path, counts=dict(counts), failed=failed, missing=missing, anew=False)
     return digest.hexdigest(), ended

@@ -39,9 +39,9 @@ FIGURES: Mapping[str, str] = {
     "apparent_power": "apparent power",
     "peak_contact_pressure": "peak contact pressure",
     "max_plastic_strain": "largest plastic strain",
+    "audit_plastic_strain": "away from singular points",
     "increments": "increments",
     "cut_increments": "cut",
-    "median_iterations": "median iterations",
     "cpu_seconds": "cpu",
 }
 """Variables a table of runs shows, where the scene gives them, and their headings. One over bodies
@@ -50,6 +50,13 @@ and components has a column for the first component of each body."""
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
 """A number in a message, not the digits of a name."""
+_AWAY = "audit_plastic_strain"
+_MARK = "*"
+_FOOTNOTE = (
+    f"\n{_MARK} taken at a singular point, where strain has no bound: a number of the mesh, which "
+    "need not settle\n  as the mesh is refined\n"
+)
+
 NAMED = 4
 """Most runs that are named for a message; the rest are counted."""
 
@@ -58,8 +65,8 @@ def runs_table(dataset: xr.Dataset) -> str:
     """Return a line for each run: where it lies in the sweep, its status, its main figures.
 
     Beside the labels of a linked axis stands what they set. Residual stresses and plastic strain
-    are what contact left; increments, those cut, and the median of Newton's iterations tell how
-    hard it was to find.
+    are what contact left; increments, and those cut if any, tell how hard it was to find. What was
+    taken at a singular point is marked.
     """
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
     keys = sum(name == axis for name, axis in places.items())
@@ -67,34 +74,61 @@ def runs_table(dataset: xr.Dataset) -> str:
     headings = [
         *(name.replace("_", " ") for name in places),
         "status",
-        *(heading for heading, _ in figures),
+        *(heading for heading, *_ in figures),
     ]
-    units = [*(_unit(dataset[name]) for name in places), "", *(_unit(each) for _, each in figures)]
+    units: list[str] = [_unit(dataset[name]) for name in places]
+    units += ["", *(_unit(each) for _, each, _ in figures)]
     values = {name: dataset[name].to_numpy() for name in (*places, "status")}
-    numbers = [each.to_numpy() for _, each in figures]
-    rows = []
+    cells = [_cells(each, spoiled) for _, each, spoiled in figures]
+    rows: list[list[str]] = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
         where = [value_text(values[name][place[axis]]) for name, axis in places.items()]
         status = STATUSES[values["status"][at]]
-        rows.append([*where, status, *(value_text(each[at]) for each in numbers)])
-    return in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
+        rows.append([*where, status, *(str(each[at]) for each in cells)])
+    table = in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
+    marked = any(spoiled.any() for *_, spoiled in figures)
+    return f"{table}\n{_FOOTNOTE}" if marked else table
 
 
-def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
-    """Yield the heading of each figure that the runs have, and its values over the sweep."""
+def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:
+    """Return the texts of a column, those of numbers at a singular point marked."""
+    end = np.where(spoiled, _MARK, " " if spoiled.any() else "")
+    texts = np.vectorize(value_text, otypes=[object])(values)
+    return np.asarray(texts + end.astype(object))
+
+
+def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray, xr.DataArray]]:
+    """Yield each figure that the runs have: heading, values, which are at a singular point."""
     for name in _own(dataset):
-        yield name.replace("_", " "), dataset[name]
+        yield name.replace("_", " "), dataset[name], _spoiled(dataset, name)
     for name, heading in FIGURES.items():
-        if name not in dataset:
+        if name not in dataset or (name == _AWAY and "singular" not in dataset.dims):
             continue
-        values = dataset[name]
-        if "component" in values.dims:
-            values = values.isel(component=0)
+        if name == "cut_increments" and not (dataset[name] > 0).any():
+            continue
+        values, spoiled = dataset[name], _spoiled(dataset, name)
         for k in range(values.sizes.get("body", 1)):
-            each = values.isel(body=k) if "body" in values.dims else values
+            one = {"body": k, "component": 0}
+            each = values.isel(one, missing_dims="ignore")
             words = {c: str(each[c].item()) for c in ("body", "component") if c in each.coords}
-            yield heading.format(**words).replace("_", " "), each
+            told = heading.format(**words).replace("_", " ")
+            yield told, each, spoiled.isel(one, missing_dims="ignore")
+
+
+def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Return where a figure was taken at a singular point, as far as its place is known."""
+    if "singular" not in dataset.dims:
+        return xr.zeros_like(dataset[name], dtype=bool)
+    if name == "max_plastic_strain":
+        return dataset[name] > dataset[_AWAY]
+    for axes in (("x", "y"), ("s",)):
+        if all(f"{name}_{axis}" in dataset for axis in axes):
+            off = [dataset[f"{name}_{axis}"] - dataset[f"singular_{axis}"] for axis in axes]
+            far = sum((each**2 for each in off[1:]), off[0] ** 2) ** 0.5
+            near = (far <= dataset["singular_radius"]).any("singular")
+            return near.transpose(*dataset[name].dims)
+    return xr.zeros_like(dataset[name], dtype=bool)
 
 
 def _own(dataset: xr.Dataset) -> list[str]:

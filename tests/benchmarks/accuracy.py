@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import SCENES, Record, Status
+from solver import SCENES, Record
 from solver.scenes.punch import PunchParameters
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import _rim
@@ -128,6 +128,6 @@ def _run(problem: Problem, parameters: Any) -> Record:
     _rim.cache_clear()
     scene = SCENES[problem.scene]
     (record,) = scene.path(parameters, [getattr(parameters, scene.branch)], lambda share: None)
-    if record.status is not Status.OK:
+    if not record.status.solved:
         raise RuntimeError(f"{record.status.name}: {record.message} ({parameters})")
     return record

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver import SCENES, Record, Status
+from solver import SCENES, Record
 from solver.linear import pardiso
 from solver.scenes.punch import PunchParameters
 from tests.benchmarks.measure import Point, timed
@@ -179,7 +179,7 @@ def _run(parameters: PunchParameters, linear_solver: str, repeats: int) -> Point
 
 def _walk(parameters: PunchParameters) -> Record:
     (record,) = SCENES["punch"].path(parameters, [parameters.load_ratio], lambda share: None)
-    if record.status is not Status.OK:
+    if not record.status.solved:
         raise RuntimeError(f"{record.status.name}: {record.message} ({parameters})")
     return record
 

@@ -127,6 +127,25 @@ def test_a_part_beyond_the_end_is_refused_with_the_length(
     assert answer.headers["content-range"] == f"bytes */{size}"
 
 
+def test_a_study_may_allow_large_strain_and_its_runs_keep_their_own_status(
+    service: Server,
+) -> None:
+    study = fake_study("large", behaviour="large")
+    strict = service.finished(service.post(study))
+    assert (strict["status"], strict["counts"]) == ("failed", {"outside_theory": 4})
+    before = len(service.computed())
+    lenient = service.finished(service.post({**study, "allow": ["large_strain"]}))
+    assert (lenient["status"], lenient["counts"]) == ("successful", {"ok": 4})
+    assert (strict["allow"], lenient["allow"]) == ([], ["large_strain"])
+    assert {run["status"] for run in lenient["runs"]} == {"ok"}
+    assert len(service.computed()) == before, "their runs are the same"
+    found = service.client.get("/runs", params={"status": "outside_theory"}).json()
+    assert found["total"] == 4
+    wrong = service.client.post("/studies", json={**study, "allow": ["everything"]})
+    assert wrong.status_code == 422
+    assert wrong.json()["errors"][0]["field"] == "allow"
+
+
 def test_events_tell_the_story_to_its_end(service: Server) -> None:
     study_id = service.post(fake_study("story", seconds=0.3))
     with service.client.stream("GET", f"/studies/{study_id}/events") as stream:

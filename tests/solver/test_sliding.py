@@ -89,13 +89,17 @@ def slid(way: float, sliding: str = "auto") -> Solution:
     return solve(Model(bodies=(block(),), rigid=(plate(STRAIGHT, way),), contacts=(pair,)))
 
 
-def test_surfaces_that_slide_by_more_than_an_element_are_warned_of() -> None:
-    """Elements of 0.5 mm."""
-    (text,) = slid(0.8, "small").audit().warnings
-    assert text.startswith("block.top moved 0.8 mm along plate.base: 1.6 sides of an element")
+def test_surfaces_that_slide_by_more_than_an_element_are_outside_small_sliding() -> None:
+    """Elements of 0.5 mm; the plate is from -2 to 2, and ends press most."""
+    audit = slid(0.8, "small").audit()
+    (text,) = audit.outside
+    assert text.startswith("block.top moved 0.8 mm along plate.base, mostly at (")
+    assert ": 1.6 sides of an element" in text
     assert text.endswith('give this pair sliding = "finite"')
-    assert slid(0.1, "small").audit().warnings == ()
-    assert slid(0.8, "finite").audit().warnings == ()
+    assert audit.figures["audit_small_sliding"] == pytest.approx(1.6, rel=0.05)
+    assert audit.passed and audit.warnings == ()
+    for within in (slid(0.1, "small").audit(), slid(0.8, "finite").audit()):
+        assert within.outside == within.warnings == ()
 
 
 @pytest.mark.parametrize("way", [0.01, 0.8, 9.0])

@@ -36,7 +36,7 @@ class FakeParameters:
     seconds: Annotated[float, Interval(ge=0.0), Unit("s")] = described(0.0, "duration of a path")
     state: Literal["plane_strain", "plane_stress"] = described("plane_stress", "out of plane")
     trouble: Literal[
-        "none", "warn", "limit", "raise", "short", "die", "die_once", "bare", "unwritable"
+        "none", "warn", "large", "limit", "raise", "short", "die", "die_once", "bare", "unwritable"
     ] = described("none", "what goes wrong at load_ratio 0.8 and above")
     mark: str = described("", "directory that counts how often a path was begun")
 
@@ -96,6 +96,8 @@ def troubled(run: FakeParameters) -> Record:
         )  # fmt: skip
     if run.trouble == "warn":
         return replace(record(run), message="strains are large")
+    if run.trouble == "large":
+        return replace(record(run), status=Status.OUTSIDE_THEORY, message="strain reaches 14%")
     if run.trouble == "unwritable" and run.load_ratio < 1.0:
         return replace(record(run), fields={"residual_stress": (("nowhere",), np.zeros(1))})
     if run.trouble == "bare":

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solver import SCENES, Status
+from solver import SCENES
 from solver.scenes.rolling_parameters import RollingParameters
 
 TABLE = Path(__file__).parents[2] / "data" / "studies" / "rolling-table.toml"
@@ -39,7 +39,7 @@ def passes(case):
 def after(case, number=1):
     """The record of a case after a pass."""
     record = passes(case)[number - 1]
-    assert record.status is Status.OK, record.message
+    assert record.status.solved, record.message
     return record
 
 

@@ -267,6 +267,20 @@ def test_the_finite_half_plane_costs_an_error_that_falls_with_its_size():
     assert 0.35 < second / first < 0.7
 
 
+def test_strain_settles_away_from_the_corner_and_not_at_it():
+    """From elements of 0.002 a to half of these; the corner reaches over 0.005 a.
+
+    It goes from 0.0407 to 0.0383: strain falls as 1/r there, and the first points beyond the radius
+    lie by a part of an element farther or nearer.
+    """
+    load = {"load_ratio": 0.8571, "friction": 0.4, "hardening": "isotropic"}
+    coarse, fine = (press(smallest_element=element, **load) for element in (2e-3, 1e-3))
+    away = [run.solution.audit().figures["audit_plastic_strain"] for run in (coarse, fine)]
+    assert away[1] == pytest.approx(away[0], rel=0.1)
+    assert max(fine.yielded.values()) > 1.2 * max(coarse.yielded.values())
+    assert away[1] < 0.1 < max(fine.yielded.values())
+
+
 def test_the_scene_records_what_the_solution_holds():
     parameters = PunchParameters(
         friction=0.4, hardening="isotropic", smallest_element=4e-3, half_plane_size=16.0

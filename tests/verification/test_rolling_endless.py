@@ -186,6 +186,19 @@ def test_the_audit_finds_what_is_wrong(broken, figure):
     assert any(text.startswith(figure) for text in violations), violations
 
 
+def test_a_pass_whose_surface_strains_by_more_than_a_tenth_is_outside_theory():
+    """The surface has a row of its own, which may strain more than all points below it."""
+    parameters, track, found = one_pass(traction=0.3)
+    within = audit_pass(track, parameters.linear_material(), found)
+    assert within.outside == ()
+    largest = found.after.whole.accumulated.max()
+    assert within.figures["audit_plastic_strain"] == pytest.approx(largest, rel=1e-12)
+    sheared = replace(found.after.top, accumulated=np.array([0.14]))
+    beyond = replace(found, after=replace(found.after, surface=sheared))
+    (told,) = audit_pass(track, parameters.linear_material(), beyond).outside
+    assert "strain reaches 14% in half_space at (0, 0): small-strain theory does not hold" in told
+
+
 @pytest.mark.parametrize(
     ("fields", "name"),
     [

@@ -62,6 +62,13 @@ _DECLARED = [
         "difference between the strain that material meets in a steady pass and that of "
         "equilibrium, its deviator times 2 G / yield stress",
     ),
+    declare(
+        "audit_plastic_strain", "largest equivalent plastic strain away from singular points"
+    ),
+    declare(
+        "audit_small_sliding",
+        "motion along the partner that small sliding leaves out / side of an element",
+    ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),
 ]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,10 +27,6 @@ _GAP = 2e-3
 """Largest gap allowed / elastic approach."""
 _OVERLAP = (0.02, 2.5e-3)
 """Largest overlap allowed / elastic approach, and / side of an element; the larger one counts."""
-_STRAY = (1.0, 0.01, 5e-3)
-"""What small sliding may leave out: motion along the partner / side of an element and, where a
-surface is curved, / length of the contact; error of the gap / elastic approach. Means weighted with
-the force."""
 _COARSE = 0.36
 """Largest edge allowed / width of the contact of curved surfaces: three vertices across it, which
 tell Hertz's pressure to 4 %."""
@@ -38,6 +34,29 @@ _LITTLE = 0.01
 """Force / force level, below which it does not count how well a contact is resolved."""
 _STILL = 1e-3
 """Least slip / elastic approach, in the work that wrong slip is compared with."""
+
+
+class Stray(NamedTuple):
+    """What small sliding leaves out, means weighted with the force.
+
+    Attributes
+    ----------
+    way : motion along the partner [mm]; ``sides`` the same / side of an element, ``length`` the
+        same / length of the contact
+    off : error of the gap / elastic approach
+    x, y : where most of the motion is [mm]
+    """
+
+    way: float
+    sides: float
+    length: float
+    off: float
+    x: float
+    y: float
+
+
+_STRAY = Stray(way=np.inf, sides=1.0, length=0.01, off=5e-3, x=np.nan, y=np.nan)
+"""What it may leave out; of the length of the contact where a surface is curved."""
 
 
 class AuditedPair:
@@ -107,23 +126,49 @@ class AuditedPair:
             "audit_contact_resolution": _COARSE,
         }
 
-    def warnings(self) -> tuple[str, ...]:
-        """Return what small sliding leaves out, where it matters."""
+    @cached_property
+    def stray(self) -> Stray | None:
+        """What small sliding leaves out; None where nothing slides, or sliding is finite."""
         if self.surfaces.finite or self.force <= 0.0:
-            return ()
+            return None
         share = np.where(self._closed, self.normal, 0.0) / self.force
         edge, touching = self.touching.edge, self.touching
-        way = float(np.abs(np.nan_to_num(touching.way)) @ share)
-        sides, length = way / float(edge @ share), way / float(edge[self._closed].sum())
+        moved = np.abs(np.nan_to_num(touching.way)) * share
+        way = float(moved.sum())
         off = float(np.abs(np.nan_to_num(touching.true_gap - touching.gap)) @ share)
-        found = (sides, length if self.surfaces.curved else 0.0, off / (self.approach or np.inf))
-        if all(value <= limit for value, limit in zip(found, _STRAY, strict=True)):
+        slave = self.surfaces.slave
+        x, y = slave.X[:, slave.vertices[moved.argmax()]]
+        return Stray(
+            way=way,
+            sides=way / float(edge @ share),
+            length=way / float(edge[self._closed].sum()),
+            off=off / (self.approach or np.inf),
+            x=float(x),
+            y=float(y),
+        )
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        """What small sliding leaves out, where that is more than the side of an element."""
+        stray = self.stray
+        return (self._told(stray),) if stray and stray.sides > _STRAY.sides else ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What small sliding leaves out, where that is less and yet matters."""
+        stray = self.stray
+        if not stray or self.outside:
             return ()
+        far = self.surfaces.curved and stray.length > _STRAY.length
+        return (self._told(stray),) if far or stray.off > _STRAY.off else ()
+
+    def _told(self, stray: Stray) -> str:
         slave, master = (".".join(side) for side in (self._pair.slave, self._pair.master))
         return (
-            f"{slave} moved {way:.2g} mm along {master}: {sides:.2g} sides of an element, "
-            f"{length:.1%} of the length of contact; gaps differ by {found[2]:.1%} of the elastic "
-            'approach. Small sliding leaves this out: give this pair sliding = "finite"',
+            f"{slave} moved {stray.way:.2g} mm along {master}, mostly at ({stray.x:z.4g}, "
+            f"{stray.y:z.4g}): {stray.sides:.2g} sides of an element, {stray.length:.1%} of the "
+            f"length of contact; gaps differ by {stray.off:.1%} of the elastic approach. Small "
+            'sliding leaves this out: give this pair sliding = "finite"'
         )
 
     @property

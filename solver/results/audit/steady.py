@@ -17,6 +17,7 @@ from solver.results.audit.report import (
     limits_at,
     warnings,
 )
+from solver.results.audit.theory import Strained, largest_strain
 from solver.steady import Touching
 from solver.steady.fields import of_layers, under_load
 from solver.steady.flow import INFLOW, LEAST
@@ -47,7 +48,7 @@ def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
     held.ravel()[track.part.free] = False
     lacking = plain.forces(stress) - load
     level = float(np.abs(load).sum(axis=0).max()) or 1.0
-    way = _Way(track, material, found)
+    way, strain = _Way(track, material, found), _strain(track, found)
     figures = {
         "audit_residual": float(np.linalg.norm(lacking[~held])) / level,
         "audit_reactions": _largest(abs((load + np.where(held, lacking, 0)).sum(axis=0))) / level,
@@ -60,11 +61,23 @@ def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
         "audit_contact_after_unloading": float(np.linalg.norm(plain.forces(residual)[~held])),
         "audit_error_loaded": estimated_error([(track.part, stress)]),
         "audit_error_residual": estimated_error([(track.part, residual)]),
+        "audit_plastic_strain": strain.value,
         **_of_contact(material, found),
     }
     limits = {name: at for name, at in (limits_at(level) | _LIMITS).items() if name in figures}
-    violations = broken(figures, limits, material.yield_stress)
-    return Audit(figures, violations, warnings(figures, float(left.plastic.accumulated.max())))
+    return Audit(
+        figures,
+        violations=broken(figures, limits, material.yield_stress),
+        warnings=warnings(figures),
+        outside=strain.outside,
+    )
+
+
+def _strain(track: Track, found: Pass) -> Strained:
+    """Return the largest strain that the pass leaves; it is the same all along x."""
+    layers = found.after.whole
+    places = np.stack([np.zeros_like(layers.depth), -layers.depth])
+    return largest_strain([(track.part.body.name, places, layers.accumulated)])
 
 
 class _Way:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Transform
 
 from studies.definition.cases import USUAL_AXES
-from studies.definition.vocabulary import OK, STATUSES
+from studies.definition.vocabulary import OK, OUTSIDE_THEORY, STATUSES
 from studies.errors import StudyError
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.captions import words
@@ -63,6 +63,7 @@ _FAILED = Kind(name="failed or missing", marker="x")
 _ABSENT = {
     OK: Kind(name="no value", marker="."),
     "limit_load": Kind(name="no equilibrium", marker="s", filled=False),
+    OUTSIDE_THEORY: Kind(name="outside small-strain theory", marker="^", filled=False),
 }
 """Runs without a value by status; others are `_FAILED`."""
 

@@ -41,7 +41,7 @@ class FakeParameters:
     seconds: Annotated[float, Interval(ge=0.0, le=60.0), Unit("s")] = field(
         default=0.0, metadata={"description": "time one run takes"}
     )
-    behaviour: Literal["good", "limit", "raise", "die", "hang"] = field(
+    behaviour: Literal["good", "large", "limit", "raise", "die", "hang"] = field(
         default="good", metadata={"description": "how runs end"}
     )
 
@@ -79,7 +79,7 @@ def record(parameters: FakeParameters) -> Record:
     stress[:, -1, 0] = np.nan
     return Record(
         parameters=parameters,
-        status=Status.OK,
+        status=Status.OUTSIDE_THEORY if parameters.behaviour == "large" else Status.OK,
         coordinates={"x": x, "y": y, "component": np.array(["xx", "yy", "zz", "xy"])},
         fields={
             "residual_stress": (("component", "y", "x"), stress),

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver import Status
 from tests.stability.trial import Figure
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ class Passed:
 def judge(passed: Passed) -> dict[str, Figure]:
     """Return the figures."""
     record = passed.record
-    if record.status is not Status.OK:
+    if not record.status.solved:
         return {"audit": Figure(1.0, 0.0)}
     own = passed.parameters.of_pass(len(record.coordinates["pass"]) - 1)
     found = {
@@ -216,7 +215,7 @@ def _others(passed: Passed) -> dict[str, Figure]:
 
 def _apart(passed: Passed, other: Record, stress: float, *, mirrored: bool) -> float:
     """Return the largest difference of residual stress and contact pressure / yield stress."""
-    if other.status is not Status.OK:
+    if not other.status.solved:
         return float("inf")
     one = passed.record
     sign = np.array([1.0, 1.0, 1.0, -1.0 if mirrored else 1.0])[:, None]

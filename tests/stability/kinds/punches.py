@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from solver import Outcome, Record, Status, System
+from solver import Outcome, Record, System
 from solver.scenes.punch import PUNCH, PunchParameters
 from tests.stability.kinds.collapse import BLOCK_SIZE, PUNCH_HEIGHT, collapse
 from tests.stability.kinds.draws import changed
@@ -100,7 +100,7 @@ def press(parameters: PunchParameters) -> Pressed:
 
 def _figures(pressed: Pressed) -> dict[str, Figure]:
     found = judge(pressed.parameters, pressed.system, pressed.outcome)
-    audit = Figure(float(pressed.record.status is not Status.OK), 0.0)
+    audit = Figure(float(not pressed.record.status.solved), 0.0)
     return {"audit": audit} | {name: Figure(found[name], LIMITS[name]) for name in LIMITS}
 
 

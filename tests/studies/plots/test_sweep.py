@@ -86,7 +86,8 @@ def test_every_run_has_the_mark_of_its_state_at_its_load_and_friction() -> None:
 
 def test_a_run_without_success_is_marked_by_its_status_whatever_it_holds() -> None:
     dataset = swept(hardening=("none",))
-    named = {(1, 2): "limit_load", (2, 0): "missing", (0, 3): "audit_failed"}
+    named = {(1, 2): "limit_load", (2, 0): "missing", (0, 3): "audit_failed",
+             (2, 2): "outside_theory"}  # fmt: skip
     for (row, column), status in named.items():
         dataset["status"][0, row, column] = STATUSES.index(status)
     dataset["shakedown_state"][0, 1, 1] = np.nan
@@ -95,6 +96,7 @@ def test_a_run_without_success_is_marked_by_its_status_whatever_it_holds() -> No
     assert marks["no equilibrium"] == {(0.5, 1.2)}
     assert marks["failed or missing"] == {(0.0, 2.4), (0.3, 1.8)}
     assert marks["no value"] == {(0.2, 1.2)}
+    assert marks["outside small-strain theory"] == {(FRICTIONS[2], RATIOS[2])}
     assert sum(map(len, marks.values())) == RATIOS.size * FRICTIONS.size
     assert {"no equilibrium", "failed or missing", "no value"} < set(legend_of(sheet))
     statuses = marks_of(sweep_figure(dataset, "status").axes[0])

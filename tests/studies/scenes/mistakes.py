@@ -291,6 +291,17 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "rigid.plate.x",
         "not both",
     ),
+    "singular without radius": (
+        put("singular", [{"at": [0.0, 0.0]}]),
+        "singular[0].radius",
+        "must be given",
+    ),
+    "singular of no size": (
+        put("singular", [{"at": [0.0, 0.0], "radius": 0.0}]),
+        "singular[0].radius",
+        "greater than 0",
+    ),
+    "allowed what is nothing": (put("allow", ["everything"]), "allow[0]", "large_strain"),
     "rigid without surface": (rigid(surfaces={}), "rigid.plate.surfaces", "1 or more"),
     "rigid of one name": (
         lambda t: rigid()(t) or t["rigid"].update(upper=t["rigid"].pop("plate")),

@@ -54,6 +54,21 @@ def test_a_block_under_pressure_has_the_stress_of_the_pressure(scene: FileScene)
     assert stress.shape == (1, 1, 4, 11)
 
 
+def test_a_file_declares_singular_points_and_what_is_allowed() -> None:
+    """Expressions and all; a study of the scene allows what its file does."""
+    tables = blocks()
+    assert built(tables).allow == ()
+    tables["allow"] = ["large_strain"]
+    tables["singular"] = [{"at": [0.0, "$wide"], "radius": "$side/2"}]
+    scene = built(tables)
+    assert scene.allow == ("large_strain",)
+    assert Study.from_dict({"name": "own", "sweep": {"mu": [0.1]}}, scene=scene).allow
+    (point,) = scene.model(scene.parameters(wide=8.0)).singular
+    assert (point.at, point.radius) == ((0.0, 8.0), 1.0)
+    record = run(scene)
+    assert record.fields["singular_radius"][1] == pytest.approx([0.5])
+
+
 def test_parameters_check_themselves(scene: FileScene) -> None:
     with pytest.raises(ModelError, match="mu = -1"):
         scene.parameters(mu=-1.0)
@@ -121,6 +136,7 @@ def test_a_scene_and_its_parameters_reach_other_processes(scene: FileScene) -> N
     [
         ("value = 150.0", "value = 151.0", False),
         ('default = 0.2', "default = 0.3", False),
+        ('summary =', 'allow = ["large_strain"]\nsummary =', False),
         ('description = "friction"', 'description = "the friction"', True),
         ('summary = "a block', 'summary = "one block', True),
         ("increments = 2", "increments = 2  # few", True),

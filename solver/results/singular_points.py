@@ -1,0 +1,36 @@
+"""The singular points of a model, stored with a run: numbers taken beside them are the mesh's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.quantities import declare
+
+if TYPE_CHECKING:
+    from solver.results.look import Look, Values
+
+_EACH = ("singular",)
+SINGULAR = declare("singular", "number of the singular point", "", dims=_EACH)
+SINGULAR_X = declare("singular_x", "position of the singular point along x", "mm", dims=_EACH)
+SINGULAR_Y = declare("singular_y", "position of the singular point along y", "mm", dims=_EACH)
+SINGULAR_S = declare(
+    "singular_s", "distance along the surface from its middle of the singular point", "mm",
+    dims=_EACH,
+)  # fmt: skip
+SINGULAR_RADIUS = declare("singular_radius", "how far the singular point reaches", "mm", dims=_EACH)
+
+
+def singular_points(look: Look) -> Values:
+    """Return places and radii of the singular points; nothing where there is none."""
+    if not look.singular:
+        return {}
+    X = np.array([point.at for point in look.singular]).T
+    return {
+        SINGULAR: np.arange(len(look.singular)),
+        SINGULAR_X: X[0],
+        SINGULAR_Y: X[1],
+        SINGULAR_S: look.view.axis.reached(X),
+        SINGULAR_RADIUS: np.array([point.radius for point in look.singular]),
+    }

@@ -1,0 +1,136 @@
+"""Runs outside small-strain theory: told with body, place and value, unless strain is singular."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import (
+    SCENES,
+    Audit,
+    Body,
+    Displacement,
+    Material,
+    Model,
+    ModelError,
+    Record,
+    SingularPoint,
+    Status,
+    solve,
+)
+from solver.mesh import grid
+from solver.results.audit.theory import LARGE_STRAIN, largest_strain
+from solver.scenes import Scene
+
+SOFT = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=200.0,
+                hardening="isotropic", hardening_ratio=0.01)  # fmt: skip
+
+
+def pulled(strain: float, singular: tuple[SingularPoint, ...] = ()) -> Audit:
+    """A bar from x = 1 to 5, drawn out evenly and pushed back: half of its plastic strain each."""
+    bar = Body(
+        name="bar",
+        mesh=grid(np.linspace(1.0, 5.0, 5), np.linspace(0.0, 1.0, 3)),
+        material=SOFT,
+        kinematics="plane_stress",
+        supports={"left": "x", "bottom": "y"},
+        loads=(Displacement(boundary="right", x=4.0 * strain / 2),),
+    )
+    return solve(Model(bodies=(bar,), singular=singular)).audit()
+
+
+def test_plastic_strain_beyond_a_tenth_is_outside_with_body_place_and_value() -> None:
+    """By hand: the yield strain is 0.001, plastic modulus over Young's modulus h = 0.01 / 0.99."""
+    audit = pulled(0.16)
+    (told,) = audit.outside
+    assert told.startswith("equivalent plastic strain reaches 15% in bar at (")
+    assert "small-strain theory does not hold there" in told
+    h = 0.01 / 0.99
+    out = (0.08 - 0.001) / (1 + h)
+    back = (0.08 - 0.002 - 2 * h * out) / (1 + h)
+    assert audit.figures["audit_plastic_strain"] == pytest.approx(out + back, rel=1e-6)
+    assert audit.passed, "the equations are solved as they should be"
+
+
+def test_plastic_strain_below_a_tenth_is_within_theory() -> None:
+    audit = pulled(0.09)
+    assert audit.outside == ()
+    assert 0.08 < audit.figures["audit_plastic_strain"] < LARGE_STRAIN
+
+
+def test_large_strain_at_a_singular_point_does_not_count() -> None:
+    everywhere = SingularPoint(at=(3.0, 0.5), radius=3.0)
+    assert pulled(0.16, (everywhere,)).outside == ()
+    beside = SingularPoint(at=(1.0, 0.0), radius=1.5)
+    assert pulled(0.16, (beside,)).outside
+
+
+def test_the_largest_strain_is_that_of_all_bodies_away_from_singular_points() -> None:
+    X = np.array([[0.0, 1.0, 2.0], [0.0, 0.0, -1.0]])
+    bodies = [("a", X, np.array([9.0, 0.1, 0.2])), ("b", X, np.array([8.0, 0.3, 0.1]))]
+    found = largest_strain(bodies, [SingularPoint(at=(0.0, 0.0), radius=0.5)])
+    assert found == (0.3, "b", 1.0, 0.0)
+    assert largest_strain(bodies)[:2] == (9.0, "a")
+
+
+@pytest.mark.parametrize(
+    ("field", "wrong"), [("at", (math.nan, 0.0)), ("radius", 0.0), ("radius", math.inf)]
+)
+def test_a_singular_point_has_a_place_and_a_radius(field: str, wrong: object) -> None:
+    given = {"at": (0.0, 0.0), "radius": 1.0}
+    with pytest.raises(ModelError, match=f"^{field} = "):
+        SingularPoint(**{**given, field: wrong})
+
+
+def punch(**fields: object) -> Record:
+    parameters = SCENES["punch"].parameters(
+        accuracy="draft", load_ratio=0.8571, friction=0.4, **fields
+    )
+    (record,) = SCENES["punch"].path(parameters, [0.8571], lambda share: None)
+    return record
+
+
+def test_a_run_outside_theory_has_a_status_of_its_own_and_keeps_its_numbers() -> None:
+    """Without hardening the half-plane flows some elements away from the corner too."""
+    record = punch(hardening="none")
+    assert record.status is Status.OUTSIDE_THEORY
+    assert "equivalent plastic strain reaches 1" in record.message
+    assert "in half_plane at (" in record.message
+    assert np.isfinite(record.fields["residual_stress"][1]).any()
+    assert record.scalars["audit_plastic_strain"] > LARGE_STRAIN
+
+
+def test_what_breaks_the_audit_is_no_question_of_theory() -> None:
+    record = punch(hardening="isotropic")
+    assert record.status is Status.OK
+    scene = SCENES["punch"]
+    both = Audit({}, violations=("wrong",), outside=("large",))
+    assert judged(scene, both) is Status.AUDIT_FAILED
+    assert judged(scene, replace(both, violations=())) is Status.OUTSIDE_THEORY
+
+
+def judged(scene: Scene, audit: Audit) -> Status:
+    """Return the status of a run with this audit, which needs no outputs."""
+    coarse = scene.parameters(smallest_element=0.05, growth=3.0, load_step=1.0, load_ratio=0.01)
+    plain = replace(scene, outputs=(), method=lambda run: one)
+
+    def one(scene: Scene, runs: object, monitor: object) -> object:
+        from solver.scenes.scene import by_increments
+
+        return (replace(look, check=lambda: audit) for look in by_increments(scene, runs, monitor))
+
+    (record,) = plain.path(coarse, [0.01], lambda share: None)
+    return record.status
+
+
+def test_a_run_tells_its_singular_points() -> None:
+    """Draft elements of 0.005 a: those at the corner reach farther than its published number."""
+    record = punch(hardening="isotropic")
+    told = {name: record.fields[name][1] for name in record.fields if name.startswith("singular_")}
+    expected = {"x": 50.0, "y": 0.0, "s": 50.0, "radius": 1.5 * 0.005 * 50.0}
+    assert {name.removeprefix("singular_"): float(each[0]) for name, each in told.items()} == (
+        pytest.approx(expected)
+    )
