@@ -118,7 +118,7 @@ class Increment:
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
             residuals = self._residuals(u, responses)
-            scale, error, violation = self._errors(residuals, candidates)
+            scale, error, violation = self._errors(u, residuals, candidates)
             since_best = 0 if error < best else since_best + 1
             # bodies that overlap or are moved can begin in balance: later residuals are not
             # compared with that, but with the first violation of contact
@@ -185,7 +185,9 @@ class Increment:
         found = find_candidates(self.system, self.start, u, contacts, span, grip=self._grip)
         return found if self.friction else found.smooth()
 
-    def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
+    def _errors(
+        self, u: Vectors, residuals: Vectors, candidates: Candidates
+    ) -> tuple[float, float, float]:
         """Return the force level [N], the relative residual and relative contact violation."""
         parts = self.system.parts
         inner = on_parts(self.system, candidates, candidates.forces)
@@ -193,6 +195,8 @@ class Increment:
         level = external + norm(inner)
         if external == 0:  # only overlapping bodies act on each other: stress gives the level
             level += norm(residuals)
+            # a body that is moved without touching another one bears nothing but rounding
+            level = level if level > rounding(self.system, u) else 0.0
         scale = max(self.start.force_scale, level)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
