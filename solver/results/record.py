@@ -22,11 +22,6 @@ class Status(Enum):
     NOT_CONVERGED = "an increment did not converge"
     AUDIT_FAILED = "the run converged, but its audit found a violated condition"
 
-    @property
-    def code(self) -> int:
-        """Position in the enumeration: the flag value stored in data sets."""
-        return list(Status).index(self)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
