@@ -2,10 +2,11 @@
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
 studies and scene files of `data`; so do those of every page that has any. ``python`` blocks are
-programs; in ``console`` blocks each line ``$ residua …`` runs and must succeed. A block after
-``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
-minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that
-script, which is. Links lead to files and headings that exist, and so do the files a page names.
+programs, each in a file of its own, as workers import it; in ``console`` blocks each line
+``$ residua …`` runs and must succeed. A block after ``<!-- no-test -->`` is left out, which only
+those may be that need a server or compute for minutes. A block after
+``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which is. Links lead
+to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ BLOCK = re.compile(
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
 COMMAND = "import sys; from studies.command.cli import main; sys.exit(main())"
+SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 NAMED = re.compile(r"`((?:solver|studies|service|tests|data|docs|examples)/[a-z0-9_./-]*)`")
@@ -52,13 +54,14 @@ class Block:
     skipped: bool
     script: str = ""
 
-    def programs(self) -> list[list[str]]:
-        """Arguments for the interpreter, one list a program."""
+    def programs(self, folder: Path) -> list[list[str]]:
+        """Arguments for the interpreter, one list a program; Python is a file in a folder."""
         if self.script:
             return []
         if self.language == "python":
             # Empty lines in front: a traceback then names the line of the page.
-            return [["-c", "\n" * self.line + self.text]]
+            (folder / SNIPPET).write_text("\n" * self.line + self.text)
+            return [[SNIPPET]]
         commands = re.findall(r"^\$ residua (.*)$", self.text, re.MULTILINE)
         return [["-c", COMMAND, *shlex.split(command)] for command in commands]
 
@@ -91,7 +94,7 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     for block in blocks((ROOT / page).read_text()):
-        for program in [] if block.skipped else block.programs():
+        for program in [] if block.skipped else block.programs(tmp_path):
             done = subprocess.run(
                 [sys.executable, *program],
                 cwd=tmp_path,
@@ -128,10 +131,10 @@ def test_a_line_that_is_not_in_the_script_is_found(tmp_path: Path) -> None:
     head = "<!-- from examples/a.py -->\n```python\n"
     page = f"{head}y = 2\nz = 3\n```\n{head}y = 2\nz = 4\n```\n{head}= 2\n```\n"
     assert [missing(block, tmp_path) for block in blocks(page)] == [False, True, True]
-    assert not [block.programs() for block in blocks(page) if block.programs()]
+    assert not any(block.programs(tmp_path) for block in blocks(page))
 
 
-def test_every_kind_of_block_is_found() -> None:
+def test_every_kind_of_block_is_found(tmp_path: Path) -> None:
     page = (
         "A\n\n```python\nx = 1\n```\n\n"
         "<!-- no-test -->\n```console\n$ residua serve\n```\n"
@@ -139,8 +142,10 @@ def test_every_kind_of_block_is_found() -> None:
     )
     program, server, command = blocks(page)
     assert (program.language, program.text, program.line) == ("python", "x = 1\n", 3)
+    assert program.programs(tmp_path) == [[SNIPPET]]
+    assert (tmp_path / SNIPPET).read_text() == "\n\n\nx = 1\n"
     assert (server.skipped, command.skipped) == (True, False)
-    assert command.programs() == [["-c", COMMAND, "scenes", "punch"]]
+    assert command.programs(tmp_path) == [["-c", COMMAND, "scenes", "punch"]]
 
 
 def test_the_page_of_the_audit_names_every_figure_and_no_other():

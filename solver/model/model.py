@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from solver.errors import ModelError
+from solver.materials.doubts import doubts
 from solver.model.body import Body
 from solver.model.loads import Temperature
 from solver.model.rigid import Pushed, RigidBody
@@ -168,6 +169,11 @@ class Model:
             return False
         body = self.body(one[0])
         return len(np.intersect1d(body.facets(one[1]), body.facets(other[1]))) > 0
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What of the materials is hardly meant, such as a number in another unit than MPa."""
+        return doubts({body.name: body.material for body in self.bodies})
 
     def body(self, name: str, field: str = "body") -> Body | RigidBody:
         """Return the body called ``name``."""

@@ -28,11 +28,6 @@ class Status(Enum):
         """Whether the run converged and passed its audit, small-strain theory apart."""
         return self in (Status.OK, Status.OUTSIDE_THEORY)
 
-    @property
-    def code(self) -> int:
-        """Position in the enumeration: the flag value stored in data sets."""
-        return list(Status).index(self)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:

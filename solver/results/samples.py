@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.fem.fields import Sampler
 from solver.tensors import not_below_zero, to_tensor, von_mises
 
@@ -86,7 +87,13 @@ class Nodal:
 
 
 class Samples(Nodal):
-    """Samples one system; the interpolation is set up once for all its runs."""
+    """Samples one system; the interpolation is set up once for all its runs.
+
+    Raises
+    ------
+    ModelError
+        when the map of the view meets no body
+    """
 
     def __init__(self, system: Bodies, view: View) -> None:
         super().__init__(system)
@@ -97,6 +104,10 @@ class Samples(Nodal):
         surface = view.axis.place(view.s, np.zeros_like(view.s))
         wholes = {name: system.full(name) for name in view.surfaces}
         self._map = {name: Sampler(whole, grid) for name, whole in wholes.items()}
+        if view.x.size and not any(sampler.inside.any() for sampler in self._map.values()):
+            raise ModelError(
+                "map", _extent(view), "must meet a body, from x to x and from y to y [mm]"
+            )
         self._lines = Sampler(system.full(view.profile_body), lines)
         self._surface = {name: Sampler(whole, surface) for name, whole in wholes.items()}
 
@@ -152,3 +163,8 @@ class Samples(Nodal):
         beyond = {"left": np.nan, "right": np.nan}
         way = {"period": body.period} if body.period else beyond
         return np.asarray(np.interp(self.view.s, x, stress, **way))
+
+
+def _extent(view: View) -> list[float]:
+    """Return from where to where a map reaches along x, and along y [mm]."""
+    return [float(end) for grid in (view.x, view.y) for end in (grid.min(), grid.max())]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
 from solver.model.loads import InitialStress
 from solver.results import saved
+from solver.results.audit.pairs import apart
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
 from solver.results.mesh_fields import MeshFields, mesh_fields
@@ -195,7 +196,9 @@ class Solution:
         With the state under load goes the one after unloading.
         """
         after = self.stages.get("unloaded") if stage == "loaded" else None
-        return audit(self.system, self._at(stage), after, self.tally.dissipation)
+        found = audit(self.system, self._at(stage), after, self.tally.dissipation)
+        own = self.system.model.doubts + apart(self.system, self.stages.values())
+        return replace(found, warnings=own + found.warnings)
 
 
 def solve(
@@ -220,6 +223,8 @@ def solve(
         1; an exception that it raises stops the work. The logger ``solver`` tells each increment
         at level INFO
 
+    What of the model is hardly meant (`Model.doubts`) is told by the same logger, as a warning.
+
     Raises
     ------
     ModelError : bad input
@@ -237,6 +242,8 @@ def solve(
         if any(load.amplitude is not None and load.varies for load in body.every_load):
             allowed = "must be absent where no stages are given: solve raises a load factor"
             raise ModelError("amplitude", body.name, allowed)
+    for doubt in model.doubts:
+        _LOG.warning("%s", doubt)
     system = System(model, linear_solver)
     follow = _Following(program, progress)
     walker = Walker(system, control, watch=partial(observe, system), report=follow)

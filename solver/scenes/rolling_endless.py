@@ -12,6 +12,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
+from solver.materials.doubts import doubts
 from solver.results.audit.steady import audit_pass
 from solver.results.look import Look
 from solver.results.samples import Samples
@@ -71,7 +72,7 @@ def without_ends(
         note = f"{rolled.error}: rolled by increments instead, over {length:.4g} mm"
         note += f" with elements of {side:.3g} mm"
         for look in by_increments(scene, others, monitor):
-            yield replace(look, notes=(note,))
+            yield replace(look, notes=(*look.notes, note))
         return
     yield from map(rolled.look, waiting)
 
@@ -158,7 +159,15 @@ class _Rolled:
             return audit_pass(side.half_plane.track, run.linear_material(), found)
 
         touch = _touch(run.of_pass(max(len(self._steps) - 1, 0)), side.half_plane.way)
-        return Look(parameters=run, samples=side.samples, touch=touch, outcome=outcome, check=check)
+        body = side.samples.view.profile_body
+        return Look(
+            parameters=run,
+            samples=side.samples,
+            touch=touch,
+            outcome=outcome,
+            check=check,
+            notes=doubts({body: run.linear_material()}),
+        )
 
 
 class _Side:

@@ -166,6 +166,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     # only who computes needs the solver, which takes half a second to import
     from solver.contact.system import System
     from solver.loading.walker import Walker
+    from solver.results.audit.pairs import apart
     from solver.results.audit.report import audit
     from solver.results.samples import Samples
     from solver.results.touch import touch_of
@@ -190,6 +191,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
             return audit(system, loaded, unloaded, outcome.tally.dissipation)
 
+        reached = () if outcome.error else outcome.points.values()
         yield Look(
             parameters=run,
             samples=samples,
@@ -197,6 +199,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             outcome=outcome,
             check=check,
             singular=system.model.singular,
+            notes=(*system.model.doubts, *apart(system, reached)),
         )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.definition.study import Study
-from studies.definition.vocabulary import STATUSES
+from studies.definition.vocabulary import OK
 from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.storage.made import Made
@@ -80,7 +80,7 @@ def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
 
 def _warned(dataset: xr.Dataset) -> str:
     """Return how many runs succeeded with a warning, which their details show."""
-    warned = (dataset["status"] == STATUSES.index("ok")) & (dataset["message"] != "")
+    warned = (dataset["status"] == OK) & (dataset["message"] != "")
     return f"; {int(warned.sum())} with a warning" if warned.any() else ""
 
 

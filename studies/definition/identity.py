@@ -181,11 +181,12 @@ def _module_digest(name: str) -> str:
     from studies.definition.meaning import meaning
 
     tree = ast.parse(file.read_bytes())
-    tree.body = [each for each in tree.body if not _only_as_script(each)]
+    tree.body = [each for each in tree.body if not only_as_script(each)]
     return _digest(meaning(ast.unparse(tree)).encode())
 
 
-def _only_as_script(statement: ast.stmt) -> bool:
+def only_as_script(statement: ast.stmt) -> bool:
+    """Tell whether a statement of a module asks whether it is the script that was started."""
     names = ast.walk(statement.test) if isinstance(statement, ast.If) else ()
     return any(isinstance(each, ast.Name) and each.id == "__name__" for each in names)
 

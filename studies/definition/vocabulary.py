@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
-import numpy as np
-
 from solver.results.record import Status
 
 STATUSES = (*(status.name.lower() for status in Status), "error", "missing")
-"""Outcomes by flag value: the solver's, then a run that broke, then one not computed."""
+"""Outcomes: the solver's, then a run that broke, then one not computed."""
 
-OK = STATUSES[Status.OK.code]
+OK = Status.OK.name.lower()
 OUTSIDE_THEORY = Status.OUTSIDE_THEORY.name.lower()
 SOLVED = tuple(status.name.lower() for status in Status if status.solved)
 """Outcomes of runs that have their numbers, which another try would not change."""
@@ -38,11 +36,6 @@ SYMMETRIC = "symmetric"
 """Attribute of a file: 1 where the bodies are one half of what is symmetric about x = 0, else 0."""
 
 LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
-    "status": {
-        "long_name": "outcome of the run",
-        "standard_name": "status_flag",
-        "flag_values": np.arange(len(STATUSES), dtype=np.int8),
-        "flag_meanings": " ".join(STATUSES),
-    },
+    "status": {"long_name": "outcome of the run"},
     "message": {"long_name": "reason of the outcome"},
 }

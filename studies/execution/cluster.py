@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError, Unusable
+from studies.execution.script import GUARD, check_script
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -104,7 +105,13 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
     ------
     Access
         for any process of this machine to which it is given
+
+    Raises
+    ------
+    StudyError
+        when the script that runs would start workers in each of them
     """
+    check_script()
     import dask  # takes a second to import
     from distributed import LocalCluster, Security
 
@@ -127,10 +134,10 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
                 silence_logs=logging.CRITICAL,
                 **({"memory_limit": memory} if memory else {}),
             )
-        except RuntimeError as error:
+        except RuntimeError as error:  # as where a thread of the script asks for them
             raise RuntimeError(
                 "worker processes did not start; they import the calling script anew, so it must "
-                "do its work under: if __name__ == '__main__':"
+                f"do its work under: {GUARD}"
             ) from error
         with cluster, _kept(cluster, workers):
             yield Access(
@@ -203,7 +210,14 @@ def connect(access: Access) -> Client:
 
 
 def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
-    """Return what functions give that processes of their own call, in order."""
+    """Return what functions give that processes of their own call, in order.
+
+    Raises
+    ------
+    StudyError
+        when the script that runs would ask for processes in each of them
+    """
+    check_script()
     from dask.base import compute
     from dask.delayed import delayed
 

@@ -130,7 +130,8 @@ def run_study(
     StoreBusy
         when another process computes into the same store
     StudyError
-        when the store cannot be written to, or the certificates cannot be used
+        when the store cannot be written to, the certificates cannot be used, or a script calls this
+        where its workers would call it too
     StoreFull
         when the disk is full; with room, the same call computes the rest
     GridLost

@@ -10,6 +10,7 @@ from studies.scenes import tables
 from studies.scenes.building import Builder
 from studies.scenes.checking import clashes, declarations
 from studies.scenes.description import Description
+from studies.scenes.looking import view_of
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
 
@@ -42,7 +43,7 @@ def examined(description: Description, *, built: bool) -> tables.SceneFile:
         if built:
             absent = {dotted(where) for where in found.own}
             builder = Builder(found.tables, description.meshes, [*mistakes], absent)
-            _build(builder)
+            _build(builder, found.tables)
             mistakes += _meant(builder.mistakes[len(mistakes) :], found.own)
     if mistakes or found.tables is None:
         raise SceneError(description.file, mistakes)
@@ -64,14 +65,17 @@ def _meant(
             yield mistake
 
 
-def _build(builder: Builder) -> None:
-    """Build the scene; the builder keeps the mistakes of meshes, boundaries, bodies and contact."""
+def _build(builder: Builder, scene: tables.SceneFile) -> None:
+    """Build the scene; the builder keeps the mistakes of meshes, bodies, contact and the map."""
     from solver.contact.system import System
+    from solver.results.samples import Samples
 
     model = builder.model()
     if model is not None:
         system = builder.tried("", lambda: System(model))
-        builder.mistakes += _apart(system) if system else ()
+        if system:
+            builder.mistakes += _apart(system)
+            builder.tried("look", lambda: Samples(system, view_of(scene)))
 
 
 def _apart(system: System) -> Iterator[StudyError]:

@@ -12,7 +12,7 @@ import h5py
 from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.study import Study
-from studies.definition.vocabulary import MISSING, OK, STATUSES, SYMMETRIC
+from studies.definition.vocabulary import MISSING, OK, SYMMETRIC
 from studies.errors import RunUnreadable
 from studies.storage import dataset as layout
 from studies.storage.appearing import appearing
@@ -61,9 +61,9 @@ def _combined(
         at = places[run_id] = tuple(own.get(name, 0) for name in frame.axes)
         with opened(store.run_path(run_id)) as run:
             frame.learn(run, at)
-            code, message = (frame.small[name][0][at] for name in ("status", "message"))
-            outcomes[run_id] = study.taken(STATUSES[code]), str(message)
-            frame.small["status"][0][at] = STATUSES.index(outcomes[run_id][0])
+            status, message = (frame.small[name][0][at] for name in ("status", "message"))
+            outcomes[run_id] = study.taken(str(status)), str(message)
+            frame.small["status"][0][at] = outcomes[run_id][0]
             ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record does not know
                 halves.add(int(run.attrs[SYMMETRIC].item()))

@@ -13,7 +13,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import USUAL_AXES, Case
 from studies.definition.parameters import completed, parameters_of
-from studies.definition.vocabulary import ERROR, KEEP, LABEL_ATTRIBUTES, STATUSES, SYMMETRIC
+from studies.definition.vocabulary import ERROR, KEEP, LABEL_ATTRIBUTES, SYMMETRIC
 from studies.storage import ugrid
 from studies.storage.provenance import provenance
 
@@ -55,7 +55,7 @@ def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.
     """
     sweep = usual_dimensions(scene)
     ones = (1,) * len(sweep)
-    status = STATUSES[record.status.code]
+    status = record.status.name.lower()
     variables: dict[str, tuple[Any, np.ndarray, Mapping[str, Any]]] = {
         name: (name, np.asarray(labels), attributes_of(name))
         for name, labels in record.coordinates.items()
@@ -87,7 +87,7 @@ def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
         if variable.dtype.kind == "f":
             fill = {} if name in dataset.coords else {"_FillValue": np.nan}
             chosen[str(name)] = {**packed, **fill} if variable.ndim else fill
-        elif variable.dtype.kind == "i" and name != "status":
+        elif variable.dtype.kind == "i":
             chosen[str(name)] = {"_FillValue": np.int32(INTEGER_FILL)}
     return chosen
 
@@ -118,7 +118,7 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     return {
         "id": attributes["id"],
         "scene": attributes["scene"],
-        "status": STATUSES[values["status"]],
+        "status": values["status"],
         "message": values["message"],
         "parameters": json.loads(attributes["parameters"]),
         "scalars": scalars,
@@ -137,12 +137,11 @@ def _frame(
     import xarray as xr  # half a second: only who makes a data set waits for it
 
     ones = (1,) * len(sweep)
-    flag = np.full(ones, STATUSES.index(status), dtype=np.int8)
-    text = np.full(ones, message, dtype=object)
+    outcome, text = (np.full(ones, each, dtype=object) for each in (status, message))
     title = f"{scene.name}: {scene.summary}"
     return xr.Dataset(
         {
-            "status": (sweep, flag, attributes_of("status")),
+            "status": (sweep, outcome, attributes_of("status")),
             "message": (sweep, text, attributes_of("message")),
         },
         coords={name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep},

@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
-from studies.definition.vocabulary import MISSING, STATUSES
+from studies.definition.vocabulary import MISSING
 from studies.storage import dataset as layout
 from studies.storage.runfile import variables
 
@@ -59,8 +59,8 @@ class Frame:
     small: dict[str, tuple[np.ndarray, dict[str, Any]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, kind in (("status", np.dtype(np.int8)), ("message", np.dtype(object))):
-            self._hold(name, kind)
+        for name in ("status", "message"):
+            self._hold(name, np.dtype(object))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -184,8 +184,7 @@ class Frame:
     def write_small(self, file: h5netcdf.File) -> None:
         """Write what was held in memory."""
         for name, (values, attributes) in self.small.items():
-            held = attributes | self.auxiliary
-            _write(file, name, tuple(self.axes), values, held, complete=name == "status")
+            _write(file, name, tuple(self.axes), values, attributes | self.auxiliary)
 
     def _extent(self, dimension: str, length: int) -> int:
         """Return up to where a run that has this length writes along a dimension."""
@@ -234,7 +233,7 @@ def _write(
 def _absent(name: str, kind: np.dtype[Any]) -> Any:
     """Return what stands for a run that has not given this variable."""
     if name == "status":
-        return STATUSES.index(MISSING)
+        return MISSING
     return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
 
 

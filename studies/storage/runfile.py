@@ -147,6 +147,8 @@ def row(path: Path) -> dict[str, Any]:
             for name, each in every.items()
             if each.ndim == rank and not each.is_scale
         }
+        if not isinstance(values["status"], str):  # its number, as earlier versions wrote it
+            values["status"] = _text(run["status"].attrs["flag_meanings"]).split()[values["status"]]
         return layout.summary(global_attributes(run), values) | stamp(path)
 
 

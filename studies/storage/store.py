@@ -31,7 +31,6 @@ from typing import TYPE_CHECKING, Literal
 from solver.scenes import Scene
 from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.definition.vocabulary import STATUSES
 from studies.errors import CatalogueDamaged, RunUnreadable, Unusable
 from studies.storage import dataset as layout
 from studies.storage import runfile, shelf
@@ -99,8 +98,8 @@ class Store:
 
         try:
             with h5py.File(self.dataset_path(study_id), "r") as file:
-                return Counter(STATUSES[code] for code in file["status"][...].ravel())
-        except (OSError, KeyError, IndexError, RuntimeError):
+                return Counter(file["status"].asstr()[...].ravel().tolist())
+        except (OSError, KeyError, TypeError, RuntimeError):
             return Counter()
 
     def save_study(self, study: Study) -> Path:

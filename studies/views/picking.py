@@ -18,7 +18,12 @@ from studies.views.reading import find_study, open_netcdf
 
 
 def flags(variable: xr.DataArray) -> dict[int, str]:
-    """Return what the values of a variable mean, nothing for one that is no flag."""
+    """Return what the values of a variable mean, nothing for one that is no flag.
+
+    The outcomes of runs are words; they have numbers where they are drawn.
+    """
+    if variable.name == "status":
+        return dict(enumerate(STATUSES))
     meanings = str(variable.attrs.get("flag_meanings", "")).split()
     values = np.atleast_1d(variable.attrs.get("flag_values", [])).tolist()
     return dict(zip(values, meanings, strict=True))
@@ -81,7 +86,7 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     """
     axes = sweep_axes(dataset)
     chosen = select(dataset, selection or {})
-    ok = np.argwhere(chosen["status"].to_numpy() == STATUSES.index(OK))
+    ok = np.argwhere(chosen["status"].to_numpy() == OK)
     if not len(ok):
         reasons = sorted({str(text) for text in chosen["message"].to_numpy().flat if text})
         wanted = dict(selection) if selection else "any"
@@ -108,7 +113,7 @@ def runs_over(
     others = [name for name in sweep_axes(dataset) if name != axis]
     best = one_run(dataset, selection)
     chosen = select(dataset, selection).sel({name: best[name].item() for name in others})
-    chosen = chosen.isel({axis: np.flatnonzero(chosen["status"] == STATUSES.index(OK))})
+    chosen = chosen.isel({axis: np.flatnonzero(chosen["status"] == OK)})
     scaled = [str(name) for name in chosen[field].dims if f"{name}{FRACTION}" in chosen.coords]
     unlike = [name for name in scaled if not _same(chosen[name], axis)]
     if unlike:

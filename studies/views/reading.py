@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from studies.definition.study import Study
@@ -101,7 +102,13 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
 
 
 def _indexed(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a data set with the fractions of grids that differ as its indexes."""
+    """Return a data set with the fractions of grids that differ as its indexes.
+
+    Outcomes are words, also where an earlier version of the solver wrote their numbers.
+    """
+    if "status" in dataset and dataset["status"].dtype.kind == "i":
+        words = np.array(str(dataset["status"].attrs["flag_meanings"]).split(), dtype=object)
+        dataset["status"] = (dataset["status"].dims, words[dataset["status"].to_numpy()])
     for name in [str(name) for name in dataset.dims]:
         if (fraction := f"{name}{FRACTION}") in dataset.variables:
             dataset = dataset.set_coords(fraction).set_xindex(fraction)

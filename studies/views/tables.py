@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from solver.results.quantities import QUANTITIES
-from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK, STATUSES
+from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked, value_text
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
@@ -84,8 +84,7 @@ def runs_table(dataset: xr.Dataset) -> str:
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
         where = [value_text(values[name][place[axis]]) for name, axis in places.items()]
-        status = STATUSES[values["status"][at]]
-        rows.append([*where, status, *(str(each[at]) for each in cells)])
+        rows.append([*where, str(values["status"][at]), *(str(each[at]) for each in cells)])
     table = in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
     marked = any(spoiled.any() for *_, spoiled in figures)
     return f"{table}\n{_FOOTNOTE}" if marked else table
@@ -152,7 +151,7 @@ def messages(dataset: xr.Dataset) -> str:
         place = dict(zip(sweep_axes(dataset), at, strict=True))
         where = (f"{axis} = {value_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
         if text[at]:
-            outcome = STATUSES[status[at]]
+            outcome = str(status[at])
             kind = "warning" if outcome == OK else outcome
             words = _NUMBER.sub("\0", str(text[at]))
             found[kind, words].append((_NUMBER.findall(str(text[at])), ", ".join(where)))

@@ -65,7 +65,7 @@ def test_the_curl_lines_of_a_page_work(service: Server, page: str, tmp_path: Pat
     assert len(data_sets) == 1
     with open_netcdf(data_sets[0]) as dataset:
         assert dataset.attrs["id"] == environment["ID"]
-        assert (dataset["status"] == 0).all()
+        assert (dataset["status"] == "ok").all()
     for picture in pictures:
         assert matplotlib.image.imread(picture).std() > 0.01
     assert len(data_sets) + len(pictures) == sum(" -o " in line for line in lines)

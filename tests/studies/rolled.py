@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.definition.vocabulary import OK, STATUSES
+from studies.definition.vocabulary import OK
 
 DEPTH = np.concatenate([np.linspace(0.0, 25.0, 126), np.linspace(25.5, 50.0, 30)])
 PEAK = 3.0
@@ -58,7 +58,7 @@ def data_set(
     sweep = ("load_ratio", "friction", "case", "element_size", "advance_step")
     dataset = xr.Dataset(
         {
-            "status": (sweep, np.full(shape, STATUSES.index(OK), dtype=np.int8)),
+            "status": (sweep, np.full(shape, OK, dtype=object)),
             "message": (sweep, np.full(shape, "", dtype=object)),
             "residual_profile": ((*sweep, "pass", "station", "component", "depth"), stress),
             "plastic_strain_profile": ((*sweep, "pass", "station", "depth"), strain),

@@ -12,7 +12,6 @@ import pytest
 from studies import Store, Study, StudyEvent, StudyOutcome, open_study, run_study
 from studies.command.cli import main
 from studies.definition.identity import solver_hash
-from studies.definition.vocabulary import STATUSES
 from studies.execution.proof import Unfit
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import compute_here, fake_study
@@ -47,9 +46,7 @@ def test_one_path_in_trouble_does_not_take_the_others_with_it(troubled: Troubled
     assert not outcome.stopped
     with open_study(outcome.dataset) as together:
         found = {
-            (load, trouble): STATUSES[
-                together["status"].sel(load_ratio=load, trouble=trouble).item()
-            ]
+            (load, trouble): together["status"].sel(load_ratio=load, trouble=trouble).item()
             for load in (0.3, 0.9)
             for trouble in TROUBLES
         }
@@ -179,7 +176,7 @@ def test_stopping_keeps_finished_runs_and_leaves_the_rest_missing(store: Store) 
     assert time.monotonic() - asked[0] < 5.0
     assert {path.stem for path in (store.directory / "runs").iterdir()} == set(outcome.computed)
     with open_study(outcome.dataset) as together:
-        assert (together["status"] == STATUSES.index("missing")).sum() == outcome.counts["missing"]
+        assert (together["status"] == "missing").sum() == outcome.counts["missing"]
 
 
 def test_an_error_of_the_listener_stops_the_work_and_frees_the_store(store: Store) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studies import Store, Study, open_netcdf
 from studies.storage import runfile
 
 RUN_ID = "0" * 32
@@ -61,3 +62,18 @@ def test_a_run_that_cannot_be_written_leaves_no_file_open(monkeypatch: pytest.Mo
     with pytest.raises((TypeError, ValueError)):
         runfile.sealed(wrong)
     assert [file.isopen() for file in opened] == [False]
+
+
+def test_a_run_of_an_earlier_version_has_its_outcome_in_the_catalogue(
+    computed: tuple[Study, Store], store: Store
+) -> None:
+    study, theirs = computed
+    (case, *_) = study.cases()
+    with open_netcdf(theirs.run_path(case.id)) as now:
+        codes = np.full(now["status"].shape, 1, dtype=np.int8)
+        meanings = {"flag_meanings": "ok limit_load not_converged"}
+        earlier = now.load().assign(status=(now["status"].dims, codes, meanings))
+    path = store.run_path(case.id)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(runfile.sealed(earlier))
+    assert runfile.row(path)["status"] == "limit_load"

@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from studies.definition.vocabulary import STATUSES
 from studies.views.tables import messages
 
 
 def told(texts: list[str], statuses: list[str]) -> str:
-    codes = np.array([STATUSES.index(each) for each in statuses], dtype=np.int8)
     return messages(
         xr.Dataset(
             {
-                "status": ("load_ratio", codes),
+                "status": ("load_ratio", np.array(statuses, dtype=object)),
                 "message": ("load_ratio", np.array(texts, dtype=object)),
             },
             coords={"load_ratio": np.linspace(0.1, 0.1 * len(texts), len(texts))},

@@ -12,9 +12,11 @@ from solver.model.model import effective_friction
 from solver.results.audit.surfaces import Surfaces
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
-    from solver.contact.state import Converged
+    from solver.contact.state import Converged, State
     from solver.contact.system import System
     from solver.model.model import ContactPair
     from solver.results.audit.surfaces import Touching
@@ -59,6 +61,24 @@ _STRAY = Stray(way=np.inf, sides=1.0, length=0.01, off=5e-3, x=np.nan, y=np.nan)
 """What it may leave out; of the length of the contact where a surface is curved."""
 
 
+def apart(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
+    """Return a warning for each pair that touches in none of the states."""
+    every = [converged.state for converged in states]
+    return tuple(
+        f"{_words(pair)} touch at the end of no stage: move them together, or take the pair out"
+        for k, pair in enumerate(system.model.contacts)
+        if not any(_closed(state, k).any() for state in every)
+    )
+
+
+def _closed(state: State, number: int) -> NDArray[np.bool_]:
+    return np.asarray(state.contacts[number].normal > _PRESSED * state.force_scale)
+
+
+def _words(pair: ContactPair) -> str:
+    return f"{'.'.join(pair.slave)} and {'.'.join(pair.master)}"
+
+
 class AuditedPair:
     """A contact pair in a converged increment.
 
@@ -74,7 +94,7 @@ class AuditedPair:
         contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
         self.normal, self.tangential = contact.normal, contact.tangential
         self._state = converged.state
-        self._closed = self.normal > _PRESSED * converged.state.force_scale
+        self._closed = _closed(converged.state, number)
         self.surfaces = Surfaces(system, number, finite=contact.finite)
         self.touching: Touching = self.surfaces.touching(
             converged.state, converged.start, self.normal, self.tangential

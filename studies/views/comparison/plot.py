@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -17,7 +19,9 @@ SHOWN = ("xx", "zz", STRAIN)
 """Profiles drawn, a column each."""
 
 _COLOURS = ("#1f5fa8", "#c8501e", "#3a8a4d", "#7a4fa0")
-"""Of the passes; after the last the first is used again."""
+"""Of few passes; more have colours in their order."""
+_NAMED = 12
+"""Most passes that the legend names."""
 _DEEPEST = 25.0
 """Depth shown [mm]."""
 _PANEL = (3.7, 1.9)
@@ -36,12 +40,13 @@ def comparison_figure(computed: Computed, published: Sequence[Published]) -> Fig
     size = (width * len(SHOWN), height * len(cases) + 0.9)
     sheet = Figure(figsize=size, dpi=130, layout="constrained")
     panels = sheet.subplots(len(cases), len(SHOWN), sharex=True, squeeze=False)
+    colours = _colours_of(sorted({number for _, number in computed.profiles}))
     for case, row in zip(cases, panels, strict=True):
         for component, axes in zip(SHOWN, row, strict=True):
-            _draw(axes, computed, case, component)
+            _draw(axes, computed, case, component, colours)
             for each in published:
                 if (each.case, each.component, each.against) == (case, component, None):
-                    _mark(axes, each)
+                    _mark(axes, each, colours)
             _furnish(axes)
         row[0].annotate(case, (0.97, 0.93), xycoords="axes fraction", ha="right", va="top",
                         weight="bold")  # fmt: skip
@@ -50,13 +55,22 @@ def comparison_figure(computed: Computed, published: Sequence[Published]) -> Fig
     drawn = [axes.dataLim.x1 for axes in panels.flat if axes.has_data()]
     panels[0, 0].set_xlim(-0.5, min(_DEEPEST, max(drawn)))
     sheet.legend(
-        handles=_legend(sorted({number for _, number in computed.profiles})),
+        handles=_legend(colours),
         loc="outside lower center", ncols=6, frameon=False, fontsize=9,
     )  # fmt: skip
     return sheet
 
 
-def _draw(axes: Axes, computed: Computed, case: str, component: str) -> None:
+def _colours_of(passes: Sequence[int]) -> dict[int, Any]:
+    """Return a colour for each pass."""
+    several = len(passes) > len(_COLOURS)
+    ordered = colormaps["viridis"](np.linspace(0.0, 0.85, len(passes)))
+    return dict(zip(passes, ordered if several else _COLOURS, strict=False))
+
+
+def _draw(
+    axes: Axes, computed: Computed, case: str, component: str, colours: Mapping[int, Any]
+) -> None:
     """Draw the profiles of all passes and levels of a case."""
     for (name, number), levels in computed.profiles.items():
         if name != case:
@@ -65,14 +79,14 @@ def _draw(axes: Axes, computed: Computed, case: str, component: str) -> None:
             if component in profile.values:
                 finest = level == min(levels)
                 axes.plot(
-                    profile.depth, profile.values[component], color=_colour(number),
+                    profile.depth, profile.values[component], color=colours[number],
                     linewidth=1.7 if finest else 0.6, alpha=1.0 if finest else 0.75,
                 )  # fmt: skip
 
 
-def _mark(axes: Axes, published: Published) -> None:
+def _mark(axes: Axes, published: Published, colours: Mapping[int, Any]) -> None:
     """Draw a published feature: a dot, an arrow from a bound, or a line at its depth."""
-    colour = _colour(published.pass_number)
+    colour = colours.get(published.pass_number, "0.4")
     depth = 0.0 if published.quantity == "surface" else published.depth
     if not published.has_value:
         axes.axvline(published.depth_bounds[0], color=colour, linestyle=":", linewidth=1.1)
@@ -114,8 +128,11 @@ def _entitle(column: Sequence[Axes], component: str) -> None:
     column[-1].set_xlabel("depth below the surface [mm]", fontsize=9)
 
 
-def _legend(passes: Sequence[int]) -> list[Line2D]:
-    lines = [Line2D([], [], color=_colour(n), linewidth=1.7, label=f"pass {n}") for n in passes]
+def _legend(colours: Mapping[int, Any]) -> list[Line2D]:
+    """Return what is explained; of many passes the first, the last and some between."""
+    among = np.linspace(0, len(colours) - 1, min(len(colours), _NAMED)).round().astype(int)
+    passes = [list(colours)[i] for i in among]
+    lines = [Line2D([], [], color=colours[n], linewidth=1.7, label=f"pass {n}") for n in passes]
     return [
         *lines,
         Line2D([], [], color="0.4", linewidth=0.6, label="coarser"),
@@ -123,7 +140,3 @@ def _legend(passes: Sequence[int]) -> list[Line2D]:
         Line2D([], [], color="0.4", marker="$\\uparrow$", linestyle="", label="published bound"),
         Line2D([], [], color="0.4", linestyle=":", label="published depth"),
     ]
-
-
-def _colour(number: int) -> str:
-    return _COLOURS[(number - 1) % len(_COLOURS)]

@@ -13,7 +13,7 @@ import xarray as xr
 from scipy.signal import find_peaks
 
 from solver.scenes import Scene
-from studies.definition.vocabulary import OK, STATUSES
+from studies.definition.vocabulary import OK
 from studies.errors import StudyError
 from studies.scenes.registry import scene_named, scene_of
 from studies.views.comparison.problem import (
@@ -157,7 +157,7 @@ def read_profiles(paths: Sequence[Path], selection: Mapping[str, str]) -> Comput
 def _profiles(dataset: xr.Dataset) -> Iterator[tuple[Key, Level, Profile]]:
     """Yield the profiles of every successful run and pass."""
     axes, sizes = sweep_axes(dataset), sizes_of(scene_of(dataset.attrs))
-    for at in np.argwhere(dataset["status"].to_numpy() == STATUSES.index(OK)):
+    for at in np.argwhere(dataset["status"].to_numpy() == OK):
         run = one_run(dataset.isel({axis: [i] for axis, i in zip(axes, at, strict=True)}))
         parameters = run_parameters(run)
         level = tuple(size.of(run, parameters) for size in sizes)

@@ -21,12 +21,13 @@ from studies.views.plots.captions import (
     words,
     wrapped,
 )
+from studies.views.plots.legends import MOST_LINES, add_legend, is_number
 from studies.views.plots.runs import Kind, absent, known_values, look_of, standing
-
-MOST_CURVES = 12
 
 _MARKS = "osD^vPh*"
 _SIZE = (8.0, 4.6)
+_ABREAST = 60
+"""Letters of all labels that have place side by side."""
 _FOOT = 0.03
 """Height of the marks of runs without a value / height of the figure."""
 
@@ -45,7 +46,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     Raises
     ------
     StudyError
-        when nothing varies, or more than `MOST_CURVES` curves would be drawn
+        when nothing varies, or more than `MOST_LINES` curves would be drawn
     """
     numbers, labels = standing(dataset)
     if not numbers and not labels:
@@ -53,17 +54,17 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
         raise StudyError("field", field, allowed)
     across, *others = [*numbers, *labels]
     curves = math.prod(each.size for each in others)
-    if curves > MOST_CURVES:
+    if curves > MOST_LINES:
         rest = ", ".join(str(each.name) for each in others)
         raise StudyError(
             "field",
             field,
-            f"would take {curves} curves, at most {MOST_CURVES} are drawn: select values of {rest}",
+            f"would take {curves} curves, at most {MOST_LINES} are drawn: select values of {rest}",
         )
     look_of(dataset, field)  # where no run has a value: say so
     sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
-    numeric = across.dtype.kind in "fiu"
+    numeric = is_number(across)
     x = across.to_numpy() if numeric else np.arange(across.size)
     values = known_values(dataset, field)
     missing: dict[Kind, list[float]] = {}
@@ -82,17 +83,15 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
         foot = np.full(len(places), _FOOT)
         kind.draw(axes, np.array(places), foot, axes.get_xaxis_transform())
     if not numeric:
-        axes.set_xticks(x, [str(each) for each in across.to_numpy()])
+        names = [str(each) for each in across.to_numpy()]
+        axes.set_xticks(x, names, rotation=90.0 if len("".join(names)) > _ABREAST else 0.0)
     _scale(axes, dataset[field], values)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_xlabel(capitalised(short_label(across)))
     if others or missing:
-        axes.legend(
-            loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, frameon=False,
-            title=", ".join(words(str(each.name)) for each in others),
-        )  # fmt: skip
+        add_legend(axes, [words(str(each.name)) for each in others])
     single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
     below = wrapped(setting(dataset.squeeze(single)), _SIZE[0], 8)
     name = capitalised(dataset[field].attrs.get("long_name", words(field)))

@@ -20,12 +20,12 @@ ALONG = ("s", "depth", "increment", "fraction", "moment")
 
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
-    """Return the numbers and flags that have one value a run."""
+    """Return the numbers and flags that have one value a run, and its outcome."""
     sweep = dataset["status"].dims
     return [
         str(name)
         for name, each in dataset.data_vars.items()
-        if each.dims == sweep and each.dtype.kind in "fiu"
+        if each.dims == sweep and (each.dtype.kind in "fiu" or name == "status")
     ]
 
 

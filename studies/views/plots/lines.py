@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError
@@ -23,13 +21,21 @@ from studies.views.plots.fields import (
     line_fields,
     too_close,
 )
+from studies.views.plots.legends import (
+    MOST_LINES,
+    STYLES,
+    add_bar,
+    add_legend,
+    colours_of,
+    has_bar,
+    is_number,
+)
 from studies.views.plots.maps import entitle
 
 _DECAYED = 0.02
 """Depth is shown to where nothing larger than this part of the peak is left."""
-_EACH, _LINES = 6, 12
-"""Most values of a dimension, and most lines, that are told apart."""
-_STYLES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (8, 2, 1, 2, 1, 2)), (0, (1, 4)))
+_EACH = len(STYLES)
+"""Most values that are drawn of a dimension of the field."""
 _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth")
 _DISTANCE = "distance"
@@ -64,6 +70,7 @@ def line_figure(
         values = values.dropna(name, how="all")
     if not values.size:
         raise StudyError("field", field, "has no value in the run selected")
+    sizes = values.sizes
     values = _told_apart(values, [name for name in values.dims if name != along], over)
     others = [name for name in values.dims if name != along]
     at = _DISTANCE if _DISTANCE in values.coords else along
@@ -77,27 +84,35 @@ def line_figure(
     sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
     entitle(axes, run, values, _SIZE[0] - 0.8)
-    shape = [values.sizes[name] for name in others] or [1]
-    alone = len(others) == 1 and values[others[0]].dtype.kind not in "fiu"
-    for first, colour in enumerate(_colours(values, others)):
-        styles = cycle(_STYLES[first % len(_STYLES) :] if alone else _STYLES)
-        for style, rest in zip(styles, np.ndindex(*shape[1:]), strict=False):
+    several = [values[name] for name in others]
+    barred = bool(several) and has_bar(several[0])
+    named = several[1:] if barred else several
+    alone = len(several) == 1 and not is_number(several[0])
+    for first, colour in enumerate(colours_of(several[0]) if several else ["C0"]):
+        styles = cycle(STYLES[first % len(STYLES) :] if alone else STYLES)
+        rests = np.ndindex(*(each.size for each in several[1:]))
+        for style, rest in zip(styles, rests, strict=False):
             line = values.isel(dict(zip(others, (first, *rest), strict=False))).dropna(along)
             if line.size:
-                name = ", ".join(value_text(line[each]) for each in others)
-                axes.plot(line[at], line, style, color=colour, label=name, linewidth=1.6)
+                name = ", ".join(value_text(line[each.name]) for each in named)
+                axes.plot(
+                    line[at],
+                    line,
+                    linestyle=style,
+                    color=colour,
+                    label=name,
+                    linewidth=1.0 if barred else 1.6,
+                )
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.0)
     axes.set(xlabel=label(values[at]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
-    if others:
-        title = ", ".join(words(str(name)) for name in others)
-        axes.legend(
-            loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, frameon=False,
-            title=title,
-        )  # fmt: skip
+    if barred:
+        add_bar(axes, several[0])
+    if named:
+        add_legend(axes, [_heading(each, sizes) for each in named], styles=barred)
     return sheet
 
 
@@ -113,26 +128,28 @@ def _told_apart(values: xr.DataArray, others: Sequence[Hashable], over: str | No
 
     Each value of the axis `over` keeps its lines.
     """
-    if over and (count := values.sizes[over]) > _LINES:
-        allowed = f"has {count} values, of which {_LINES} can be told apart: select some of them"
+    barred = over is not None and has_bar(values[over])
+    if over and not barred and (count := values.sizes[over]) > MOST_LINES:
+        allowed = (
+            f"has {count} values, of which {MOST_LINES} can be told apart: select some of them"
+        )
         raise StudyError("over", over, allowed)
-    for name in others:
-        if values.sizes[name] > _EACH and name != over:
+    own = [name for name in others if name != over]
+    for name in own:
+        if values.sizes[name] > _EACH:
             among = np.linspace(0.0, values.sizes[name] - 1.0, _EACH)
             values = values.isel({name: among.round().astype(int)})
-    if math.prod(values.sizes[name] for name in others) > _LINES:
-        values = values.isel({others[-1]: [values.sizes[others[-1]] // 2]})
+    counted, most = (own, len(STYLES)) if barred else (others, MOST_LINES)
+    for name in reversed(own):
+        if math.prod(values.sizes[each] for each in counted) > most:
+            values = values.isel({name: [values.sizes[name] // 2]})
     return values.squeeze([name for name in others if values.sizes[name] == 1])
 
 
-def _colours(values: xr.DataArray, others: Sequence[Hashable]) -> Sequence[object]:
-    """Return a colour for each value of the first dimension: in order, where it is a number."""
-    if not others:
-        return ["C0"]
-    first = values[others[0]]
-    if first.dtype.kind in "fiu":
-        return list(colormaps["viridis"](np.linspace(0.0, 0.85, first.size)))
-    return [f"C{number}" for number in range(first.size)]
+def _heading(drawn: xr.DataArray, sizes: Mapping[Hashable, int]) -> str:
+    """Return the name of a dimension, and of how many values those drawn are some."""
+    name, all_of_them = words(str(drawn.name)), sizes[drawn.name]
+    return name if drawn.size == all_of_them else f"{name} ({drawn.size} of {all_of_them})"
 
 
 def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:

@@ -97,9 +97,13 @@ def _rank(quantity: xr.DataArray) -> int:
 
 
 def known_values(dataset: xr.Dataset, field: str) -> xr.DataArray:
-    """Return a field where runs succeeded, NaN elsewhere; the status of every run."""
-    ok = dataset["status"] == STATUSES.index(OK)
-    return dataset[field].astype(float).where(ok | (field == "status"))
+    """Return a field where runs succeeded, NaN elsewhere; the number of the status of every run."""
+    status = dataset["status"]
+    if field == "status":
+        numbers = {name: float(code) for code, name in flags(status).items()}
+        drawn = [numbers.get(name, np.nan) for name in status.to_numpy().flat]
+        return status.copy(data=np.reshape(drawn, status.shape))
+    return dataset[field].astype(float).where(status == OK)
 
 
 def look_of(dataset: xr.Dataset, field: str) -> Look:
@@ -124,6 +128,6 @@ def look_of(dataset: xr.Dataset, field: str) -> Look:
 def absent(known: np.ndarray, status: np.ndarray) -> dict[Kind, np.ndarray]:
     """Return where runs have no value, by why: those that there are."""
     found = {_ABSENT.get(name, _FAILED): np.zeros_like(known) for name in STATUSES}
-    for value, name in enumerate(STATUSES):
-        found[_ABSENT.get(name, _FAILED)] |= ~known & (status == value)
+    for name in STATUSES:
+        found[_ABSENT.get(name, _FAILED)] |= ~known & (status == name)
     return {kind: there for kind, there in found.items() if there.any()}

@@ -16,7 +16,6 @@ from matplotlib.lines import Line2D
 
 from studies import StudyError
 from studies.command.cli import main
-from studies.definition.vocabulary import STATUSES
 from studies.storage.dataset import attributes_of
 from studies.views.plots.picture import picture
 from studies.views.plots.sweep import sweep_figure
@@ -37,7 +36,7 @@ def swept(
     s = np.linspace(0.0, 4.0, 5)
     return xr.Dataset(
         {
-            "status": (sweep, np.zeros(shape, dtype=np.int8), attributes_of("status")),
+            "status": (sweep, np.full(shape, "ok", dtype=object), attributes_of("status")),
             "message": (sweep, np.full(shape, "", dtype=object)),
             "increments": (sweep, value, {"units": "MPa", "long_name": "a figure"}),
             "contact_pressure": ((*sweep, "s"), value[..., None] * s, {"units": "MPa"}),
@@ -70,7 +69,7 @@ def test_one_swept_number_is_drawn_as_a_curve_for_each_of_the_rest() -> None:
 def test_runs_without_a_value_are_marked_at_the_foot_and_named_once() -> None:
     dataset = swept(frictions=[0.0])
     for law in range(2):
-        dataset["status"][0, 0, law] = STATUSES.index("limit_load")
+        dataset["status"][0, 0, law] = "limit_load"
     sheet = sweep_figure(dataset, "increments")
     assert legend_of(sheet) == [*LAWS, "no equilibrium"]
     *curves, foot = lines_of(sheet)
@@ -89,7 +88,7 @@ def test_labels_alone_stand_side_by_side() -> None:
 
 def test_an_outcome_is_drawn_by_its_name() -> None:
     dataset = swept(frictions=[0.0], laws=["none"])
-    dataset["status"][1, 0, 0] = STATUSES.index("limit_load")
+    dataset["status"][1, 0, 0] = "limit_load"
     axes = sweep_figure(dataset, "status").axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["ok", "limit load"]
 
@@ -106,7 +105,7 @@ def test_contours_are_drawn_where_a_sweep_is_dense_but_not_over_holes() -> None:
     few, many = [0.0, 0.1, 0.2], list(np.linspace(0.0, 0.7, 8))
     assert not contours(sweep_figure(swept(many, few, ["none"]), "increments").axes[0])
     dataset = swept(many, many[::-1], ["none"])
-    dataset["status"][0, 0, 0] = STATUSES.index("limit_load")  # load 0, friction 0.7
+    dataset["status"][0, 0, 0] = "limit_load"  # load 0, friction 0.7
     filled, _ = contours(sweep_figure(dataset, "increments").axes[0])
     inside = [path.contains_point((0.69, 0.01)) for path in filled.get_paths()]
     assert not any(inside)
@@ -121,7 +120,7 @@ def contours(axes: Axes) -> list[QuadContourSet]:
 
 def test_lines_of_several_runs_lie_over_one_axis() -> None:
     dataset = swept()
-    dataset["status"][1, 1, 0] = STATUSES.index("limit_load")  # load 0.2, friction 0.1, none
+    dataset["status"][1, 1, 0] = "limit_load"  # load 0.2, friction 0.1, none
     selection = {"load_ratio": 0.4, "friction": 0.1}
     sheet = picture(dataset, "contact_pressure", selection=selection, over="hardening")
     assert legend_of(sheet) == LAWS
@@ -174,9 +173,6 @@ def test_lines_are_laid_over_each_other_where_another_axis_changes_the_grid() ->
 def test_each_value_of_an_axis_has_its_line() -> None:
     dataset = swept(loads=list(np.linspace(0.1, 0.8, 8)), frictions=[0.0], laws=["none"])
     assert len(lines_of(picture(dataset, "contact_pressure", over="load_ratio"))) == 8
-    dataset = swept(loads=list(np.linspace(0.1, 0.8, 13)), frictions=[0.0], laws=["none"])
-    with pytest.raises(StudyError, match="has 13 values, of which 12 can be told apart"):
-        picture(dataset, "contact_pressure", over="load_ratio")
 
 
 def test_one_number_for_each_label_is_drawn_of_the_one_that_is_selected() -> None:

@@ -39,7 +39,7 @@ def grid_map(
     """Return a successful run with one map that is different everywhere."""
     values = 1.0 + np.arange(y.size * x.size, dtype=float).reshape(y.size, x.size)
     run = xr.Dataset(
-        {"status": 0, "message": "", "contact_half_width": x.max() / 2},
+        {"status": "ok", "message": "", "contact_half_width": x.max() / 2},
         coords={"x": ("x", x, {"units": "mm"}), "y": ("y", y, {"units": "mm"})},
         attrs={
             "scene": "fake",

@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from solver.results.sliding_limits import johnson_limit, melan_limit
 from studies import Store, Study, StudyError, open_study
 from studies.command.cli import main
-from studies.definition.vocabulary import STATUSES
 from studies.storage.dataset import attributes_of
 from studies.views.plots.fields import sweep_fields
 from studies.views.plots.sweep import sweep_figure
@@ -37,7 +36,7 @@ def swept(
     slips = np.where(FRICTIONS > 0.0, traction, 0.0)
     return xr.Dataset(
         {
-            "status": (sweep, np.zeros(shape, dtype=np.int8), attributes_of("status")),
+            "status": (sweep, np.full(shape, "ok", dtype=object), attributes_of("status")),
             "message": (sweep, np.full(shape, "", dtype=object)),
             "shakedown_state": (sweep, states, attributes_of("shakedown_state")),
             "creepage": (sweep, 0.25 * states - 0.5, attributes_of("creepage")),
@@ -89,7 +88,7 @@ def test_a_run_without_success_is_marked_by_its_status_whatever_it_holds() -> No
     named = {(1, 2): "limit_load", (2, 0): "missing", (0, 3): "audit_failed",
              (2, 2): "outside_theory"}  # fmt: skip
     for (row, column), status in named.items():
-        dataset["status"][0, row, column] = STATUSES.index(status)
+        dataset["status"][0, row, column] = status
     dataset["shakedown_state"][0, 1, 1] = np.nan
     sheet = sweep_figure(dataset, "shakedown_state")
     marks = marks_of(sheet.axes[0])
@@ -106,7 +105,7 @@ def test_a_run_without_success_is_marked_by_its_status_whatever_it_holds() -> No
 
 def test_numbers_share_one_scale_of_colours_with_zero_in_the_middle() -> None:
     dataset = swept()
-    dataset["status"][0, 0, 0] = STATUSES.index("limit_load")
+    dataset["status"][0, 0, 0] = "limit_load"
     dataset["creepage"][1, 0, 0] = -0.9
     sheet = sweep_figure(dataset, "creepage")
     clouds = []
@@ -173,7 +172,7 @@ def test_panels_of_a_linked_axis_are_headed_by_its_labels() -> None:
 def test_a_field_without_values_is_refused() -> None:
     dataset = swept()
     for field in ("creepage", "shakedown_state"):
-        dataset[field] = dataset[field].where(dataset["status"] != 0)
+        dataset[field] = dataset[field].where(dataset["status"] != "ok")
         with pytest.raises(StudyError, match=f"field = '{field}': has no value in the run"):
             sweep_figure(dataset, field)
 
@@ -184,7 +183,7 @@ def test_nothing_is_cut_and_the_legend_lies_beside_panels_of_a_good_size(
     hardening: tuple[str, ...], field: str
 ) -> None:
     dataset = swept(hardening=hardening)
-    dataset["status"][0, 0, 0] = STATUSES.index("limit_load")
+    dataset["status"][0, 0, 0] = "limit_load"
     dataset["load_ratio"].attrs["long_name"] = "a very long description " * 8
     given = {"poisson_ratio": 0.3, "passes": 10, "track": 64.0, "periodic": True, "growth": 1.2}
     dataset.attrs["parameters"] = json.dumps(given | {"element_size": 2.0, "advance_step": 4.0})

@@ -219,6 +219,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "look.map.x.stop",
         "must be > start = -1",
     ),
+    "map beside the bodies": (
+        seen_on(start=20.0, stop=30.0),
+        "look.map",
+        "must meet a body",
+    ),
     "map with half of a grading": (
         seen_on(near=0.0),
         "look.map.x.size",

@@ -13,11 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from fastapi.testclient import TestClient
 
 import studies.scenes.registry as registry
+from service.app import create_app
+from service.settings import Settings
 from solver import SCENES, ModelError, Record, Status, System
 from solver.scenes.punch import PUNCH, PunchParameters
 from studies import Store, Study, StudyError, open_study, run_study, scene_schema
+from studies.command.cli import main
 from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named, scene_of
@@ -374,3 +378,45 @@ def test_the_work_of_a_run_is_told_from_its_meshes(path: Path) -> None:
     assert effort.unknowns >= system.n_unknowns, "supported ones count as well"
     assert effort.elements == sum(body.mesh.nelements for body in system.model.bodies)
     assert effort.increments == scene.program(parameters).count
+
+
+def test_numbers_in_another_unit_reach_the_user(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "blocks.toml").write_text(
+        BLOCKS.replace("youngs_modulus = 2e5", "youngs_modulus = 200")
+    )
+    (tmp_path / "study.toml").write_text('name = "soft"\nscene = "blocks.toml"\n')
+    out = tmp_path / "out"
+    assert main(["run", str(tmp_path / "study.toml"), "--out", str(out), "--workers", "1"]) == 0
+    told = "upper.youngs_modulus = 200: 200000 MPa was probably meant, 200 GPa"
+    printed = capsys.readouterr().out
+    assert f"warning: {told}" in printed
+    assert "1 with a warning" in printed
+    with TestClient(create_app(Settings(data=out)), base_url="http://localhost") as client:
+        (found,) = client.get("/runs").json()["items"]
+    assert told in found["message"]
+
+
+def test_a_pair_that_never_touches_is_told(scene: FileScene) -> None:
+    tables = blocks()
+    tables["bodies"]["upper"]["supports"] = {"left": "x"}
+    tables["contacts"][0]["gap"] = 0.2
+    tables["loads"] = [
+        {"body": "upper", "kind": "displacement", "boundary": "top", "x": 0.0, "y": -0.1}
+    ]
+    record = run(built(tables))
+    assert record.status is Status.OK, record.message
+    assert record.message.startswith("upper.bottom and lower.top touch at the end of no stage")
+    assert "touch" not in run(scene).message
+
+
+def test_a_map_that_a_swept_value_takes_off_the_bodies_ends_the_run() -> None:
+    tables = blocks()
+    along = {"start": "$at", "stop": "$at + 1", "num": 5}
+    tables["parameters"]["at"] = {"default": 1.0, "unit": "mm", "description": "where one looks"}
+    tables["look"]["map"] = {"x": along, "y": {"start": -1.0, "stop": 0.0, "num": 5}}
+    scene = built(tables)
+    assert run(scene).status is Status.OK
+    with pytest.raises(ModelError, match=r"map = \[50\.0, 51\.0, -1\.0, 0\.0\]: must meet a body"):
+        run(scene, at=50.0)

@@ -1,0 +1,54 @@
+"""Whether worker processes can import the script that asks for them."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.definition.identity import only_as_script
+from studies.errors import StudyError
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+GUARD = 'if __name__ == "__main__":'
+
+
+def check_script() -> None:
+    """Refuse to start workers from a script that they would run anew.
+
+    A worker process imports the script that was started. Where this asks for workers as it is
+    imported, outside of `GUARD`, each worker would ask for more. A notebook, the interpreter's
+    prompt and ``python -c`` have no file to import.
+
+    Raises
+    ------
+    StudyError
+        with the script and the line that asks
+    """
+    file = getattr(sys.modules["__main__"], "__file__", None)
+    line = _line_of(file) if file else None
+    if file is None or line is None:
+        return
+    try:
+        statements = ast.parse(Path(file).read_bytes()).body
+    except (OSError, SyntaxError, ValueError):  # no source that could be imported as text
+        return
+    if not any(only_as_script(each) for each in statements if each.lineno <= line):
+        allowed = (
+            f"line {line} must stand under `{GUARD}`, since worker processes import the script"
+        )
+        raise StudyError("script", Path(file).name, allowed)
+
+
+def _line_of(file: str) -> int | None:
+    """Return the line of the script that is being carried out, outside of its functions."""
+    frame: FrameType | None = inspect.currentframe()
+    while frame is not None:
+        if frame.f_globals is vars(sys.modules["__main__"]) and frame.f_code.co_name == "<module>":
+            return frame.f_lineno if frame.f_code.co_filename == file else None
+        frame = frame.f_back
+    return None
