@@ -103,6 +103,7 @@ class Converged:
         blended with the elastic stiffness
     strayed : message that contact has reached the end of a surface; empty if it has not
     energy : work since the lap began
+    lost : how far its beginning is from what the increment before has left
     """
 
     start: State
@@ -118,3 +119,4 @@ class Converged:
     blended: int
     strayed: str = ""
     energy: Energy = field(default_factory=Energy)
+    lost: float = 0.0

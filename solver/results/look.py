@@ -10,6 +10,7 @@ from solver.results.quantities import Quantity
 
 if TYPE_CHECKING:
     from solver.loading.outcome import Outcome
+    from solver.results.audit.recomputed import Recomputed
     from solver.results.audit.report import Audit
     from solver.results.samples import Bodies, Samples, Solved
     from solver.results.touch import Touch
@@ -28,6 +29,7 @@ class Look:
     outcome : the result of its program
     check : () -> its audit, of a complete run
     notes : what the user must know of how it was computed
+    source : what its record is compared with; None for the states of a system
     """
 
     parameters: Any
@@ -36,6 +38,7 @@ class Look:
     outcome: Outcome
     check: Callable[[], Audit]
     notes: tuple[str, ...] = ()
+    source: Recomputed | None = None
 
     @property
     def system(self) -> Bodies:

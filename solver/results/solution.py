@@ -194,7 +194,7 @@ class Solution:
         With the state under load goes the one after unloading.
         """
         after = self.stages.get("unloaded") if stage == "loaded" else None
-        return audit(self.system, self._at(stage), after, self.tally.dissipation)
+        return audit(self.system, self._at(stage), after, self.tally.dissipation, self.tally.lost)
 
 
 def solve(

@@ -36,6 +36,10 @@ _DECLARED = [
         "smallest plastic dissipation of an increment in a unit of volume", "MPa",
     ),
     declare(
+        "audit_history",
+        "what an increment or pass begins with, less what the one before has left / yield stress",
+    ),
+    declare(
         "audit_contact_after_unloading",
         "force out of balance with the stress of the released bodies", "N",
     ),
@@ -49,6 +53,10 @@ _DECLARED = [
         "audit_steadiness",
         "difference between the strain that material meets in a steady pass and that of "
         "equilibrium, its deviator times 2 G / yield stress",
+    ),
+    declare(
+        "audit_stored",
+        "difference between what is stored of a run and what is computed anew / its scale",
     ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),

@@ -32,6 +32,7 @@ _LIMITS = {
     "audit_law": 1e-6,
     "audit_yield": 1e-6,
     "audit_slip": 0.03,
+    "audit_history": 1e-6,
     "audit_energy": 1e-5,
 }
 _TURNING = 0.02  # energy error where the directions of contact turn within an increment
@@ -59,9 +60,16 @@ def _largest(*values: float) -> float:
 
 
 def audit(
-    system: System, loaded: Converged, unloaded: Converged | None, least_dissipation: float
+    system: System,
+    loaded: Converged,
+    unloaded: Converged | None,
+    least_dissipation: float,
+    lost: float = 0.0,
 ) -> Audit:
-    """Check one run: its state under load and, where there is one, after unloading."""
+    """Check one run: its state under load and, where there is one, after unloading.
+
+    ``least_dissipation`` and ``lost`` are those of all its increments, see `Tally`.
+    """
     states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
     bodies, released = (
@@ -83,6 +91,7 @@ def audit(
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_energy": _energy_error(bodies, loaded),
         "audit_dissipation": least_dissipation,
+        "audit_history": lost,
         "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
     }  # fmt: skip
     figures |= _strength(system, loaded) | _discretisation(system, states)
