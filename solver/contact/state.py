@@ -146,6 +146,7 @@ class Converged:
     apart : whether the bodies were taken apart in the increment
     energy : work since the lap began
     timing : how well contact was followed since then
+    lost : how far its beginning is from what the increment before has left
     """
 
     start: State
@@ -163,3 +164,4 @@ class Converged:
     apart: bool = False
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)
+    lost: float = 0.0

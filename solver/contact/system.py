@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from solver.model.loads import Load
     from solver.model.model import Model
 
+    Array = NDArray[np.float64]
+
 
 LEAST = 1e-7
 """Force, or energy / that of elements that resist what is given, from which on ratios are told."""
@@ -38,6 +41,8 @@ _TOUCHING = 1e-9
 """Gap / length of the longest contact surface, below which vertices touch."""
 _SET_DOWN = 1e-9
 """Gap / radius of a wheel that is set down, below which vertices touch."""
+_EXPANDED = 8
+"""States of condensed bodies whose displacements are kept: results and audit ask for them often."""
 
 
 def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: str) -> Part:
@@ -86,6 +91,7 @@ class System:
             for contact in model.contacts
         )
 
+        self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
         self._check_held()
 
     def _check_held(self) -> None:
@@ -194,8 +200,14 @@ class System:
     def displacement(self, name: str, state: State) -> NDArray[np.float64]:
         """Return the displacements (n,) of a whole body [mm]."""
         number = self.part(name)
-        part, u = self.parts[number], state.u[number]
-        return part.expand(u, state.time)
+        part, u, time = self.parts[number], state.u[number], state.time
+        for of, at, known in self._expanded:
+            if of is u and at == time:
+                return known
+        found = part.expand(u, time)
+        if found is not u:  # of a condensed body: its inside is solved for
+            self._expanded.append((u, time, found))
+        return found
 
     def axle(self, converged: Converged) -> Hub | None:
         """Return the motion of the first wheel, where there is one."""

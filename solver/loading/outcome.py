@@ -35,7 +35,7 @@ class Tally:
 
     Newton iterations of each increment, cuts, iterations whose contact problem needed pivoting or
     whose tangent was blended, CPU seconds, plastic work [N mm], least plastic dissipation at a
-    point in an increment [N mm/mm3].
+    point in an increment [N mm/mm3], most of what an increment has lost of the state before it.
     """
 
     iterations: tuple[int, ...] = ()
@@ -45,6 +45,7 @@ class Tally:
     seconds: float = 0.0
     plastic_work: float = 0.0
     dissipation: float = 0.0
+    lost: float = 0.0
 
     def plus(self, converged: Converged) -> Tally:
         """Return the tally with one more increment."""
@@ -55,6 +56,7 @@ class Tally:
             blended=self.blended + converged.blended,
             plastic_work=self.plastic_work + converged.plastic_work,
             dissipation=float(np.minimum(self.dissipation, converged.dissipation)),
+            lost=float(np.maximum(self.lost, converged.lost)),
         )
 
 

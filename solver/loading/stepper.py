@@ -17,6 +17,7 @@ from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
 from solver.loading.carrying import MEMORY, Carrier
 from solver.loading.energy import worked
+from solver.loading.history import lost
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
 from solver.loading.program import ROUNDING
@@ -243,10 +244,11 @@ class Stepper:
         return guess, guess is not None
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
-        """Return the increment ``now`` with the work since the lap began."""
+        """Return the increment ``now`` with the work since the lap began, and what it has lost."""
         with one_thread():
-            energy = worked(self.system, before, now)
-        return replace(now, energy=energy, timing=before.timing.then(now.timing))
+            energy, forgotten = worked(self.system, before, now), lost(self.system, before, now)
+        timing = before.timing.then(now.timing)
+        return replace(now, energy=energy, lost=forgotten, timing=timing)
 
     def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
         """Return the point after one more increment."""

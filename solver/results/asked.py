@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -126,6 +126,22 @@ class Asked:
             if span is not None:
                 inside &= (at >= span[0]) & (at <= span[1])
         return np.where(inside, values, np.nan), X
+
+
+class Looked(NamedTuple):
+    """Where a scene file looks, besides its view: what its record has by name.
+
+    Attributes
+    ----------
+    lines, points : in the order of their dimensions
+    contacts : names of the contact pairs
+    asked : numbers of every run
+    """
+
+    lines: Mapping[str, Places]
+    points: Mapping[str, Places]
+    contacts: Sequence[str]
+    asked: Sequence[Asked]
 
 
 def _positive_length(values: Array, s: Array) -> float:

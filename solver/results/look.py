@@ -11,6 +11,7 @@ from solver.results.quantities import Quantity
 if TYPE_CHECKING:
     from solver.loading.outcome import Outcome
     from solver.model.singular import SingularPoint
+    from solver.results.audit.recomputed import Recomputed
     from solver.results.audit.report import Audit
     from solver.results.samples import Bodies, Samples, Solved
     from solver.results.touch import Touch
@@ -30,6 +31,7 @@ class Look:
     check : () -> its audit, of a complete run
     notes : what the user must know of how it was computed
     singular : points beside which its numbers are those of the mesh
+    source : what its record is compared with; None for the states of a system
     """
 
     parameters: Any
@@ -39,6 +41,7 @@ class Look:
     check: Callable[[], Audit]
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
+    source: Recomputed | None = None
 
     @property
     def system(self) -> Bodies:

@@ -196,7 +196,8 @@ class Solution:
         With the state under load goes the one after unloading.
         """
         after = self.stages.get("unloaded") if stage == "loaded" else None
-        found = audit(self.system, self._at(stage), after, self.tally.dissipation)
+        tally = self.tally
+        found = audit(self.system, self._at(stage), after, tally.dissipation, tally.lost)
         own = self.system.model.doubts + apart(self.system, self.stages.values())
         return replace(found, warnings=own + found.warnings)
 

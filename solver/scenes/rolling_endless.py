@@ -13,6 +13,7 @@ import numpy as np
 from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
+from solver.results.audit.sources import OfPass
 from solver.results.audit.steady import audit_pass
 from solver.results.look import Look
 from solver.results.samples import Samples
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from solver.model.motion import TravellingPressure
     from solver.results.audit.report import Audit
     from solver.results.steady import Standing
     from solver.results.touch import Touch
@@ -110,6 +112,7 @@ class _Rolled:
         self._steps: list[int] = []
         self._traces: list[Trace] = []
         self._found: Pass | None = None
+        self._previous: Pass | None = None
 
     def looks(
         self, runs: Sequence[RollingParameters], monitor: Monitor, reach: float
@@ -125,7 +128,7 @@ class _Rolled:
         self.error = None
         try:
             for number, found in enumerate(steady_passes(last, reach), start=1):
-                self._found = found
+                self._previous, self._found = self._found, found
                 self._steps.append(max(found.steps, 1))
                 self._traces.append(self._sides[found.direction].trace(found))
                 monitor(min(number / last.passes, 0.99))
@@ -144,29 +147,34 @@ class _Rolled:
         """Return a run after the last pass found."""
         found = self._found
         side = self._sides[found.direction if found else self._last.directions[0]]
+        view = side.samples.view
         seconds = time.process_time() - self._started - self._elsewhere
         points = side.states(found) if found else {}
         outcome = Outcome(
             tally=Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan),
-            last=points.get(side.samples.view.unloaded),
+            last=points.get(view.unloaded),
             points=points,
             traces=tuple(self._traces),
             error=self.error,
         )
 
+        previous, ways = self._previous, self._last.directions
+
         def check() -> Audit:
             assert found is not None
-            return audit_pass(side.half_plane.track, run.linear_material(), found)
+            way = ways[len(self._steps) - 1]
+            return audit_pass(side.half_plane.track, run.linear_material(), found, previous, way)
 
-        touch = _touch(run.of_pass(max(len(self._steps) - 1, 0)), side.half_plane.way)
-        body = side.samples.view.profile_body
+        own = run.of_pass(max(len(self._steps) - 1, 0))
+        moving = _moving(own, found.direction) if found and own.load != "contact" else None
         return Look(
             parameters=run,
             samples=side.samples,
-            touch=touch,
+            touch=_touch(own, side.half_plane.way),
             outcome=outcome,
             check=check,
-            notes=doubts({body: run.linear_material()}),
+            notes=doubts({side.samples.view.profile_body: run.linear_material()}),
+            source=OfPass(side.half_plane, found, moving, view.unloaded) if found else None,
         )
 
 
@@ -222,5 +230,9 @@ def _touch(parameters: RollingParameters, way: int) -> Touch:
     """Return what acts on the half-space."""
     if parameters.load == "contact":
         return SteadyContact(way)
+    return Prescribed(_moving(parameters, way), 0.0)
+
+
+def _moving(parameters: RollingParameters, way: int) -> TravellingPressure:
     p, ratio = parameters, way * parameters.friction * parameters.traction
-    return Prescribed(standing_pressure(p.half_width, p.peak_pressure, ratio), 0.0)
+    return standing_pressure(p.half_width, p.peak_pressure, ratio)

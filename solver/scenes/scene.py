@@ -23,6 +23,7 @@ from solver.results.view import View
 from solver.scenes.effort import Effort
 
 if TYPE_CHECKING:
+    from solver.results.asked import Looked
     from solver.results.audit.report import Audit
     from solver.results.samples import Samples
 
@@ -53,6 +54,7 @@ class Scene:
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
     view : (parameters) -> where results are taken
+    looked : (parameters) -> places that have names, and numbers asked for at them, where there are
     outputs : functions that compute quantities of a complete run
     costs : functions that compute quantities of every run, also of one that failed
     method : (parameters) -> how runs that differ in ``branch`` are computed; `by_increments`
@@ -79,6 +81,7 @@ class Scene:
     view: Callable[[Any], View]
     outputs: tuple[Output, ...]
     costs: tuple[Output, ...]
+    looked: Callable[[Any], Looked] | None = None
     refining: frozenset[str] = frozenset()
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
@@ -115,29 +118,41 @@ class Scene:
             status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
             messages = (*look.notes, str(look.outcome.error))
             return self._labelled(look, status, messages, cost)
+        from solver.results.audit.stored import stored  # only who computes needs the solver
+
         check = look.check()
         status = Status.OUTSIDE_THEORY if check.outside else Status.OK
         states = {stage: look.outcome.points[stage] for stage in look.view.stages}
         own = self.warnings(look) if self.warnings else ()
         figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
-        found = self._labelled(
-            look,
-            status if check.passed else Status.AUDIT_FAILED,
-            check.violations + check.outside + look.notes + check.warnings + own,
-            {**cost, **figures, **_merged(look, (singular_points, *self.outputs))},
+        values = {**cost, **figures, **_merged(look, (singular_points, *self.outputs))}
+        written = self._labelled(look, Status.OK, (), values)
+        looked = self.looked(look.parameters) if self.looked else None
+        last = stored(look, written, self.view(look.parameters), looked)
+        violations = check.violations + last.violations
+        if violations:
+            status = Status.AUDIT_FAILED
+        messages = violations + check.outside + look.notes + check.warnings + own
+        return replace(
+            written,
+            status=status,
+            message=self._told(status, messages),
+            scalars={**written.scalars, "audit_stored": last.figure},
+            mesh=partial(mesh_fields, look.system, states),
         )
-        return replace(found, mesh=partial(mesh_fields, look.system, states))
+
+    def _told(self, status: Status, messages: tuple[str, ...]) -> str:
+        advice = self.advice.get(status)
+        return "; ".join((*messages, advice) if advice else messages)
 
     def _labelled(
         self, look: Look, status: Status, messages: tuple[str, ...], values: Values
     ) -> Record:
-        if advice := self.advice.get(status):
-            messages += (advice,)
         own = {q.name: value for q, value in values.items() if q.coordinate}
         return Record(
             parameters=look.parameters,
             status=status,
-            message="; ".join(messages),
+            message=self._told(status, messages),
             coordinates={**look.view.coordinates, **own},
             fields={
                 q.name: (q.dims, value)
@@ -189,7 +204,8 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
 
         def check(outcome: Outcome = outcome) -> Audit:
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
-            return audit(system, loaded, unloaded, outcome.tally.dissipation)
+            tally = outcome.tally
+            return audit(system, loaded, unloaded, tally.dissipation, tally.lost)
 
         reached = () if outcome.error else outcome.points.values()
         yield Look(

@@ -6,8 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.results.asked import Asked
-from solver.results.places import Fields, Places, along_lines, at_points, on_pairs, over_time
+from solver.results.asked import Asked, Looked
+from solver.results.places import (
+    Fields,
+    Places,
+    along_lines,
+    at_points,
+    on_pairs,
+    over_time,
+)
 from solver.results.view import View
 from studies.scenes import tables
 
@@ -54,15 +61,22 @@ def asked(scene: tables.SceneFile) -> list[Asked]:
     return [Asked(name=name, **each.model_dump()) for name, each in scene.outputs.items()]
 
 
+def places_of(scene: tables.SceneFile) -> Looked:
+    """Return the places that a scene file names, and the numbers that it asks for."""
+    look = scene.look
+    return Looked(
+        lines={n: Places(line.body, places(line, look.samples)) for n, line in look.lines.items()},
+        points={n: Places(at.body, np.array(at.at)[:, None]) for n, at in look.points.items()},
+        contacts=[contact.name for contact in scene.contacts],
+        asked=asked(scene),
+    )
+
+
 def looked(scene: tables.SceneFile, program: Program, look: Look) -> Values:
     """Return all that a scene file asks for of a run."""
     system: Any = look.system
     fields = Fields(system, {name: look.outcome.points[name] for name in look.view.stages})
-    lines = {name: Places(line.body, places(line, scene.look.samples))
-             for name, line in scene.look.lines.items()}  # fmt: skip
-    points = {name: Places(point.body, np.array(point.at)[:, None])
-              for name, point in scene.look.points.items()}  # fmt: skip
-    contacts = [contact.name for contact in scene.contacts]
+    lines, points, contacts, numbers = places_of(scene)
     out: dict[Any, Any] = {}
     if lines:
         out |= along_lines(fields, lines)
@@ -72,7 +86,7 @@ def looked(scene: tables.SceneFile, program: Program, look: Look) -> Values:
         out |= on_pairs(fields, contacts, scene.look.samples)
     times = [0.0, *(target.time for target in program.targets)]
     out |= over_time(look.outcome.history, times, system.all_names, contacts)
-    for number in asked(scene):
+    for number in numbers:
         out |= number.values(fields, lines, contacts)
     return out
 

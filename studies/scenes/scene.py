@@ -25,11 +25,12 @@ from studies.scenes.checking import clashes
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of
 from studies.scenes.examining import examined
-from studies.scenes.looking import asked, looked, view_of
+from studies.scenes.looking import asked, looked, places_of, view_of
 
 if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.model.model import Model
+    from solver.results.asked import Looked
     from solver.results.samples import Samples
     from solver.results.view import View
 
@@ -92,6 +93,7 @@ def _made(description: Description, scene: tables.SceneFile) -> FileScene:
         model=partial(_model, description),
         program=partial(_program, description),
         view=partial(_view, description),
+        looked=partial(_places, description),
         outputs=(*((_maps,) if scene.look.map else ()), partial(_looked, description)),
         costs=(cost,),
         watch=_watched,
@@ -140,6 +142,10 @@ def _effort(description: Description, parameters: Any, values: Sequence[Any]) ->
 
 def _view(description: Description, parameters: Any) -> View:
     return view_of(_tables(description, parameters))
+
+
+def _places(description: Description, parameters: Any) -> Looked:
+    return places_of(_tables(description, parameters))
 
 
 def _looked(description: Description, look: Look) -> Values:

@@ -102,7 +102,7 @@ class StoredCentre(Law):
             centre=state.centre + 2 / 3 * Hk * flow,
         )
         n = np.sqrt(2 / 3) * N
-        q = f + self.like.yield_stress
+        q = np.where(f > 0, f, 0.0) + self.like.yield_stress  # none of what stays elastic
         shrunk = 2 * G * np.where(f > 0, 3 * G * dp / q, 0.0)
         P = (C - self.elasticity.bulk_modulus * _ones(len(strain))) / (2 * G)
         turned = np.where(f > 0, 2 * G * 3 * G / (3 * G + Hk), 0.0) - shrunk

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from hashlib import sha256
 
 import numpy as np
@@ -29,10 +29,13 @@ from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
 from solver.loading.program import Lap, shared
 from solver.loading.settling import Settling
+from solver.materials import TrescaMaterial
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
+from solver.model.loads import Temperature
 from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
+from tests.solver.laws import CURVES, LAYERED, STEEL, StoredCentre, chaboche, steel
 
 COARSE = PunchParameters(smallest_element=0.05, growth=1.8, friction=0.3)
 CONTROL = PathControl(load_step=0.1, unload_steps=2)
@@ -102,6 +105,47 @@ def test_branches_of_one_path_equal_separate_runs_bit_for_bit(system):
             assert all(map(np.array_equal, arrays(ours), arrays(theirs)))
         assert branch.tally.iterations == alone.tally.iterations
         assert branch.tally.plastic_work == alone.tally.plastic_work
+
+
+WITH_MEMORY = {
+    "mixed": steel("mixed"),
+    "back stresses": chaboche("fading"),
+    "layered": LAYERED,
+    "tresca": TrescaMaterial(elasticity=STEEL, curve=CURVES["linear"]),
+    "own": StoredCentre(steel("kinematic")),
+    "heated": chaboche("fading"),
+}
+
+
+@pytest.mark.parametrize("name", WITH_MEMORY)
+def test_a_branch_has_all_that_its_law_remembers(name):
+    """Every internal variable, also those that only this law has, and heat of each time."""
+    law = WITH_MEMORY[name]
+    half_width = np.array([0.0, 0.4, 0.8, 1.2, 2.0])
+    heat = Temperature(rise=lambda x: 40.0 - 10.0 * x[0], expansion=1e-5, modulus_drop=4e-4,
+                       yield_drop=2e-3)  # fmt: skip
+    block = Body(
+        name="block",
+        mesh=grid(half_width, -half_width[::-1]).with_boundaries(
+            {"under": lambda x: (x[1] == 0.0) & (x[0] < 0.8)}
+        ),
+        material=law,
+        supports={"left": "x", "bottom": "y"},
+        pressure={"under": 1100.0},
+        loads=(heat,) if name == "heated" else (),
+    )
+    system = System(Model(bodies=(block,)))
+    fork, branch = walked(system, [0.6, 0.7])
+    alone = outcome_at(system, 0.7)
+    (remembered,) = fork.points["loaded"].state.plastic
+    for stage in ("loaded", "unloaded"):
+        ours, theirs = (found.points[stage] for found in (branch, alone))
+        (own,), (other,) = ours.state.plastic, theirs.state.plastic
+        for variable in fields(other):
+            assert getattr(remembered, variable.name).any(), f"{variable.name} is nothing yet"
+            one, two = (getattr(each, variable.name) for each in (own, other))
+            assert np.array_equal(one, two), variable.name
+        assert all(map(np.array_equal, arrays(ours), arrays(theirs)))
 
 
 def test_programs_in_any_order_give_the_same(system):

@@ -181,8 +181,9 @@ def test_all_runs_with_one_mesh_share_it():
 )
 def test_the_audit_finds_what_is_wrong(broken, figure):
     parameters, track, found = one_pass(traction=0.3)
-    assert audit_pass(track, parameters.linear_material(), found).violations == ()
-    violations = audit_pass(track, parameters.linear_material(), broken(found)).violations
+    material = parameters.linear_material()
+    assert audit_pass(track, material, found, None, 1).violations == ()
+    violations = audit_pass(track, material, broken(found), None, 1).violations
     assert any(text.startswith(figure) for text in violations), violations
 
 

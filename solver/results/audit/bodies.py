@@ -50,11 +50,11 @@ class AuditedBody:
     def _strain(self, state: State) -> Array:
         """Return Mandel strain (4, n_points) from the displacements, without the eigenstrain."""
         strain = self.plain.strain(self._system.displacement(self.name, state))
-        return strain.reshape(len(strain), -1) - self.plain.part.eigenstrain(state.time)
+        return strain.reshape(len(strain), -1) - self.plain.eigenstrain(state.time)
 
     @cached_property
     def _law(self) -> Law:
-        return self.plain.part.law(self._converged.state.time)
+        return self.plain.law(self._converged.state.time)
 
     @cached_property
     def _reached(self) -> Array:

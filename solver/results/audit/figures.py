@@ -48,6 +48,10 @@ _DECLARED = [
         "smallest plastic dissipation of an increment in a unit of volume", "MPa",
     ),
     declare(
+        "audit_history",
+        "what an increment or pass begins with, less what the one before has left / yield stress",
+    ),
+    declare(
         "audit_contact_after_unloading",
         "force out of balance with the stress of the released bodies", "N",
     ),
@@ -68,6 +72,10 @@ _DECLARED = [
     declare(
         "audit_small_sliding",
         "motion along the partner that small sliding leaves out / side of an element",
+    ),
+    declare(
+        "audit_stored",
+        "difference between what is stored of a run and what is computed anew / its scale",
     ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),

@@ -1,8 +1,9 @@
-"""A second, plain evaluation of a body: strain, nodal forces, applied forces, elastic energy.
+"""A second, plain evaluation of a body: strain, stress, nodal forces, applied forces, energy.
 
 Nothing here uses the operators that increments are solved with: gradients come from the elements
-themselves, volumes from the quadrature, and the resultants of pressures from the shape of the
-boundary. Stress and strain are Mandel vectors, elements and points last.
+themselves, volumes from the quadrature, heat and initial stress from the loads as they were
+declared, and the resultants of pressures from the shape of the boundary. Stress and strain are
+Mandel vectors, elements and points last.
 """
 
 from __future__ import annotations
@@ -14,15 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.fem.surface import edges_of
+from solver.materials.heated import Heated
 from solver.mesh.elements import element_type
 from solver.mesh.shapes import shape_functions
-from solver.model.loads import Pressure, Traction
-from solver.tensors import SQRT2, to_tensor
+from solver.model.loads import InitialStress, Pressure, Temperature, Traction
+from solver.tensors import SQRT2, to_mandel, to_tensor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
+    from solver.materials.law import Law
+    from solver.materials.state import PlasticState
+    from solver.model.amplitude import Amplitude
     from solver.model.body import Body
 
     Array = NDArray[np.float64]
@@ -30,6 +35,11 @@ if TYPE_CHECKING:
 
 _CHORDS = 64
 """Chords of a curved edge."""
+
+
+def load_factor(amplitude: Amplitude | None, time: float) -> float:
+    """Return the factor at a time of a load with this amplitude: time itself, where it has none."""
+    return time if amplitude is None else float(np.interp(time, amplitude.time, amplitude.value))
 
 
 @dataclass(frozen=True)
@@ -100,6 +110,86 @@ class PlainBody:
             zz = np.einsum("iep,ie->ep", self._round, at[..., 0])
         return self._level(np.array([xx, yy, zz, xy / SQRT2]))
 
+    @cached_property
+    def points(self) -> Array:
+        """Places of the points (2, n_points) [mm]."""
+        return np.asarray(self.part.basis.global_coordinates()).reshape(2, -1)
+
+    def recovered(self, values: Array) -> Array:
+        """Return nodal values (..., n_nodes) of values at points (..., n_points).
+
+        In each element the values are those of a (bi)linear field that is nearest to them at its
+        points; at a node the mean over elements counts, weighted with their volume.
+        """
+        basis = self.part.basis
+        terms = 4 if basis.mesh.t.shape[0] == 4 else 3
+        terms = next(k for k in (terms, 3, 1) if self.volume.shape[1] >= k)
+
+        def linear(x: Array) -> Array:
+            return np.stack([np.ones(x.shape[1]), x[0], x[1], x[0] * x[1]][:terms], axis=1)
+
+        fit, *_ = np.linalg.lstsq(linear(np.asarray(basis.X)), np.eye(self.volume.shape[1]))
+        to_nodes = linear(np.array(basis.elem.doflocs, dtype=float).T) @ fit
+        volume, nodes = self.volume.sum(axis=1), self._nodes
+        count = self.part.X.shape[1]
+        weighted = values.reshape(*values.shape[:-1], *self.volume.shape) * volume[:, None]
+        each = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
+        total = np.bincount(nodes.ravel(), np.tile(volume, len(nodes)), count)
+        total[total == 0] = 1.0  # copies of a periodic body have no element of their own
+        sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in each]) / total
+        return np.asarray(sums[:, self.part.same].reshape(*values.shape[:-1], count))
+
+    def eigenstrain(self, time: float) -> Array:
+        """Return the Mandel strain (4, n_points) of heat and of making, without stress."""
+        out, elasticity = np.zeros((4, self.points.shape[1])), self.body.material.elasticity
+        for load in self.body.every_load:
+            if isinstance(load, Temperature):
+                rise = load_factor(load.amplitude, time) * load.at(self.points)
+                out[:3] += load.expansion * rise
+            elif isinstance(load, InitialStress):
+                nu, stress = elasticity.poisson_ratio, to_mandel(load.at(self.points))
+                out[:3] += nu / elasticity.youngs_modulus * stress[:3].sum(axis=0)
+                out -= (1 + nu) / elasticity.youngs_modulus * stress
+        return out
+
+    def _left(self, time: float) -> tuple[Array, Array]:
+        """Return the shares of Young's modulus and of the yield stress that heat leaves."""
+        stiff, strong = np.ones((2, self.points.shape[1]))
+        for load in self.body.every_load:
+            if isinstance(load, Temperature) and load.softens:
+                rise = load_factor(load.amplitude, time) * load.at(self.points)
+                stiff -= load.modulus_drop * rise
+                strong -= load.yield_drop * rise
+        return stiff, strong
+
+    def law(self, time: float) -> Law:
+        """Return the law of the points at a time."""
+        stiff, strong = self._left(time)
+        if (stiff == 1).all() and (strong == 1).all():
+            return self.body.law
+        return Heated(law=self.body.law, stiff=stiff, strong=strong)
+
+    def stress(self, u: Array, plastic: PlasticState | None, time: float) -> Array:
+        """Return Mandel stress (4, n_points) by Hooke's law [MPa].
+
+        Parameters
+        ----------
+        u : (n,) displacements [mm]
+        plastic : internal variables at the points, None where nothing has yielded
+        """
+        elasticity = self.body.material.elasticity
+        nu, double_shear = elasticity.poisson_ratio, 2 * elasticity.shear_modulus
+        strain = self.strain(u).reshape(4, -1) - self.eigenstrain(time)
+        if plastic is not None:
+            strain -= plastic.plastic_strain
+        if self.body.kinematics == "plane_stress":
+            strain[2] = -nu / (1 - nu) * (strain[0] + strain[1])
+        out = double_shear * strain
+        out[:3] += double_shear * nu / (1 - 2 * nu) * strain[:3].sum(axis=0)
+        if self.body.kinematics == "plane_stress":
+            out[2] = 0.0
+        return np.asarray(self._left(time)[0] * out)
+
     def forces(self, stress: Array) -> Array:
         """Return the nodal forces (n_nodes, 2) that balance a Mandel stress (4, n_points) [N]."""
         tensor = to_tensor(stress).reshape(4, *self.volume.shape)
@@ -134,10 +224,10 @@ class PlainBody:
                 force = load.value * np.array([-along[1], along[0]])
             else:
                 force = np.multiply.outer([load.x, load.y], np.linalg.norm(along, axis=0))
-            total += load.factor(time) * (depth * force).sum(axis=(1, 2))
+            total += load_factor(load.amplitude, time) * (depth * force).sum(axis=(1, 2))
         return total
 
     def elastic_energy(self, stress: Array, time: float) -> float:
         """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""
-        density = self.part.law(time).energy_density(stress)
+        density = self.law(time).energy_density(stress)
         return float((density * self.volume.ravel()).sum())

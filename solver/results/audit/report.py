@@ -35,6 +35,7 @@ _LIMITS = {
     "audit_slip": 0.03,
     "audit_touch_time": 0.1,
     "audit_slip_resolution": 0.5,
+    "audit_history": 1e-6,
     "audit_energy": 1e-5,
 }
 _TURNING = 0.02  # energy error where the directions of contact turn within an increment
@@ -72,9 +73,16 @@ def _largest(*values: float) -> float:
 
 
 def audit(
-    system: System, loaded: Converged, unloaded: Converged | None, least_dissipation: float
+    system: System,
+    loaded: Converged,
+    unloaded: Converged | None,
+    least_dissipation: float,
+    lost: float = 0.0,
 ) -> Audit:
-    """Check one run: its state under load and, where there is one, after unloading."""
+    """Check one run: its state under load and, where there is one, after unloading.
+
+    ``least_dissipation`` and ``lost`` are those of all its increments, see `Tally`.
+    """
     states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
     bodies, released = (
@@ -98,6 +106,7 @@ def audit(
         "audit_touch_time": loaded.timing.unknown,
         "audit_slip_resolution": loaded.timing.passage,
         "audit_dissipation": least_dissipation,
+        "audit_history": lost,
         "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
     }  # fmt: skip
     figures |= _strength(system, loaded)

@@ -38,8 +38,16 @@ _LIMITS = {
 }
 
 
-def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
-    """Check a steady pass: the state under load, what it leaves, and how material came there."""
+def audit_pass(
+    track: Track, material: Material, found: Pass, previous: Pass | None, direction: int
+) -> Audit:
+    """Check a steady pass: the state under load, what it leaves, and how material came there.
+
+    Parameters
+    ----------
+    previous : the pass before it, None of the first one
+    direction : its way along x, as declared
+    """
     plain, C = PlainBody(track.part), material.stiffness(4)
     loaded, left = under_load(track, found), of_layers(track, found.after)
     stress, residual = (C @ (f.strain - f.plastic.plastic_strain) for f in (loaded, left))
@@ -55,6 +63,7 @@ def audit_pass(track: Track, material: Material, found: Pass) -> Audit:
         "audit_law": way.misfit() / material.yield_stress,
         "audit_yield": way.beyond() / material.yield_stress,
         "audit_dissipation": way.dissipation(),
+        "audit_history": way.lost(previous, direction),
         "audit_inflow": way.inflow(),
         "audit_outflow": way.outflow(),
         "audit_steadiness": 2 * material.shear_modulus * found.left_over / material.yield_stress,
@@ -112,6 +121,24 @@ class _Way:
         nothing = np.zeros((4, 4, 0)), np.zeros(0, dtype=bool)
         response = Response(self._stress, nothing[0], self._after, nothing[1])
         return float(self._material.dissipation(self._before, response).min())
+
+    def lost(self, previous: Pass | None, direction: int) -> float:
+        """Return how far the state before the pass is from that which the last one left.
+
+        It is a difference of plastic strain, times 2 G / yield stress. Seen along the other way
+        shear has the other sign.
+        """
+        found = self._found
+        before = found.before.whole
+        strain, flow = np.zeros_like(before.plastic_strain), np.zeros_like(before.accumulated)
+        if previous is not None:
+            left = previous.after.whole
+            seen = 1.0 if previous.direction == direction else -1.0
+            strain, flow = left.plastic_strain * [1.0, 1.0, 1.0, seen], left.accumulated
+        off = np.append(np.abs(before.plastic_strain - strain), np.abs(before.accumulated - flow))
+        double_shear = 2 * self._material.shear_modulus
+        turned = float(found.direction != direction)
+        return max(turned, _largest(off) * double_shear / self._material.yield_stress)
 
     def inflow(self) -> float:
         """Return the plastic strain gathered in the first column / that of the pass."""

@@ -17,6 +17,7 @@ from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
 from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.results.audit.plain import load_factor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -194,7 +195,8 @@ class Surfaces:
         pressure, shear = ((hats * (f / safe)[ends]).sum(axis=0) for f in (normal, tangential))
         force = partner.faces * (-pressure * n + shear * t)
         true_gap = true.distance(on_slave(xs))
-        offset = self.pair.offset(state.time)
+        factor = load_factor(self.pair.amplitude, state.time)
+        offset = self.pair.gap - factor * self.pair.interference
         return Touching(
             area=area,
             gap=mean((apart * n).sum(axis=0), partner.faces) + offset,

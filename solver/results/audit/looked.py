@@ -1,0 +1,277 @@
+"""What a record stores of a scene file's looks, against what is computed anew."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.model.rigid import Moved, RigidBody
+from solver.results.audit.compared import LIMIT, MEASURED, Compared, some
+from solver.results.audit.plain import load_factor
+from solver.results.audit.sources import between
+from solver.results.audit.values import Places, flowed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.results.asked import Asked, Looked
+    from solver.results.audit.sources import OfStates
+    from solver.results.audit.tractions import Tractions
+    from solver.results.look import Look
+    from solver.results.record import Record
+
+    Array = NDArray[np.float64]
+
+_LEAST_STRAIN = 1e-6
+_LEAST_LENGTH = 1e-9
+"""Displacement, gap or slip / size of the bodies, that is next to nothing."""
+_PARTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
+_ROUNDED = 1e-9
+"""Difference of times of the program that is rounding."""
+
+
+class LookedAt:
+    """Lines, points, contact surfaces, the course of forces and motions, and numbers.
+
+    Parameters
+    ----------
+    stress_scale : that differences of stress are divided by [MPa]
+    """
+
+    def __init__(
+        self,
+        look: Look,
+        record: Record,
+        looked: Looked,
+        source: OfStates,
+        out: Compared,
+        stress_scale: float,
+    ) -> None:
+        self._look, self._record, self._looked, self._source = look, record, looked, source
+        self._out = out
+        sizes = [np.ptp(look.system.full(name).X, axis=1).max() for name in look.system.names]
+        length = _LEAST_LENGTH * float(max(sizes))
+        self._least = {"stress": stress_scale, "mises": stress_scale,
+                       "plastic_strain": _LEAST_STRAIN, "displacement": length,
+                       "pressure": _LEAST_STRAIN * stress_scale,
+                       "shear": _LEAST_STRAIN * stress_scale,
+                       "pressure_deformed": _LEAST_STRAIN * stress_scale,
+                       "gap": length, "slip": length}  # fmt: skip
+
+    def compare(self) -> None:
+        """Compare all that is declared."""
+        self._lines()
+        self._points()
+        self._pairs()
+        self._moments()
+        for asked in self._looked.asked:
+            self._asked(asked)
+
+    def _field(self, name: str) -> Array:
+        return np.asarray(self._record.fields[name][1])
+
+    def _scale(self, kind: str, values: Array) -> float:
+        return max(float(np.max(np.abs(np.nan_to_num(values)), initial=0.0)), self._least[kind])
+
+    # -- lines and points ------------------------------------------------------------------------
+
+    def _lines(self) -> None:
+        for k, line in enumerate(self._looked.lines.values()):
+            X = np.stack([self._field("line_x")[k], self._field("line_y")[k]])
+            self._out.add("line_x", X, line.X, float(np.abs(line.X).max()))
+            s = np.append(0.0, np.cumsum(np.hypot(*np.diff(line.X))))
+            self._out.add("line_distance", self._field("line_distance")[k], s, s[-1])
+            stress, mises, strain = (
+                self._field(f"line_{name}")[k] for name in ("stress", "mises", "plastic_strain")
+            )
+            at = some(X.shape[1], stress, mises, strain)
+            self._fields("line", line.body, line.X[:, at], stress[..., at], mises[..., at],
+                         strain[..., at])  # fmt: skip
+
+    def _points(self) -> None:
+        for k, point in enumerate(self._looked.points.values()):
+            X = np.array([self._field("point_x")[k], self._field("point_y")[k]])
+            self._out.add("point_x", X, point.X[:, 0], float(np.abs(point.X).max()))
+            stress, mises, strain = (
+                self._field(f"point_{name}")[k][..., None]
+                for name in ("stress", "mises", "plastic_strain")
+            )
+            places = self._fields("point", point.body, point.X, stress, mises, strain)
+            for j, stage in enumerate(self._look.view.stages):
+                moved = self._source.fields(point.body, stage).displacement
+                own, scale = places.of(moved)[:, 0], self._scale("displacement", moved)
+                for axis, value in zip("xy", own, strict=True):
+                    name = f"point_displacement_{axis}"
+                    self._out.add(name, self._field(name)[k, j], value, scale)
+
+    def _fields(
+        self, kind: str, body: str, X: Array, stress: Array, mises: Array, strain: Array
+    ) -> Places:
+        """Compare fields (stage, ..., n) at places (2, n) of a body."""
+        places = Places(self._source.plain(body), X)
+        for k, stage in enumerate(self._look.view.stages):
+            fields = self._source.fields(body, stage)
+            for name, told, nodal in (
+                ("stress", stress[k], fields.stress),
+                ("mises", mises[k], np.maximum(fields.mises, 0.0)),
+                ("plastic_strain", strain[k], flowed(fields)),
+            ):
+                own = places.of(nodal)
+                own = own if name == "stress" else np.maximum(own, 0.0)
+                self._out.add(f"{kind}_{name}", told, own, self._scale(name, nodal))
+                self._out.absent(f"{kind}_{name}", told, places.outside)
+        return places
+
+    # -- contact and forces ------------------------------------------------------------------
+
+    def _share(self, found: Tractions) -> float:
+        return LIMIT / MEASURED if found.measured else 1.0
+
+    def _pairs(self) -> None:
+        for k, _ in enumerate(self._looked.contacts):
+            for j, stage in enumerate(self._look.view.stages):
+                found = self._source.tractions(k, stage)
+                s = np.asarray(self._record.coordinates["fraction"]) * found.s[-1]
+                self._out.add("pair_distance", self._field("pair_distance")[k], s, s[-1])
+                for axis, at in zip("xy", found.X, strict=True):
+                    name, own = f"pair_{axis}", between(s, found.s, at)
+                    self._out.add(name, self._field(name)[k], own, float(np.abs(found.X).max()))
+                for name in ("pressure", "shear", "pressure_deformed", "gap", "slip"):
+                    values = _on_slave(found, name)
+                    share = self._share(found) if name in ("gap", "slip") else 1.0
+                    told = self._field(f"pair_{name}")[k, j]
+                    scale = found.way if name in ("gap", "slip") else self._scale(name, values)
+                    self._out.add(f"pair_{name}", told, between(s, found.s, values), scale, share)
+
+    def _moments(self) -> None:
+        """Compare forces and motions at the ends of stages."""
+        times = self._field("moment_time")
+        for stage in self._look.view.stages:
+            state = self._look.outcome.points[stage].state
+            near = np.flatnonzero(np.abs(times - state.time) < _ROUNDED)
+            if not len(near):
+                continue
+            contact = {name: np.zeros(2) for name in self._source.system.all_names}
+            finite = False
+            for k, pair in enumerate(self._source.system.model.contacts):
+                found = self._source.tractions(k, stage)
+                finite |= found.measured
+                contact[pair.slave[0]] += found.touching.on_slave.sum(axis=0)
+                contact[pair.master[0]] += found.touching.on_master.sum(axis=0)
+                for name in ("normal", "tangential"):
+                    own = getattr(state.contacts[k], name).sum()
+                    told = self._field(f"contact_{name}_force")[k, near[-1]]
+                    self._out.add(f"contact_{name}_force", told, own, state.force_scale)
+            for j, name in enumerate(self._source.system.all_names):
+                body = self._source.system.model.body(name)
+                self._part(body, j, int(near[-1]), contact[name], state, measured=finite)
+
+    def _part(
+        self, body: Any, j: int, moment: int, contact: Array, state: Any, *, measured: bool
+    ) -> None:
+        """Compare the reaction and the motion of a body or rigid body."""
+        own = -contact
+        if isinstance(body, RigidBody):
+            u = state.u[self._source.system.part(body.name)]
+            for name, motion, moved in zip(
+                ("motion_x", "motion_y"), body.every_load, u, strict=False
+            ):
+                held = isinstance(motion, Moved)
+                value = load_factor(motion.amplitude, state.time) * motion.value if held else moved
+                self._out.add(name, self._field(name)[j, moment], value,
+                              max(abs(value), self._least["gap"]))  # fmt: skip
+        else:
+            own = own - self._source.plain(body.name).applied(state.time)
+            if body.kinematics == "axisymmetric":
+                own[0] = np.nan  # radial forces are in balance round the axis
+        share = LIMIT / MEASURED if measured else 1.0
+        for name, value in zip(("reaction_x", "reaction_y"), own, strict=True):
+            told = self._field(name)[j, moment]
+            if np.isfinite(told):
+                self._out.add(name, told, value, state.force_scale, share)
+
+    # -- numbers -----------------------------------------------------------------------------
+
+    def _asked(self, asked: Asked) -> None:
+        """Compare an extreme value and its place, an integral or an extent."""
+        kind, _, part = asked.of.partition(".")
+        told, share = self._record.scalars[asked.name], 1.0
+        if asked.contact is not None:
+            found = self._source.tractions(self._looked.contacts.index(asked.contact), asked.stage)
+            values, X, s = _on_slave(found, kind), found.X, found.s
+            share = self._share(found) if kind in ("gap", "slip") else 1.0
+            if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
+                return
+            if (kind, asked.take) == ("pressure", "extent"):
+                self._out.add(asked.name, told, found.length, s[-1])
+                return
+            values = np.where(np.isnan(values) & ~found.closed, 0.0, values) if kind in (
+                "pressure", "shear") else values  # fmt: skip
+        else:
+            values, X = self._values(asked, kind, part)
+            s = np.append(0.0, np.cumsum(np.hypot(*np.diff(X))))
+        scale = self._scale(kind, values)
+        if not np.isfinite(values).any():
+            return
+        if asked.take in ("maximum", "minimum"):
+            own = np.nanmax(values) if asked.take == "maximum" else np.nanmin(values)
+            self._out.add(asked.name, told, own, scale, share)
+            place = [self._record.scalars[f"{asked.name}_{axis}"] for axis in "xy"]
+            off = np.hypot(*(X - np.array(place)[:, None]))
+            there = values[off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()]
+            near = np.abs(there[np.isfinite(there)] - own).min(initial=np.inf)
+            self._out.add(f"{asked.name}_x", near, 0.0, scale, share)
+            self._out.add(f"{asked.name}_x", off.min(), 0.0, max(s[-1], self._least["gap"]))
+            return
+        values = np.nan_to_num(values)
+        if asked.take == "integral":
+            whole, most = (float((v[1:] + v[:-1]) @ np.diff(s) / 2) for v in (values, abs(values)))
+            self._out.add(asked.name, told, whole, max(most, self._least[kind] * s[-1]), share)
+            return
+        self._out.add(asked.name, told, _above_zero(values, s), s[-1], share)
+
+    def _values(self, asked: Asked, kind: str, part: str) -> tuple[Array, Array]:
+        """Return the values (n,) of a field of a body or line, and where they are (2, n)."""
+        if asked.line is not None:
+            line = self._looked.lines[asked.line]
+            body, X = line.body, line.X
+        else:
+            body, X = str(asked.body), None
+        fields = self._source.fields(body, asked.stage)
+        if X is None and kind in ("mises", "plastic_strain"):
+            X, mises, flow = fields.at_points
+            values = mises if kind == "mises" else flow
+        else:
+            nodal = flowed(fields) if kind == "plastic_strain" else getattr(fields, kind)
+            places = None if X is None else Places(self._source.plain(body), X)
+            values = nodal if places is None else places.of(nodal)
+            values = values[_PARTS[part]] if part else np.maximum(values, 0.0)
+            X = fields.plain.part.X if X is None else X
+        inside = np.ones(X.shape[1], dtype=bool)
+        for at, span in zip(X, (asked.x, asked.y), strict=True):
+            if span is not None and asked.line is None:
+                inside &= (at >= span[0]) & (at <= span[1])
+        return np.where(inside, values, np.nan), X
+
+
+def _on_slave(found: Tractions, kind: str) -> Array:
+    """Return what acts at the vertices of a slave (n,), NaN where it is not known."""
+    if kind in ("pressure", "pressure_deformed"):
+        moved = kind == "pressure_deformed"
+        return np.where(found.known, found.pressure(moved=moved), np.nan)
+    if kind == "shear":
+        return np.where(found.known, found.shear(moved=False), np.nan)
+    touching = found.touching
+    return np.where(found.known, touching.gap if kind == "gap" else touching.way, np.nan)
+
+
+def _above_zero(values: Array, s: Array) -> float:
+    """Return the length along which values, linear between places, are above zero."""
+    total = 0.0
+    for a, b, length in zip(values[:-1], values[1:], np.diff(s), strict=True):
+        if a > 0 and b > 0:
+            total += length
+        elif a > 0 or b > 0:
+            total += length * max(a, b) / abs(a - b)
+    return float(total)

@@ -1,0 +1,214 @@
+"""What a record is compared with: fields and contact of a run, from its states alone."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.model.loads import Displacement
+from solver.results.audit.plain import PlainBody, load_factor
+from solver.results.audit.recomputed import Acting
+from solver.results.audit.tractions import Tractions
+from solver.results.audit.values import PassFields, StateFields
+from solver.steady import Touching
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.model.motion import TravellingPressure
+    from solver.results.audit.recomputed import Fields
+    from solver.results.look import Look
+    from solver.results.steady import HalfPlane
+    from solver.steady import Pass
+
+    Array = NDArray[np.float64]
+
+
+def between(x: Array, at: Array, values: Array) -> Array:
+    """Return values at places x, linear between those known; NaN beyond the first and the last."""
+    return np.asarray(np.interp(x, at, values, left=np.nan, right=np.nan))
+
+
+class OfStates:
+    """A run of a system of bodies."""
+
+    def __init__(self, look: Look) -> None:
+        self._look, self.system = look, _any(look.system)
+        self.plain = cache(lambda name: PlainBody(look.system.full(name)))
+        self.fields = cache(self._fields)
+        self.tractions = cache(self._tractions)
+
+    def _fields(self, name: str, stage: str) -> Fields:
+        state, number = self._look.outcome.points[stage].state, self.system.part(name)
+        plastic = state.plastic[number] if self.system.parts[number].meshed else None
+        u = self.system.displacement(name, state)
+        return StateFields(self.plain(name), u, plastic, state.time)
+
+    def exact(self, stage: str) -> bool:
+        """See `Recomputed`."""
+        del stage
+        return True
+
+    def held(self, name: str, stage: str) -> tuple[Array, Array]:
+        """Return displacements where a body is held or moved: those found, those declared [mm]."""
+        body, fields = self.plain(name).body, self.fields(name, stage)
+        declared = np.full_like(fields.displacement, np.nan)
+        for boundary, axes in body.supports.items():
+            for each in axes:
+                declared["xy".index(each), self.plain(name).part.boundary_nodes(boundary)] = 0.0
+        for load in reversed(body.every_load):  # the first that holds a component keeps it
+            if isinstance(load, Displacement):
+                nodes, factor = self.plain(name).part.boundary_nodes(load.boundary), load.amplitude
+                for axis, value in load.components.items():
+                    declared[axis, nodes] = load_factor(factor, self._time(stage)) * value
+        return fields.displacement, declared
+
+    def _tractions(self, pair: int, stage: str) -> Tractions:
+        return Tractions(self.system, pair, self._look.outcome.points[stage])
+
+    @property
+    def _travelling(self) -> TravellingPressure | None:
+        bodies = self.system.model.bodies
+        return next((b.travelling for b in bodies if b.travelling is not None), None)
+
+    def _time(self, stage: str) -> float:
+        return float(self._look.outcome.points[stage].state.time)
+
+    def centre(self, stage: str) -> float:
+        """See `Recomputed`."""
+        if stage not in self._look.view.following:
+            return 0.0
+        if self._travelling is not None:
+            return load_factor(self._travelling.position, self._time(stage))
+        axles = (b.axle for b in self.system.model.bodies if b.axle is not None)
+        each = (a.centre[0] + load_factor(a.position, self._time(stage)) for a in axles)
+        return float(next(each, 0.0))
+
+    def _along(self, X: Array) -> Array:
+        (x0, y0), (ax, ay) = self._look.view.axis
+        return np.asarray((X[0] - x0) * ax + (X[1] - y0) * ay)
+
+    def acting(self, stage: str, x: Array) -> Acting:
+        """See `Recomputed`."""
+        nowhere = np.full_like(x, np.nan)
+        if not self.system.interfaces:
+            if self._travelling is None:
+                return Acting(nowhere, nowhere, nowhere)
+            body = next(b for b in self.system.model.bodies if b.travelling is not None)
+            side = body.periodic and body.box[0]
+            return Acting(*hertz(self._travelling, self._time(stage), x, side or 0.0), nowhere)
+        found = self.tractions(0, stage)
+        at = self._along(found.X)
+        order = np.argsort(at)
+        if not found.closed.any():
+            nothing = between(x, at[order], np.zeros_like(at))
+            return Acting(nothing, nothing, nowhere)
+        unknown = np.where(found.known, 0.0, np.nan)
+        pressure, shear, gap = (
+            between(x, at[order], (values + unknown)[order])
+            for values in (found.pressure(moved=False), -found.shear(moved=False), found.gap)
+        )
+        return Acting(pressure, shear, gap, found.way, found.measured)
+
+    def extent(self, stage: str) -> tuple[float, float]:
+        """See `Recomputed`."""
+        if not self.system.interfaces:
+            moving = self._travelling
+            if moving is None:
+                return np.nan, 0.0
+            share = load_factor(moving.amplitude, self._time(stage))
+            return moving.half_width, share * moving.peak
+        found = self.tractions(0, stage)
+        x = self._along(found.X[:, found.closed])
+        if not len(x):
+            return np.nan, 0.0
+        pressure = found.pressure(moved=False)
+        if not found.known[pressure.argmax()]:
+            return np.nan, float(pressure.max())
+        width = x.max() if self._look.view.symmetric else np.ptp(x) / 2
+        return float(width), float(pressure.max())
+
+
+def hertz(moving: TravellingPressure, time: float, x: Array, period: float) -> tuple[Array, Array]:
+    """Return pressure and shear of a travelling pressure at places x (n,) [MPa]."""
+    away = x - load_factor(moving.position, time)
+    if period:
+        away = (away + period / 2) % period - period / 2
+    inside = np.clip(1 - (away / moving.half_width) ** 2, 0.0, None)
+    pressure = load_factor(moving.amplitude, time) * moving.peak * np.sqrt(inside)
+    return pressure, load_factor(moving.shear_ratio, time) * pressure
+
+
+class OfPass:
+    """A steady pass.
+
+    Parameters
+    ----------
+    moving : the pressure as it really goes, where no wheel makes it
+    released : name of the state that the pass leaves
+    """
+
+    def __init__(
+        self,
+        half_plane: HalfPlane,
+        found: Pass,
+        moving: TravellingPressure | None,
+        released: str,
+    ) -> None:
+        self._half_plane, self._found = half_plane, found
+        self._moving, self._released = moving, released
+        self.fields = cache(self._fields)
+        self.plain = cache(lambda name: PlainBody(half_plane.full(name)))
+
+    def _fields(self, name: str, stage: str) -> Fields:
+        del name
+        return PassFields(self._half_plane, self._found, loaded=stage != self._released)
+
+    def exact(self, stage: str) -> bool:
+        """See `Recomputed`: under the load there are two strains, see `audit_steadiness`."""
+        return stage == self._released
+
+    def centre(self, stage: str) -> float:
+        """See `Recomputed`."""
+        del stage
+        return 0.0
+
+    @property
+    def _vertices(self) -> tuple[Array, Array, Array]:
+        """Places along x, and pressure and shear there, as one sees them who stands beside."""
+        touching, chain = self._found.loading, self._half_plane.track.surface
+        assert isinstance(touching, Touching)
+        x, way = chain.X[0, chain.vertices], self._found.direction
+        side = np.abs(np.diff(x)) / 2
+        area = np.append(side, 0.0) + np.append(0.0, side)
+        order = np.argsort(way * x)
+        pressure, shear = touching.normal / area, -way * touching.tangential / area
+        return (way * x)[order], pressure[order], shear[order]
+
+    def acting(self, stage: str, x: Array) -> Acting:
+        """See `Recomputed`."""
+        nowhere = np.full_like(x, np.nan)
+        if self._moving is not None:
+            time = float(stage == self._released)
+            return Acting(*hertz(self._moving, time, x, 0.0), nowhere)
+        if stage == self._released:
+            return Acting(np.zeros_like(x), np.zeros_like(x), nowhere)
+        at, pressure, shear = self._vertices
+        return Acting(between(x, at, pressure), between(x, at, shear), nowhere)
+
+    def extent(self, stage: str) -> tuple[float, float]:
+        """See `Recomputed`."""
+        if self._moving is not None:
+            share = load_factor(self._moving.amplitude, float(stage == self._released))
+            return self._moving.half_width, share * self._moving.peak
+        if stage == self._released:
+            return np.nan, 0.0
+        at, pressure, _ = self._vertices
+        return float(np.ptp(at[pressure > 0]) / 2), float(pressure.max())
+
+
+def _any(system: Any) -> Any:
+    """Return what a look knows as bodies: of a run by increments it is a `System`."""
+    return system

@@ -1,0 +1,342 @@
+"""The last part of the audit: what a record stores, against what is computed anew.
+
+It begins at the end of the chain. Of each quantity of a record some values are taken, and those
+where it is largest; they are computed again at the places that view and scene file declare, from
+displacements, internal variables, contact forces and declared loads (`sources`). The sampler, the
+recovery, the looks and the outputs that made the record take no part.
+
+Quantities that a scene computes by itself are left out: nothing is declared of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.audit.compared import LIMIT, MEASURED, STEADY, Compared, some
+from solver.results.audit.figures import AUDIT
+from solver.results.audit.looked import LookedAt
+from solver.results.audit.sources import OfStates, between
+from solver.results.audit.values import Places, equivalent, flowed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from solver.results.asked import Looked
+    from solver.results.audit.recomputed import Fields, Recomputed
+    from solver.results.look import Look
+    from solver.results.record import Record
+    from solver.results.view import View
+
+    Array = NDArray[np.float64]
+
+_FIGURE = AUDIT["audit_stored"].name
+_LEAST_STRAIN = 1e-6
+"""Strain, and times Young's modulus stress, that is next to nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """The figure, the condition violated if any, and the names of what was compared."""
+
+    figure: float
+    violations: tuple[str, ...]
+    names: frozenset[str]
+
+
+def stored(look: Look, record: Record, view: View, looked: Looked | None) -> Stored:
+    """Compare a record with values computed anew.
+
+    Parameters
+    ----------
+    look : the run
+    record : what is stored of it
+    view, looked : where the scene looks, as its parameters declare it
+    """
+    source = look.source or OfStates(look)
+    viewed = _Viewed(look, record, view, source)
+    found = viewed.compared()
+    if looked is not None and isinstance(source, OfStates):
+        LookedAt(look, record, looked, source, found, viewed.stress_scale).compare()
+    violations: tuple[str, ...] = ()
+    if not found.figure <= LIMIT:
+        text = f"{_FIGURE} = {found.figure:.2e} exceeds {LIMIT:.2e}"
+        violations = (f"{text}: {found.name} is not what is computed anew",)
+    return Stored(found.figure, violations, frozenset(found.seen))
+
+
+class _Viewed:
+    """What a record stores at the places of its view."""
+
+    def __init__(self, look: Look, record: Record, view: View, source: Recomputed) -> None:
+        self._look, self._record, self._view, self._source = look, record, view, source
+        self._out = Compared()
+
+    def compared(self) -> Compared:
+        """Return the comparison of all that is declared."""
+        self._held()
+        self._coordinates()
+        self._maps()
+        self._profiles()
+        self._surfaces()
+        self._contact()
+        self._extremes()
+        return self._out
+
+    # -- what is stored ----------------------------------------------------------------------
+
+    def _stored(self, name: str) -> Array | None:
+        """Return a field, that after the last pass where it has passes."""
+        if name not in self._record.fields:
+            return None
+        dims, values = self._record.fields[name]
+        return np.asarray(values)[-1] if dims[0] == "pass" else np.asarray(values)
+
+    def _axis(self, name: str) -> Array:
+        return np.asarray(self._record.coordinates.get(name, np.zeros(0)), dtype=float)
+
+    def _coordinates(self) -> None:
+        """Compare the places that the record tells with those that are declared."""
+        for name, declared in self._view.coordinates.items():
+            told = self._record.coordinates.get(name, np.zeros(0))
+            if declared.dtype.kind != "f":
+                same = told.shape == declared.shape and bool((told == declared).all())
+                self._out.add(name, float(same), 1.0, 1.0)
+            elif told.shape != declared.shape:
+                self._out.add(name, 0.0, 1.0, 1.0)
+            else:
+                self._out.add(name, told, declared, float(np.abs(declared).max()))
+
+    def _held(self) -> None:
+        """Compare displacements with those that supports and loads prescribe."""
+        source = self._source
+        if not isinstance(source, OfStates):
+            return
+        for name in self._look.system.names:
+            for stage in self._view.stages:
+                found, declared = source.held(name, stage)
+                self._out.add("displacement", found, declared, float(np.abs(found).max()))
+
+    # -- scales --------------------------------------------------------------------------------
+
+    @cached_property
+    def stress_scale(self) -> float:
+        """The largest stress under load, or one that is next to nothing [MPa]."""
+        names = self._view.surfaces or dict.fromkeys(self._look.system.names, "")
+        each = [self._source.fields(name, self._view.loaded) for name in names]
+        most = max(float(np.nanmax(np.abs(fields.stress))) for fields in each)
+        E = max(f.plain.body.material.elasticity.youngs_modulus for f in each)
+        return max(most, _LEAST_STRAIN * E)
+
+    def _strain_scale(self, values: Array) -> float:
+        return max(float(np.nanmax(values, initial=0.0)), _LEAST_STRAIN)
+
+    # -- fields at places ----------------------------------------------------------------------
+
+    def _place(self, s: Array, depth: Array) -> Array:
+        """Return places (2, n) along the axis of the view and below it [mm]."""
+        (x0, y0), (ax, ay) = self._view.axis
+        return np.stack([x0 + s * ax + depth * ay, y0 + s * ay - depth * ax])
+
+    def _against(
+        self,
+        name: str,
+        stored: Array,
+        own: Array,
+        places: tuple[Places, ...],
+        scale: float,
+        stage: str = "",
+    ) -> None:
+        """Compare values (..., n) at places of one body or of several."""
+        exact = self._source.exact(stage or self._view.unloaded)
+        self._out.add(name, stored, own, scale, 1.0 if exact else LIMIT / STEADY)
+        self._out.absent(name, stored, np.all([p.outside for p in places], axis=0))
+
+    def _maps(self) -> None:
+        x, y, view = self._axis("x"), self._axis("y"), self._view
+        states = {"loaded": view.loaded, "unloaded": view.unloaded}
+        single = {
+            "residual_stress": ("unloaded", _itself),
+            "residual_mises": ("unloaded", equivalent),
+            "mises_loaded": ("loaded", equivalent),
+            "stress_difference": ("loaded", _difference),
+        }
+        staged = {"map_stress": _itself, "map_mises": equivalent}
+        names = [*single, *staged, "plastic_strain", "map_plastic_strain"]
+        there = {name: values for name in names if (values := self._stored(name)) is not None}
+        if not there:
+            return
+        flat = {name: v.reshape(*v.shape[:-2], -1) for name, v in there.items()}
+        at = some(len(x) * len(y), *flat.values())
+        X = self._place(x[at % len(x)], -y[at // len(x)])
+        places = {name: Places(self._source.plain(name), X) for name in view.surfaces}
+        bodies = tuple(places.values())
+
+        def sampled(of: Callable[[Fields], Array], stage: str) -> Array:
+            """Return values (..., n) of the first body that holds a place."""
+            out = np.full(len(at), np.nan)
+            unsure = np.zeros(len(at), dtype=bool)
+            for name, where in places.items():
+                here = where.of(of(self._source.fields(name, stage)))
+                here = np.where(unsure, np.nan, here)
+                out = np.where(np.isnan(out), here, out)
+                unsure |= ~where.inside & ~where.outside
+            return np.asarray(out)
+
+        for name, (state, of) in single.items():
+            if name in flat:
+                own = of(sampled(_stress, states[state]))
+                self._against(
+                    name, flat[name][..., at], own, bodies, self.stress_scale, states[state]
+                )
+        for name, of in staged.items():
+            for k, stage in enumerate(view.stages if name in flat else ()):
+                own = of(sampled(_stress, stage))
+                told = flat[name][k][..., at]
+                self._against(name, told, own, bodies, self.stress_scale, stage)
+        strains = {"plastic_strain": (view.unloaded,), "map_plastic_strain": view.stages}
+        for name, stages in strains.items():
+            for k, stage in enumerate(stages if name in flat else ()):
+                own = np.maximum(sampled(flowed, stage), 0.0)
+                values = flat[name] if name == "plastic_strain" else flat[name][k]
+                self._against(name, values[at], own, bodies, self._strain_scale(values))
+
+    def _profiles(self) -> None:
+        stress, strain = self._stored("residual_profile"), self._stored("plastic_strain_profile")
+        if stress is None or strain is None:
+            return
+        station, depth, view = self._axis("station"), self._axis("depth"), self._view
+        flat = np.moveaxis(stress, 1, 0).reshape(4, -1)
+        at = some(strain.size, flat, strain.ravel())
+        where = self._place(station[at // len(depth)], depth[at % len(depth)])
+        places = Places(self._source.plain(view.profile_body), where)
+        fields = self._source.fields(view.profile_body, view.unloaded)
+        own = places.of(fields.stress)
+        self._against("residual_profile", flat[:, at], own, (places,), self.stress_scale)
+        # what a steady pass leaves is interpolated as recovered
+        steady = self._look.source is not None
+        own = np.maximum(places.of(fields.accumulated if steady else flowed(fields)), 0.0)
+        scale = self._strain_scale(strain)
+        name = "plastic_strain_profile"
+        self._against(name, strain.ravel()[at], own, (places,), scale)
+
+    def _surfaces(self) -> None:
+        s, view = self._axis("s"), self._view
+        residual, mises = self._stored("surface_residual"), self._stored("surface_mises")
+        for k, name in enumerate(view.surfaces if residual is not None else ()):
+            assert residual is not None
+            at = some(len(s), residual[k])
+            places = Places(self._source.plain(name), self._place(s[at], np.zeros(len(at))))
+            own = places.of(self._source.fields(name, view.unloaded).stress)
+            self._against("surface_residual", residual[k][:, at], own, (places,),
+                          self.stress_scale)  # fmt: skip
+        for k, stage in enumerate(view.stages if mises is not None else ()):
+            assert mises is not None
+            fields, name = self._source.fields(view.profile_body, stage), view.profile_body
+            nodes = fields.plain.part.boundary_nodes(view.surfaces[name])
+            along = self._along(fields.plain.part.X[:, nodes])
+            order = np.argsort(along)
+            most = float(np.max(fields.at_points[1]))
+            values = np.clip(fields.mises[nodes][order], 0.0, most)
+            centre = self._source.centre(stage)
+            own = between(s + centre, along[order], values)
+            self._out.add("surface_mises", mises[k], own, self.stress_scale)
+
+    def _along(self, X: Array) -> Array:
+        """Return how far along the axis of the view places are (n,) [mm]."""
+        (x0, y0), (ax, ay) = self._view.axis
+        return np.asarray((X[0] - x0) * ax + (X[1] - y0) * ay)
+
+    # -- contact and extremes ----------------------------------------------------------------
+
+    def _contact(self) -> None:
+        """Compare pressure, shear and gap along the surface, half-width and peak."""
+        lines = [self._stored(f"contact_{name}") for name in ("pressure", "shear", "gap")]
+        if any(line is None for line in lines):
+            return
+        pressure, shear, gap = (np.asarray(line) for line in lines)
+        for k, stage in enumerate(self._view.stages):
+            x = self._axis("s") + self._source.centre(stage)
+            own = self._source.acting(stage, x)
+            width, peak = self._source.extent(stage)
+            scale = max(peak, _LEAST_STRAIN * self.stress_scale)
+            self._out.add("contact_pressure", pressure[k], own.pressure, scale)
+            self._out.add("contact_shear", shear[k], own.shear, scale)
+            share = LIMIT / MEASURED if own.measured else 1.0
+            self._out.add("contact_gap", gap[k], own.gap, own.way, share)
+            if stage == self._view.loaded:
+                self._number("peak_contact_pressure", peak, peak)
+                self._number("contact_half_width", width, width)
+
+    def _number(self, name: str, own: float, scale: float) -> None:
+        if name in self._record.scalars:
+            self._out.add(name, self._record.scalars[name], own, scale)
+
+    def _extremes(self) -> None:
+        """Compare the largest and smallest residual stresses, and the largest plastic strain."""
+        numbers = self._record.scalars
+        bodies = self._look.system.names
+        if "max_plastic_strain" in numbers:
+            each = [self._source.fields(name, self._view.unloaded).at_points for name in bodies]
+            y, flow = (np.concatenate([np.atleast_2d(one[k])[-1] for one in each]) for k in (0, 2))
+            scale = self._strain_scale(flow)
+            self._number("max_plastic_strain", float(flow.max()), scale)
+            depth = numbers.get("depth_of_max_plastic_strain", np.nan)
+            if np.isfinite(depth):
+                there = np.abs(y + depth) <= np.abs(y + depth).min()
+                self._out.add("depth_of_max_plastic_strain", flow[there].max(), flow.max(), scale)
+        if "peak_residual_tension" in numbers:
+            normal = np.concatenate(
+                [self._source.fields(n, self._view.unloaded).stress[:3].ravel() for n in bodies]
+            )
+            self._number("peak_residual_tension", float(normal.max()), self.stress_scale)
+            self._number("peak_residual_compression", float(normal.min()), self.stress_scale)
+        for k, (name, boundary) in enumerate(self._view.surfaces.items()):
+            if self._stored("residual_max") is None:
+                return
+            fields = self._source.fields(name, self._view.unloaded)
+            X = fields.plain.part.X
+            surface = fields.plain.part.boundary_nodes(boundary)
+            s = self._along(X[:, surface])
+            for kind, of in (("max", np.max), ("min", np.min)):
+                for prefix, stress, places, axes in (
+                    ("residual", fields.stress, X, ("x", "y")),
+                    ("surface_residual", fields.stress[:, surface], s[None], ("s",)),
+                ):
+                    own = of(stress, axis=1)
+                    self._extreme(f"{prefix}_{kind}", k, own, stress, places, axes)
+
+    def _extreme(
+        self, name: str, body: int, own: Array, stress: Array, places: Array, axes: tuple[str, ...]
+    ) -> None:
+        """Compare extremes (4,), and the stress (4, n_nodes) where they are told to be."""
+        told = self._stored(name)
+        at = [self._stored(f"{name}_{axis}") for axis in axes]
+        if told is None or any(one is None for one in at):
+            return
+        self._out.add(name, told[body], own, self.stress_scale)
+        where = np.stack([np.asarray(one)[body] for one in at])  # (n_axes, 4)
+        for component in np.flatnonzero(np.isfinite(where).all(axis=0)):
+            off = np.abs(places - where[:, component, None]).max(axis=0)
+            there = stress[component, off <= off.min() + 1e-9 * np.abs(places).max()]
+            near = np.abs(there - own[component]).min()
+            self._out.add(f"{name}_{axes[0]}", near, 0.0, self.stress_scale)
+
+
+def _stress(fields: Fields) -> Array:
+    return fields.stress
+
+
+def _itself(values: Array) -> Array:
+    return values
+
+
+def _difference(stress: Array) -> Array:
+    """Return the difference of the principal stresses in the plane (n,) of components (4, n)."""
+    xx, yy, _, xy = stress
+    return np.asarray(np.sqrt((xx - yy) ** 2 + 4 * xy**2))

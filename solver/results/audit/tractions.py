@@ -1,0 +1,163 @@
+"""What acts on the slave of a contact pair, from contact forces and the shapes of the surfaces."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.results.audit.surfaces import Surfaces, deformed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+    from solver.results.audit.surfaces import Touching
+
+    Array = NDArray[np.float64]
+
+_XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
+_WHOLE = 1e-6
+"""Share of the hat of a vertex that may not face the master, where the vertex faces it."""
+
+
+class Tractions:
+    """A contact pair in a converged state; arrays (n,) are those of the slave's vertices."""
+
+    def __init__(self, system: System, number: int, converged: Converged) -> None:
+        state, self._contact = converged.state, converged.state.contacts[number]
+        self._surfaces = Surfaces(system, number, finite=self._contact.finite)
+        self._model = system.model
+        self._chain = self._surfaces.slave
+        self._measured = self._surfaces, state, converged.start
+        slave = self._surfaces.pair.slave[0]
+        self._moved = deformed(system, slave, state)[0][:, self._chain.nodes]
+
+    @cached_property
+    def touching(self) -> Touching:
+        """Gaps and motions on the deformed bodies."""
+        surfaces, state, start = self._measured
+        return surfaces.touching(state, start, self._contact.normal, self._contact.tangential)
+
+    @property
+    def gap(self) -> Array:
+        """Mean gap under the hats, NaN where no master faces the slave [mm]."""
+        return self.touching.gap
+
+    @property
+    def way(self) -> float:
+        """How far the slave has moved at most, its gap included: the scale of gaps [mm]."""
+        moved = float(np.abs(self._moved - self._chain.X).max())
+        return max(moved, float(np.nanmax(np.abs(self.touching.gap), initial=0.0)))
+
+    @property
+    def X(self) -> Array:
+        """Places of the vertices (2, n) [mm]."""
+        return np.asarray(self._chain.X[:, self._chain.vertices])
+
+    @property
+    def s(self) -> Array:
+        """Distance from the first vertex [mm]."""
+        return np.append(0.0, np.cumsum(np.hypot(*np.diff(self.X))))
+
+    @property
+    def closed(self) -> NDArray[np.bool_]:
+        """Where the bodies press."""
+        return np.asarray(self._contact.normal > 0)
+
+    @property
+    def measured(self) -> bool:
+        """Whether gaps and motions are means over other projections than those of the solver."""
+        return self._surfaces.finite or self._surfaces.curved
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """Where a vertex and its neighbours face the master with the whole of their hats, or not.
+
+        The area of part of a hat depends on how surfaces are projected.
+        """
+        share = self.touching.area / self._area
+        whole = (share > 1 - _WHOLE) | (share < _WHOLE)
+        return whole & np.append(whole[1:], True) & np.append(True, whole[:-1])
+
+    def _depth(self, x: Array) -> Array:
+        """Return thickness, or the circumference [mm] at places x (2, ...)."""
+        if self._model.bodies[0].kinematics == "axisymmetric":
+            return np.asarray(2 * np.pi * x[0])
+        name = self._surfaces.pair.slave[0]
+        return np.full(x.shape[1:], self._model.body(name).thickness)
+
+    def _hats(self, x: Array, *, straight: bool = False) -> Array:
+        """Return the integrals (n, n) of products of two hats, the nodes at x (2, n_nodes).
+
+        Their sum over one index is the area of a hat [mm2]. ``straight`` takes the chords.
+        """
+        edges = self._chain.edges[:, :2] if straight else self._chain.edges
+        k, at = edges.shape[1], x[:, edges]
+        place = at @ shape_functions(_XI, k).T
+        along = np.hypot(*(at @ shape_derivatives(_XI, k).T))
+        weight = _WEIGHT * along * self._depth(place)
+        ends = np.stack([(1 - _XI) / 2, (1 + _XI) / 2])
+        blocks = np.einsum("ep,ap,bp->eab", weight, ends, ends)
+        n = len(edges)
+        out, first = np.zeros((n + 1, n + 1)), np.arange(n)
+        for a in (0, 1):
+            for b in (0, 1):
+                np.add.at(out, (first + a, first + b), blocks[:, a, b])
+        return out
+
+    @cached_property
+    def _area(self) -> Array:
+        return np.asarray(self._hats(self._chain.X).sum(axis=1))
+
+    def over_area(self, force: Array, *, moved: bool) -> Array:
+        """Return means under the hats (n,) of a force per area [MPa] for forces (n,) [N].
+
+        ``moved`` takes the area where the bodies are, if they slide far.
+        """
+        hats = self._hats(self._chain.X, straight=True)
+        total = hats.sum(axis=1)
+        area = self._area
+        each = np.divide(force, area, out=np.zeros_like(force), where=area > 0)
+        mean = np.divide(hats @ each, total, out=np.zeros_like(force), where=total > 0)
+        if not (moved and self._surfaces.finite):
+            return np.asarray(mean)
+        now = self._hats(self._moved).sum(axis=1)
+        return np.asarray(mean * np.divide(area, now, out=np.ones_like(area), where=now > 0))
+
+    def pressure(self, *, moved: bool) -> Array:
+        """Return the contact pressure [MPa]."""
+        return self.over_area(self._contact.normal, moved=moved)
+
+    def shear(self, *, moved: bool) -> Array:
+        """Return the shear on the slave along its surface [MPa]."""
+        return self.over_area(self._contact.tangential, moved=moved)
+
+    @property
+    def length(self) -> float:
+        """Length along which the bodies touch [mm].
+
+        The square of the pressure falls linearly to a smooth edge; that line is drawn through the
+        third, fourth and fifth vertex from the last that touches, within the next edge.
+        """
+        total, n, s = 0.0, len(self.s), self.s
+        square = self.pressure(moved=False) ** 2
+        for way in (1, -1):
+            beyond = np.append(self.closed[1:], False) if way > 0 else np.append(
+                False, self.closed[:-1])  # fmt: skip
+            for last in np.flatnonzero(self.closed & ~beyond):
+                total += way * s[last]
+                inner = last - way * np.array([2, 3, 4])
+                inside = (inner >= 0) & (inner < n)
+                if not (inside.all() and self.closed[inner].all() and 0 <= last + way < n):
+                    continue
+                x = s[inner] - s[last]
+                slope = ((x - x.mean()) * square[inner]).sum() / ((x - x.mean()) ** 2).sum()
+                zero = x.mean() - square[inner].mean() / slope if slope else np.nan
+                if slope * way < 0:
+                    edge = abs(s[last + way] - s[last])
+                    total += way * float(np.clip(zero, -edge, edge))
+        return float(total)
