@@ -14,12 +14,16 @@ if TYPE_CHECKING:
 
 _ROUNDS = 5
 """Times the motion is found anew: curved surfaces do not move apart along straight lines."""
+_FARTHEST = 5.0
+"""Motion / overlap, above which bodies are not moved: a wedge or a taper would leave its fit."""
 _HELD = 1e-9
 """Residual of the dual problem, below which no motion parts the bodies."""
 
 
 def parted(system: System, state: State) -> State:
     """Return the state with floating bodies moved until nothing overlaps, else the same state.
+
+    It is the same too where they would have to move by much more than they overlap.
 
     The smallest rigid motion q for which ``gap + A q >= 0`` is that of least distance (Lawson and
     Hanson 1974, chapter 23): of r, the residual of ``min |E y - f|, y >= 0`` with the rows of
@@ -28,8 +32,8 @@ def parted(system: System, state: State) -> State:
     """
     sizes = [part.rigid.shape[1] for part in system.parts]
     ends = np.cumsum(sizes)
-    moved = state
-    for _ in range(_ROUNDS):
+    moved, overlap = state, 0.0
+    for _ in range(_ROUNDS + 1):
         rows, gaps = [], []
         for interface in system.interfaces:
             pairing = interface.pairing(moved.u, moved.time)
@@ -44,6 +48,7 @@ def parted(system: System, state: State) -> State:
         A, gap = np.vstack(rows), np.concatenate(gaps)
         if not (gap < -system.touching).any():
             return system.at_rest(moved)
+        overlap = max(overlap, -float(gap.min()))
         scale = float(np.abs(gap).max())
         E = np.vstack([A.T, -gap / scale])
         f = np.append(np.zeros(ends[-1]), 1.0)
@@ -54,4 +59,7 @@ def parted(system: System, state: State) -> State:
         q = -scale * r[:-1] / r[-1]
         each = zip(system.parts, moved.u, np.split(q, ends[:-1]), strict=True)
         moved = replace(moved, u=tuple(u + part.rigid @ own for part, u, own in each))
+        ways = (np.abs(u - u0).max() for u, u0 in zip(moved.u, state.u, strict=True))
+        if max(ways) > _FARTHEST * overlap:
+            return state
     return state

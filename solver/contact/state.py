@@ -88,42 +88,66 @@ class Energy:
     scale: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+def _none() -> NDArray[np.float64]:
+    return np.zeros(1)
+
+
+_LITTLE = 0.01
+"""Force of a pair / that of the pair with most, below which its timing does not count."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Timing:
-    """How well increments follow contact in time, at worst since a lap began [N].
+    """How well increments have followed contact in time; all (n_pairs,) [N].
 
     Attributes
     ----------
     untimed : friction that is not known, because vertices touched at unknown times: the sum over
-        increments
-    friction : most friction that all contact could bear
-    passed : normal force times way of its contact along a surface in an increment / its width
+        increments since the pair was last open
+    friction : most friction that its contact could bear since then
+    passed : normal force times way of its contact along a surface in an increment / its width, at
+        most
     normal : most normal force
     """
 
-    untimed: float = 0.0
-    friction: float = 0.0
-    passed: float = 0.0
-    normal: float = 0.0
+    untimed: NDArray[np.float64] = field(default_factory=_none)
+    friction: NDArray[np.float64] = field(default_factory=_none)
+    passed: NDArray[np.float64] = field(default_factory=_none)
+    normal: NDArray[np.float64] = field(default_factory=_none)
 
     @property
     def unknown(self) -> float:
-        """Friction that is not known / most friction."""
-        return self.untimed / self.friction if self.untimed else 0.0
+        """Friction that is not known / most friction, of the worst pair."""
+        return _worst(self.untimed, self.friction)
 
     @property
     def passage(self) -> float:
-        """Way of a contact in an increment / its width, weighted with its force."""
-        return self.passed / self.normal if self.passed else 0.0
+        """Way of a contact in an increment / its width, of the worst pair."""
+        return _worst(self.passed, self.normal)
+
+    def beside(self, other: Timing) -> Timing:
+        """Return what is unknown and has passed here, of the larger forces of both."""
+        friction, normal = (
+            np.maximum(getattr(self, name), getattr(other, name)) for name in ("friction", "normal")
+        )
+        return replace(self, friction=friction, normal=normal)
 
     def then(self, now: Timing) -> Timing:
         """Return the timing after one more increment."""
+        closed = now.normal > 0
         return Timing(
-            untimed=self.untimed + now.untimed,
-            friction=max(self.friction, now.friction),
-            passed=max(self.passed, now.passed),
-            normal=max(self.normal, now.normal),
+            untimed=np.where(closed, self.untimed + now.untimed, 0.0),
+            friction=np.where(closed, np.maximum(self.friction, now.friction), 0.0),
+            passed=np.maximum(self.passed, now.passed),
+            normal=np.maximum(self.normal, now.normal),
         )
+
+
+def _worst(part: NDArray[np.float64], whole: NDArray[np.float64]) -> float:
+    """Return the largest ratio of the pairs whose force is not little."""
+    part, whole = np.broadcast_arrays(part, whole)
+    counts = (whole > 0) & (whole >= _LITTLE * whole.max(initial=0.0))
+    return float((part[counts] / whole[counts]).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -337,6 +337,6 @@ class Increment:
         )
 
     def _timing(self, candidates: Candidates) -> Timing:
-        if not candidates.n:
+        if not candidates.n or not self.friction:
             return Timing()
         return timing(self.system, self.start, candidates, self._stiffness(candidates))

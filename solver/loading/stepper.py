@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 _TURN = 0.1
 """Largest rotation of a rigid body in an increment [rad]."""
-
-
 _UNTIMED = 0.02
 """Friction that is not known / most friction, above which an increment is divided."""
 _PASSAGE = 0.5
@@ -139,71 +137,82 @@ class Stepper:
         if self.system.moves:
             begun = self.begin(state, time, point.tally)
             history, met = (*point.history, *begun.history), point.met | begun.met
-            return replace(begun, history=history, met=met)
+            timing = point.now.timing.then(begun.now.timing)
+            return replace(begun, now=replace(begun.now, timing=timing), history=history, met=met)
         return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`.
 
         An increment in which a rigid body turns too far is divided: a friction force that turns
-        with its surface would be missed. One that does not follow contact well is divided too, if
-        its parts converge, and those after it grow again. One after which surfaces have moved too
-        far for small sliding is repeated with surfaces that are paired anew.
+        with its surface would be missed. One that fails is halved. One that does not follow contact
+        well is halved too, and kept as it is where its halves fail; those after it grow again.
         """
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
-        step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
-        whole, least = step, abs(step) / 2**self.control.max_cuts
-        forces, divided = point.now.timing, False
-        coarse: Converged | None = None
-        while point.now.state.time != target:
-            state = point.now.state
-            close = abs(target - state.time) <= abs(step) * (1 + ROUNDING)
-            time = target if close else state.time + step
-            together = contact or time != target
-            guess, trusted = self._predict(point.past, state, time) if together else (None, False)
+        whole = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
+        size = _Size(whole, self.control.max_cuts)
+        known, coarse = point.now.timing, None
+        while (now := point.now.state.time) != target:
+            close = abs(target - now) <= abs(size.step) * (1 + ROUNDING)
+            time = target if close else now + size.step
             try:
-                converged = Increment(
-                    self.system,
-                    state,
-                    time,
-                    guess=guess,
-                    contact=together,
-                    elastic_first=not trusted,
-                    patient=abs(time - state.time) < 2 * least * (1 - ROUNDING),
-                    tolerances=self.control.tolerances,
-                ).solve()
+                converged = self._increment(
+                    point, time, contact=contact or time != target, patient=size.shortest
+                )
             except IncrementFailed as failure:
                 if coarse is None:
                     tally = replace(point.tally, cuts=point.tally.cuts + 1)
                     point = replace(point, tally=self._timed(tally), past=())
-                    step, divided = (time - state.time) / 2, False
-                    if abs(step) < least * (1 - ROUNDING):
+                    if not size.failed(time - now):
                         raise PathEnded(self._ended(failure, point, time), point) from failure
                     continue
                 converged = coarse
-                step = converged.state.time - state.time
             else:
-                following = followed(self.system, state, converged.state)
-                if following is not None:
-                    point = replace(point, now=replace(point.now, state=following))
+                # the forces of what is too coarse tell how large they become
+                known = converged.timing.beside(known)
+                if _coarse(known) and size.divided(time - now):
+                    coarse = converged
                     continue
-                forces = replace(forces.then(converged.timing), untimed=0.0, passed=0.0)
-                half = (time - state.time) / 2
-                if _coarse(converged.timing.then(forces)) and abs(half) >= _SHORTEST * abs(whole):
-                    coarse, step, divided = converged, half, True
-                    continue
-            coarse = None
-            if divided:
-                step = min(2 * step, whole, key=abs)
-            converged = self._worked(point.now, converged)
-            past = (*point.past[1 - MEMORY :], state)
-            point = self._after(point, converged, past)
+            size.converged(converged.state.time - now)
+            past = (*point.past[1 - MEMORY :], point.now.state)
+            point, coarse = self._after(point, self._worked(point.now, converged), past), None
             if converged.strayed:
-                error = NotConverged(f"{self.place(time)}: {converged.strayed}", state.time, time)
-                raise PathEnded(error, point)
+                reached = converged.state.time
+                message = f"{self.place(reached)}: {converged.strayed}"
+                raise PathEnded(NotConverged(message, now, reached), point)
             self._report()
         return point
+
+    def _increment(self, point: Point, time: float, *, contact: bool, patient: bool) -> Converged:
+        """Return the increment to a time or raise `IncrementFailed`.
+
+        Where straight surfaces have moved too far for small sliding in it, it is repeated with
+        surfaces that are paired anew, if that converges.
+        """
+        state = point.now.state
+        guess, trusted = self._predict(point.past, state, time) if contact else (None, False)
+
+        def solved(start: State, guess: State | None) -> Converged:
+            return Increment(
+                self.system,
+                start,
+                time,
+                guess=guess,
+                contact=contact,
+                elastic_first=guess is None or not trusted,
+                patient=patient,
+                tolerances=self.control.tolerances,
+            ).solve()
+
+        converged = solved(state, guess)
+        following = followed(self.system, state, converged.state)
+        if following is None:
+            return converged
+        try:
+            return solved(following, None)
+        except IncrementFailed:
+            return converged
 
     def elastic(self, point: Point, target: float) -> Point | None:
         """Return the point at time ``target`` in one increment, None where something yields.
@@ -273,6 +282,43 @@ class Stepper:
         now = clock.process_time()
         spent, self._clock = now - self._clock, now
         return replace(tally, seconds=tally.seconds + spent)
+
+
+class _Size:
+    """The step of increments to a target: halved where they fail, divided and growing again.
+
+    Attributes
+    ----------
+    step : that of the next increment, with its sign
+    """
+
+    def __init__(self, whole: float, cuts: int) -> None:
+        self.step = whole
+        self._whole, self._least = whole, abs(whole) / 2**cuts
+        self._grows = False
+
+    @property
+    def shortest(self) -> bool:
+        """Whether an increment of this size that fails is not halved again."""
+        return abs(self.step) < 2 * self._least * (1 - ROUNDING)
+
+    def failed(self, step: float) -> bool:
+        """Halve a step; return whether one may be so short."""
+        self.step, self._grows = step / 2, False
+        return abs(self.step) >= self._least * (1 - ROUNDING)
+
+    def divided(self, step: float) -> bool:
+        """Halve a step that may grow again, if one may be so short; return whether it may."""
+        if abs(step) / 2 < _SHORTEST * abs(self._whole) * (1 - ROUNDING):
+            return False
+        self.step, self._grows = step / 2, True
+        self._least = min(self._least, abs(self.step))  # what grows and fails comes back to this
+        return True
+
+    def converged(self, step: float) -> None:
+        """Let the next step be twice this one, where steps may grow."""
+        if self._grows:
+            self.step = min(2 * step, self._whole, key=abs)
 
 
 def _coarse(timing: Timing) -> bool:

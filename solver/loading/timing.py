@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.problem import bound_lines, least
 from solver.contact.state import Timing
 
 if TYPE_CHECKING:
@@ -31,26 +32,21 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     ``stiffness`` is that of the contact points, elastic [N/mm]: no vertex has more friction than
     its slip strains out of the bodies around it.
     """
-    found, first, n = Timing(), 0, candidates.n
+    first, n = 0, candidates.n
+    N = np.maximum(candidates.forces[:n], 0.0)
+    bound, strained = np.zeros(n), np.zeros(n)
+    if len(candidates.motion) > n:
+        bound = least(bound_lines(candidates.friction, candidates.cohesion, candidates.limit), N)
+        slips = zip(candidates.slips, candidates.vertices, strict=True)
+        strained = stiffness[n:] * np.abs(np.concatenate([slip[at] for slip, at in slips]))
+    unknown = np.where(candidates.untimed, np.minimum(bound, strained), 0.0)
+    found = np.zeros((4, len(system.interfaces)))
     for k, (interface, at) in enumerate(zip(system.interfaces, candidates.vertices, strict=True)):
         here = slice(first, first + len(at))
         first += len(at)
-        normal, slip = np.maximum(candidates.forces[:n][here], 0.0), candidates.slips[k]
-        untimed, friction = 0.0, 0.0
-        if interface.rough:
-            bound = interface.friction * normal + interface.cohesion * candidates.area[k] * (
-                normal > 0
-            )
-            strained = stiffness[n:][here] * np.abs(slip[at])
-            friction = float(bound.sum())
-            untimed = float(np.minimum(bound, strained) @ candidates.untimed[here])
-        found = Timing(
-            untimed=found.untimed + untimed,
-            friction=found.friction + friction,
-            passed=max(found.passed, _passed(interface, start.contacts[k], at, normal, slip)),
-            normal=found.normal + float(normal.sum()),
-        )
-    return found
+        passed = _passed(interface, start.contacts[k], at, N[here], candidates.slips[k])
+        found[:, k] = unknown[here].sum(), bound[here].sum(), passed, N[here].sum()
+    return Timing(untimed=found[0], friction=found[1], passed=found[2], normal=found[3])
 
 
 def _passed(
@@ -65,6 +61,6 @@ def _passed(
     after[at] = normal
     if not (after.any() and before.normal.any()):
         return 0.0
-    new, lost = after @ (before.normal == 0), before.normal @ (after == 0)
+    came, left = after @ (before.normal == 0), before.normal @ (after == 0)
     width = interface.slave_surface.tributary @ (after > 0)
-    return max(float(min(new, lost)), float(np.abs(slip) @ after / width))
+    return float(np.max([min(came, left), np.abs(slip) @ after / width]))

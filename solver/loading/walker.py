@@ -153,7 +153,7 @@ class Walker:
         if reached is None:
             return None
         history = (*reached.history, *start.point.history[-1:])
-        back = replace(start.point, tally=reached.tally, history=history)
+        back = replace(start.point, tally=reached.tally, history=history, met=reached.met)
         points = {stages[0].name: reached.now, stages[-1].name: start.point.now}
         return self._closed(replace(start, point=back, points=points), program)
 

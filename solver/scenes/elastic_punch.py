@@ -152,6 +152,7 @@ def model(parameters: ElasticPunchParameters) -> Model:
         slave=("punch", "bottom"),
         master=("half_plane", FACING),
         friction=parameters.friction,
+        sliding="small",
     )
     return Model(bodies=bodies, contacts=(pair,))
 

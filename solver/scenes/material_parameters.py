@@ -156,9 +156,9 @@ class ContactParameters(MaterialParameters):
         self,
         slave: tuple[str, str],
         master: tuple[str, str],
-        sliding: Literal["auto", "small", "finite"] = "auto",
+        sliding: Literal["small", "finite"] = "small",
     ) -> ContactPair:
-        """Return a pair of boundaries with this friction."""
+        """Return a pair of boundaries with this friction; flat ones slide by little."""
         return ContactPair(
             slave=slave,
             master=master,

@@ -110,7 +110,10 @@ def model(parameters: RigidPunchParameters) -> Model:
     base = Curve(points=np.stack([under, np.zeros_like(under)]))
     punch = RigidBody(name="punch", surfaces={"base": base}, y=Pushed(value=-parameters.half_width))
     pair = ContactPair(
-        slave=("punch", "base"), master=("half_plane", "top"), friction=parameters.friction
+        slave=("punch", "base"),
+        master=("half_plane", "top"),
+        friction=parameters.friction,
+        sliding="small",
     )
     return Model(bodies=(half_plane,), rigid=(punch,), contacts=(pair,))
 

@@ -204,6 +204,7 @@ def model(parameters: ShaftHubParameters) -> Model:
         slave=("hub", "bottom"),
         master=("shaft", FACING),
         friction=parameters.friction,
+        sliding="small",
         interference=parameters.interference / parameters.mean_pressure if fitted else 0.0,
     )
     return Model(bodies=bodies, contacts=(pair,))

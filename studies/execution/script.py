@@ -37,11 +37,17 @@ def check_script() -> None:
         statements = ast.parse(Path(file).read_bytes()).body
     except (OSError, SyntaxError, ValueError):  # no source that could be imported as text
         return
-    if not any(only_as_script(each) for each in statements if each.lineno <= line):
+    if not any(only_as_script(each) and _guards(each, line) for each in statements):
         allowed = (
             f"line {line} must stand under `{GUARD}`, since worker processes import the script"
         )
         raise StudyError("script", Path(file).name, allowed)
+
+
+def _guards(statement: ast.stmt, line: int) -> bool:
+    """Tell whether a line is in a statement, or after one that ends the module."""
+    ends = isinstance(statement, ast.If) and isinstance(statement.body[-1], ast.Raise)
+    return statement.lineno <= line and (ends or line <= (statement.end_lineno or line))
 
 
 def _line_of(file: str) -> int | None:

@@ -17,6 +17,7 @@ from solver import (
     Material,
     Model,
     ModelError,
+    Moved,
     Pushed,
     RigidBody,
     Solution,
@@ -174,3 +175,40 @@ def test_a_block_that_friction_holds_may_be_meshed_a_little_too_deep(
     assert contact.normal.sum() == pytest.approx(100.0)
     assert contact.tangential.sum() == pytest.approx(-10.0 - 5.0 * overlap, rel=1e-3)
     assert found.audit().passed, found.audit().violations
+
+
+def test_a_taper_that_overlaps_stays_in_its_fit() -> None:
+    """A slope of 0.05: to part the bodies, the hub would have to move by twenty overlaps."""
+
+    def cone(p: np.ndarray) -> np.ndarray:
+        return np.stack([p[0] + 0.05 * (20.0 - p[1]), p[1]])
+
+    def tip(p: np.ndarray) -> np.ndarray:
+        return np.stack([p[0] * (1 + 0.005 * (20.0 - p[1])), p[1]])
+
+    inner = grid(np.linspace(0.0, 10.0, 6), np.linspace(-5.0, 25.0, 16))
+    shaft = Body(name="shaft", mesh=mapped(inner, tip), material=ELASTIC,
+                 kinematics="axisymmetric", supports={"left": "x", "bottom": "y"})  # fmt: skip
+    outer = grid(np.linspace(9.99, 25.0, 8), np.linspace(0.0, 20.0, 11))
+    hub = Body(name="hub", mesh=mapped(outer, cone), material=ELASTIC, kinematics="axisymmetric")
+    pair = ContactPair(slave=("hub", "left"), master=("shaft", "right"), friction=0.3)
+    found = solve(Model(bodies=(shaft, hub), contacts=(pair,)),
+                  stages=(Stage(name="fitted", target=1.0),))  # fmt: skip
+    assert found.stages["fitted"].state.contacts[0].normal.sum() > 1e4
+    assert np.abs(found.displacement("hub", "fitted")).max() < 0.02
+
+
+def test_a_fit_that_is_loaded_in_cycles_is_judged_by_its_last_touch() -> None:
+    """What was not known of the friction of a contact that has opened since does not count."""
+    times = np.arange(9.0)
+    load = Amplitude(times, times % 2)
+    block = Body(name="block", mesh=grid(np.linspace(-4, 4, 17), np.linspace(-4, 0, 9)),
+                 material=ELASTIC, supports={"bottom": "xy"})  # fmt: skip
+    ball = RigidBody(name="ball", surfaces={"cap": arc((0.0, 20.0), 20.0, (-1.77, -1.37), 20)},
+                     x=Moved(value=0.002, amplitude=load),
+                     y=Moved(value=-0.02, amplitude=load))  # fmt: skip
+    pair = ContactPair(slave=("block", "top"), master=("ball", "cap"), friction=0.3)
+    stages = tuple(Stage(name=str(k), target=float(k), steps=2) for k in range(1, 8))
+    found = solve(Model(bodies=(block,), rigid=(ball,), contacts=(pair,)), stages=stages)
+    first, last = (found.audit(name).figures["audit_touch_time"] for name in ("1", "7"))
+    assert 0 < last <= 1.01 * first

@@ -68,7 +68,7 @@ FAMILIES: dict[str, Family] = {
     "overlap": _all(12, overlap.scenes),
     "apart": _all(8, apart.scenes),
     "point": _all(6, point.scenes),
-    "ratios": _all(12, ratios.scenes),
+    "ratios": _all(11, ratios.scenes),
     "meshes": _all(8, meshes.scenes),
     "units": _all(6, units.scenes),
     "offsets": _all(5, offsets.scenes),

@@ -96,3 +96,9 @@ def test_what_is_typed_has_no_file_that_workers_import(tmp_path: Path) -> None:
     done = started("x = 1\n", tmp_path, "-i", given=f"{ASK}check_script()\nprint(x)\n")
     assert done.stdout == "1\n"
     assert "Error" not in done.stderr
+
+
+def test_an_if_that_only_names_the_module_is_no_guard(tmp_path: Path) -> None:
+    done = started(ASK + "if __name__:\n    pass\ncheck_script()", tmp_path)
+    assert done.returncode == 1
+    assert "must stand under" in done.stderr

@@ -140,10 +140,10 @@ def master_stands_still(patch: Patch) -> None:
     """Gaps do not see the master move."""
     pairing = solver.contact.interface.Interface.pairing
 
-    def still(self: Any, u: Any, time: float = 0.0) -> Any:
+    def still(self: Any, u: Any, time: float = 0.0, **options: Any) -> Any:
         number = self.sides[1][0]
         seen = tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u))
-        return pairing(self, seen, time)
+        return pairing(self, seen, time, **options)
 
     patch.setattr(solver.contact.interface.Interface, "pairing", still)
 

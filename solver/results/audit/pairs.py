@@ -228,7 +228,7 @@ class AuditedPair:
     def _coarseness(self) -> float:
         """Return the longest edge in a contact of curved surfaces / its width; 0 where flat."""
         little = _LITTLE * self._state.force_scale
-        if not self.surfaces.curved or self.force <= little:
+        if self.force <= little:
             return 0.0
         return self.surfaces.coarseness(self._state, np.where(self._closed, self.normal, 0.0))
 

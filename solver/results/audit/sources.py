@@ -58,11 +58,15 @@ class OfStates:
         for boundary, axes in body.supports.items():
             for each in axes:
                 declared["xy".index(each), self.plain(name).part.boundary_nodes(boundary)] = 0.0
-        for load in reversed(body.every_load):  # the first that holds a component keeps it
+        moved: dict[tuple[str, int], float] = {}  # displacements of one boundary add up
+        for load in body.every_load:
             if isinstance(load, Displacement):
-                nodes, factor = self.plain(name).part.boundary_nodes(load.boundary), load.amplitude
+                factor = load_factor(load.amplitude, self._time(stage))
                 for axis, value in load.components.items():
-                    declared[axis, nodes] = load_factor(factor, self._time(stage)) * value
+                    key = load.boundary, axis
+                    moved[key] = moved.get(key, 0.0) + factor * value
+        for (boundary, axis), value in moved.items():
+            declared[axis, self.plain(name).part.boundary_nodes(boundary)] = value
         return fields.displacement, declared
 
     def _tractions(self, pair: int, stage: str) -> Tractions:

@@ -35,6 +35,8 @@ _BLOCK = 1000
 """Points treated at once, each with every edge."""
 _CORNER = float(np.radians(40.0))  # turn between edges that meet in a corner
 _OPPOSED = 0.25  # least cosine of the angle between surfaces that face each other
+_STRAIGHT = 1e-6
+"""Turn of the normals [rad] that rounding may make."""
 _SHARE = 0.05
 """Share of the force of a pair, below which a patch of its contact does not count."""
 _BESIDE = 1e-9
@@ -116,41 +118,51 @@ class Surfaces:
     def coarseness(self, state: State, normal: Array) -> float:
         """Return the longest edge that contact forces (n,) act on / the width of their contact.
 
-        The worst of all patches of vertices in contact that bear more than a share of the force. At
-        the axis, or a support, the other half of a patch counts.
+        The worst of all patches of contact between surfaces that are curved there, and that bear
+        more than a share of the force; 0 where there are none. At the axis, or where a support
+        stands for a plane of symmetry, the other half of a patch counts.
         """
         xs, xm = self._at(state)
-        mirrored = self._mirrored()
-        closed = normal > 0
-        closed[[0, -1]] |= closed[[1, -2]] & mirrored  # next to the axis hats are small
-        ends = np.flatnonzero(np.diff(np.pad(closed.astype(int), 1)))
+        closed, halved = normal > 0, self._halved()
+        closed[[0, -1]] |= closed[[1, -2]] & halved  # next to the axis hats are small
+        closed[1:-1] |= closed[:-2] & closed[2:]  # one open vertex parts no contact
+        bounds = np.flatnonzero(np.diff(np.pad(closed.astype(int), 1)))
         worst = 0.0
-        for first, last in zip(ends[::2], ends[1::2] - 1, strict=True):
-            patch = slice(first, last + 1)
+        for first, end in zip(bounds[::2], bounds[1::2], strict=True):
+            patch = np.arange(first, end)
             if normal[patch].sum() < _SHARE * normal.sum():
                 continue
-            edges = [0.0]
-            sides = ((self.pair.slave, self.slave, xs), (self.pair.master, self.master, xm))
-            for (name, _), chain, x in sides:
-                if name in self._system.names:  # rigid surfaces are what they are
-                    own, at = x[:, chain.vertices], xs[:, self.slave.vertices[patch]]
-                    near = np.linalg.norm(own[:, :, None] - at[:, None], axis=0).argmin(axis=0)
-                    edges.append(float(_edge_lengths(chain)[near].max()))
-            halved = (mirrored & [first == 0, last == len(closed) - 1]).any()
-            width = float(self.slave.tributary[patch].sum()) * (2 if halved else 1)
-            worst = max(worst, max(edges) / width)
+            corners = xm[:, self.master.vertices]
+            at = xs[:, self.slave.vertices[patch]]
+            near = np.linalg.norm(corners[:, :, None] - at[:, None], axis=0).argmin(axis=0)
+            sides = ((self.pair.slave, self.slave, patch), (self.pair.master, self.master, near))
+            if not any(_bent(chain, vertices) for _, chain, vertices in sides):
+                continue
+            longest = max(  # rigid surfaces are what they are
+                float(_edge_lengths(chain)[vertices].max())
+                for (name, _), chain, vertices in sides
+                if name in self._system.names
+            )
+            mirrored = (halved & [first == 0, end == len(closed)]).any()
+            width = float(self.slave.tributary[patch].sum()) * (2 if mirrored else 1)
+            worst = max(worst, longest / width)
         return worst
 
-    def _mirrored(self) -> NDArray[np.bool_]:
-        """Return whether the axis or a support stands for another half beyond either end (2,)."""
+    def _halved(self) -> NDArray[np.bool_]:
+        """Return whether the slave ends at the axis or a plane of symmetry, at either end (2,).
+
+        There a support holds it along its surface, and not across.
+        """
         name, _ = self.pair.slave
         if name not in self._system.names:
             return np.zeros(2, dtype=bool)
         whole = self._system.full(name)
         held = np.ones(whole.n, dtype=bool)
         held[whole.free] = False
-        ends = self.slave.nodes[self.slave.vertices[[0, -1]]]
-        return np.asarray(held.reshape(-1, 2)[ends].any(axis=1))
+        ends = held.reshape(-1, 2)[self.slave.nodes[self.slave.vertices[[0, -1]]]]
+        first, last = _at_ends(self.slave.X, self.slave)
+        along = np.abs(np.stack([first[:, 0], last[:, -1]])).argmin(axis=1)
+        return np.asarray(ends[[0, 1], along] & ~ends[[0, 1], 1 - along])
 
     def touching(self, state: State, start: State, normal: Array, tangential: Array) -> Touching:
         """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
@@ -249,6 +261,16 @@ def _spread(force: Array, nodes: NDArray[np.int64], shape: Array, count: int) ->
 def _edge_lengths(surface: Surface) -> Array:
     length = np.linalg.norm(np.diff(surface.X[:, surface.vertices]), axis=0)
     return np.asarray((np.append(length, length[-1]) + np.append(length[0], length)) / 2)
+
+
+def _bent(surface: Surface, vertices: NDArray[np.int64]) -> bool:
+    """Whether a surface as it was made is curved next to vertices; a corner is no curve."""
+    first, last = _at_ends(surface.X, surface)
+    within = np.pad(np.linalg.norm(last - first, axis=0), 1)
+    turn = np.linalg.norm(first[:, 1:] - last[:, :-1], axis=0)
+    turn = np.pad(np.where(turn < 2 * np.sin(_CORNER / 2), turn, 0.0), 1)
+    bend = np.max([within[:-1], within[1:], turn], axis=0)
+    return bool((bend[vertices] > _STRAIGHT).any())
 
 
 def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) -> Array:

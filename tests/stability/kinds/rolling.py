@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from solver import LimitLoad, NotConverged, Record, Status, System
+from solver import LimitLoad, NotConverged, Record, System
 from solver.contact.state import Converged, State
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_parameters import RollingParameters
@@ -134,8 +134,8 @@ def judge(rolled: Rolled) -> dict[str, Figure]:
     p, record = rolled.parameters, rolled.record
     force = p.force
     way = p.directions[-1] * p.traction * p.friction * force
-    figures = {"audit": Figure(float(record.status is not Status.OK), 0.0)}
-    if record.status is not Status.OK:
+    figures = {"audit": Figure(float(not record.status.solved), 0.0)}
+    if not record.status.solved:
         return figures
     stages = list(record.coordinates["stage"])
     s = record.coordinates["s"]

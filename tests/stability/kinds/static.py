@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from solver import SCENES, Record, Status
+from solver import SCENES, Record
 from tests.stability.trial import Figure, Scene
 
 COUNT = 4
@@ -59,7 +59,7 @@ class Drawn:
 def judge(drawn: Drawn, both: tuple[Record, Record]) -> dict[str, Figure]:
     """Return the figures."""
     one, _ = both
-    figures = {"audit": Figure(float(sum(r.status is not Status.OK for r in both)), 0.0)}
+    figures = {"audit": Figure(float(sum(not r.status.solved for r in both)), 0.0)}
     if figures["audit"].value:
         return figures
     (_, p), (_, q) = (r.fields["contact_pressure"] for r in both)

@@ -420,3 +420,25 @@ def test_a_map_that_a_swept_value_takes_off_the_bodies_ends_the_run() -> None:
     assert run(scene).status is Status.OK
     with pytest.raises(ModelError, match=r"map = \[50\.0, 51\.0, -1\.0, 0\.0\]: must meet a body"):
         run(scene, at=50.0)
+
+
+def test_press_then_slide_by_two_displacements_of_one_boundary() -> None:
+    """They add up, and what is stored is compared with their sum."""
+    content = blocks()
+    del content["bodies"]["upper"]["supports"]
+    content["loads"] = [
+        {"body": "upper", "kind": "displacement", "boundary": "top", "x": 0.0, "y": -0.002,
+         "amplitude": {"pressed": 1, "slid": 1}},
+        {"body": "upper", "kind": "displacement", "boundary": "top", "x": 0.004, "y": -0.001,
+         "amplitude": {"pressed": 0, "slid": 1}},
+    ]  # fmt: skip
+    content["stages"] = [{"name": "pressed", "increments": 2}, {"name": "slid", "increments": 2}]
+    content["outputs"] = {
+        f"top_{axis}": {"of": f"displacement.{axis}", "take": take, "body": "upper",
+                        "stage": "slid"}
+        for axis, take in (("x", "maximum"), ("y", "minimum"))
+    }  # fmt: skip
+    record = run(built(content))
+    assert record.status is Status.OK, record.message
+    assert record.scalars["top_x"] == pytest.approx(0.004, rel=0.05)
+    assert record.scalars["top_y"] == pytest.approx(-0.003, rel=1e-9)
