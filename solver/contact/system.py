@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 
 
 LEAST = 1e-7
-"""Force, or energy / that of elements that resist what is given, from which on ratios are told."""
+"""Least force that ratios refer to / that of elements that resist what is given by themselves."""
+LEAST_ENERGY = 1e-8
+"""The same of energies: of free expansion a hundred-millionth of 1e-5 is left by rounding."""
 _TOUCHING = 1e-9
 """Gap / length of the longest contact surface, below which vertices touch."""
 _SET_DOWN = 1e-9
@@ -126,7 +128,7 @@ class System:
         elements, which cancel, nothing but their rounding is left.
         """
         force, energy = np.array([part.resisted(time) for part in self.parts]).T
-        return LEAST * float(np.linalg.norm(force)), LEAST * float(energy.sum())
+        return LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
 
     @property
     def n_unknowns(self) -> int:

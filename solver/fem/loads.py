@@ -148,7 +148,7 @@ class _Course:
             f"{self.name}.{'xy'[self.axis]}", float(f"{mine[worst]:g}"),
             f"must be {others[worst]:g} mm at time {times[worst]:g}, as {other.name} of body "
             f"{part.body.name!r} has it: "
-            f"they meet at ({x:g}, {y:g}) mm; let one of the boundaries end before",
+            f"they meet at ({x:g}, {y:g}) mm; or shorten one of the boundaries by an element",
         )  # fmt: skip
 
 

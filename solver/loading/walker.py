@@ -125,9 +125,8 @@ class Walker:
                 slave, master = (".".join(side) for side in (contact.slave, contact.master))
                 time = point.now.state.time
                 return NotConverged(
-                    f"{slave} and {master} have not faced each other at any time: no normal of the "
-                    "slave has met the master from outside, so that no contact was possible; check "
-                    "the boundaries, where the bodies are, and how they move", time, time,
+                    f"{slave} and {master} were at no time opposite each other, so that they could "
+                    "not touch; check the boundaries, where the bodies are, and how they move", time, time,
                 )  # fmt: skip
         return None
 
