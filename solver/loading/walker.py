@@ -126,7 +126,8 @@ class Walker:
                 time = point.now.state.time
                 return NotConverged(
                     f"{slave} and {master} were at no time opposite each other, so that they could "
-                    "not touch; check the boundaries, where the bodies are, and how they move", time, time,
+                    "not touch; check the boundaries, where the bodies are, and how they move",
+                    time, time,
                 )  # fmt: skip
         return None
 
