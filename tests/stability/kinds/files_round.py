@@ -88,7 +88,7 @@ class Pressed(NamedTuple):
         """Return the scene file; ``names`` are its stages before the release."""
         a, R = self.a, self.radius
         L, h = 25 * a, self.fine * a / finer
-        close = [{"at": [0.0, 0.0], "size": h, "radius": 1.5 * a}]
+        close = [{"at": [0.0, 0.0], "size": h, "radius": max(1.5, self.fine) * a}]
         start = 0.0 if self.round_axis else -L
         held = {"left": "x", "bottom": "y"} if self.round_axis else {"bottom": "xy"}
         grown = {"size": L / 5, "growth": 1.5, "near": close}
@@ -189,7 +189,7 @@ def moved(number: int, rng: Rng) -> Draw:
     def check(runs: Sequence[Told]) -> Figures:
         (run,) = runs
         return {"force of a way": Figure(near(run.contact("c", "on")[0], p.force),
-                                         PEAK + 0.08 * p.fine),
+                                         PEAK + 0.08 * min(p.fine, 1.0)),
                 "peak": p.peaked(run.record.scalars["top"])}  # fmt: skip
 
     return Draw(f"moved {p}", (tables,), check, p.excused)
