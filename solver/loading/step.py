@@ -114,12 +114,14 @@ def rounding(system: System, u: Vectors) -> float:
 
 
 def apart(system: System, candidates: Candidates) -> str:
-    """Return a message on bodies that contact alone holds but that do not touch; else empty."""
+    """Return a message on bodies that contact alone holds and that no force holds; else empty."""
     floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
     if not floating or candidates.forces.any():
         return ""
     gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
-    return (
-        f"; body {' and '.join(floating)} is held by contact alone and stands {gap:.3g} mm "
-        "apart: the load must push it towards the body that is to hold it"
+    stands = (
+        f"stands {gap:.3g} mm apart: the load must push it towards the body that is to hold it"
+        if gap > system.touching
+        else "touches: the load must press it on, and push it along by less than friction bears"
     )
+    return f"; body {' and '.join(floating)} is held by contact alone and {stands}"

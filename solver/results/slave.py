@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+_LEVEL = 1e-6
+"""Fall of the squared pressure over an edge / its largest, below which it does not fall."""
+
+
 class Slave(NamedTuple):
     """What acts on the slave of a pair, at its vertices (n,): s from its start, X (2, n).
 
@@ -53,10 +57,10 @@ class Slave(NamedTuple):
         beyond = last + way
         if not known.all() or not self.closed[inner].all() or not 0 <= beyond < len(self.s):
             return float(self.s[last])
-        slope, start = np.polyfit(self.s[inner] - self.s[last], self.pressure[inner] ** 2, 1)
-        if slope * way >= 0:
+        square, edge = self.pressure[inner] ** 2, abs(float(self.s[beyond] - self.s[last]))
+        slope, start = np.polyfit(self.s[inner] - self.s[last], square, 1)
+        if slope * way * edge >= -_LEVEL * square.max():  # as around the middle of few vertices
             return float(self.s[last])
-        edge = abs(float(self.s[beyond] - self.s[last]))
         return float(self.s[last] + np.clip(-start / slope, -edge, edge))
 
 

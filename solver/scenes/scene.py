@@ -207,7 +207,8 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             tally = outcome.tally
             return audit(system, loaded, unloaded, tally.dissipation, tally.lost)
 
-        reached = () if outcome.error else outcome.points.values()
+        # of a run that stopped nobody knows which pairs would have touched
+        never = () if outcome.error else apart(system, outcome.points.values())
         yield Look(
             parameters=run,
             samples=samples,
@@ -215,7 +216,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             outcome=outcome,
             check=check,
             singular=system.model.singular,
-            notes=(*system.model.doubts, *apart(system, reached)),
+            notes=(*system.model.doubts, *never),
         )
 
 

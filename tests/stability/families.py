@@ -13,6 +13,7 @@ from tests.stability.kinds import (
     cycles,
     duplicate,
     endless,
+    files,
     fits,
     folded,
     friction,
@@ -88,6 +89,7 @@ FAMILIES: dict[str, Family] = {
     "rigid": Family(rigid.COUNT, 60, rigid.scenes),
     "static": Family(static.COUNT, 48, static.scenes),
     "endless": Family(endless.COUNT, 300, endless.scenes),
+    "files": Family(files.COUNT, 200, files.scenes),
 }
 
 FOUND = ["endless-64", "endless-160", "endless-174"]

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Material, Model, Pushed, RigidBody, Solution, Stage, solve
+from solver import (
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    Moved,
+    Pushed,
+    RigidBody,
+    Solution,
+    Stage,
+    solve,
+)
 from solver.mesh import graded, grid, mapped
 from solver.model.rigid import Curve, arc, line
 
@@ -123,6 +134,28 @@ def test_of_two_curved_bodies_the_finer_one_bears_the_forces(fine: str) -> None:
     found = solve(Model(bodies=(upper, lower), contacts=(pair,)), stages=ONCE)
     assert found.system.model.contacts[0].slave == sides[fine]
     assert "audit_contact_resolution" in " ".join(found.audit("loaded").violations)
+
+
+@pytest.mark.parametrize("on_axis", [True, False])
+@pytest.mark.parametrize("size", [0.6, 2.0, 4.0])
+def test_a_way_that_ends_between_vertices_is_no_answer(on_axis: bool, size: float) -> None:
+    """A ball that is moved into a plane meets force, although the mean gaps under hats are open."""
+    x = np.arange(0.0, 20.0 + size / 2, size)
+    body = Body(
+        name="plane",
+        mesh=grid(x if on_axis else both_sides(x), -graded(20.0, 0.1, 1.3, 4.0)[::-1]),
+        material=STEEL,
+        kinematics="axisymmetric" if on_axis else "plane_strain",
+        supports={"bottom": "xy"} | ({"left": "x"} if on_axis else {}),
+    )
+    start, whole = (-np.pi / 2, (False, True)) if on_axis else (-np.pi / 2 - 0.5, (True, True))
+    cap = arc((0.0, RADIUS), RADIUS, (start, -np.pi / 2 + 0.5), 40, whole)
+    ball = RigidBody(name="ball", surfaces={"cap": cap}, y=Moved(value=-(HALF_WIDTH**2) / RADIUS))
+    pair = ContactPair(slave=("plane", "top"), master=("ball", "cap"))
+    found = solve(Model(bodies=(body,), rigid=(ball,), contacts=(pair,)), stages=ONCE)
+    audit = found.audit("loaded")
+    assert (found.loaded.state.contacts[0].normal > 0).any() == (size == 0.6)
+    assert [text.split()[0] for text in audit.violations] == ["audit_contact_resolution"]
 
 
 def test_a_flat_punch_stays_the_slave_on_a_finer_plane() -> None:

@@ -17,6 +17,9 @@ LIMIT = 1e-6
 MEASURED = 0.02
 """The same of gap, slip and reactions where surfaces are curved or slide far: another projection
 measures them, and means over hats differ by what surfaces turn within an edge."""
+AREA = 1e-4
+"""The same of pressure and shear there: at its ends, another projection finds another share of the
+surface that faces its partner."""
 STEADY = 1e-3
 """The same of stress under a load that passes: its strains are those of equilibrium, up to
 `audit_steadiness`."""

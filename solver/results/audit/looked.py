@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.model.rigid import Moved, RigidBody
-from solver.results.audit.compared import LIMIT, MEASURED, Compared, some
+from solver.results.audit.compared import AREA, LIMIT, MEASURED, Compared, some
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
 from solver.results.audit.values import Places, flowed
@@ -125,8 +125,9 @@ class LookedAt:
 
     # -- contact and forces ------------------------------------------------------------------
 
-    def _share(self, found: Tractions) -> float:
-        return LIMIT / MEASURED if found.measured else 1.0
+    def _share(self, found: Tractions, kind: str) -> float:
+        limit = MEASURED if kind in ("gap", "slip") else AREA
+        return LIMIT / limit if found.measured else 1.0
 
     def _pairs(self) -> None:
         for k, _ in enumerate(self._looked.contacts):
@@ -139,10 +140,12 @@ class LookedAt:
                     self._out.add(name, self._field(name)[k], own, float(np.abs(found.X).max()))
                 for name in ("pressure", "shear", "pressure_deformed", "gap", "slip"):
                     values = _on_slave(found, name)
-                    share = self._share(found) if name in ("gap", "slip") else 1.0
                     told = self._field(f"pair_{name}")[k, j]
-                    scale = found.way if name in ("gap", "slip") else self._scale(name, values)
-                    self._out.add(f"pair_{name}", told, between(s, found.s, values), scale, share)
+                    scale = self._scale(name, values)
+                    if name in ("gap", "slip"):  # unloaded, what is left of them is rounding
+                        scale = max(found.way, self._least[name])
+                    self._out.add(f"pair_{name}", told, between(s, found.s, values), scale,
+                                  self._share(found, name))  # fmt: skip
 
     def _moments(self) -> None:
         """Compare forces and motions at the ends of stages."""
@@ -200,7 +203,7 @@ class LookedAt:
         if asked.contact is not None:
             found = self._source.tractions(self._looked.contacts.index(asked.contact), asked.stage)
             values, X, s = _on_slave(found, kind), found.X, found.s
-            share = self._share(found) if kind in ("gap", "slip") else 1.0
+            share = self._share(found, kind)
             if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
                 return
             if (kind, asked.take) == ("pressure", "extent"):

@@ -226,7 +226,16 @@ class AuditedPair:
         }
 
     def _coarseness(self) -> float:
-        """Return the longest edge in a contact of curved surfaces / its width; 0 where flat."""
+        """Return the longest edge in a contact of curved surfaces / its width; 0 where flat.
+
+        Where no vertex bears and the bodies overlap, the contact is as wide as their overlap.
+        """
+        if not self.surfaces.curved:
+            return 0.0
+        if not self._closed.any():
+            deep = self.touching.point_gap < -self.limits["audit_overlap"]
+            width = float(self.touching.point_length[deep].sum())
+            return float(self.touching.edge.max()) / width if width else 0.0
         little = _LITTLE * self._state.force_scale
         if self.force <= little:
             return 0.0

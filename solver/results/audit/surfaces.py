@@ -79,6 +79,9 @@ class Touching:
     slip : (n,) mean slip of the increment [mm]
     way : (n,) mean motion of the slave along the master since the bodies were at rest [mm]
     edge : (n,) mean length of the edges at a vertex [mm]
+    point_gap : (n_points,) gap of the deformed bodies at points of the slave, inf where no master
+        faces it [mm]
+    point_length : (n_points,) length of the slave that each point stands for [mm]
     on_slave, on_master : nodal forces (n_nodes, 2) equivalent to the contact forces [N]
     """
 
@@ -88,6 +91,8 @@ class Touching:
     slip: Array
     way: Array
     edge: Array
+    point_gap: Array
+    point_length: Array
     on_slave: Array
     on_master: Array
 
@@ -189,8 +194,8 @@ class Surfaces:
         since = on_slave(xs - slave.X) - partner.of(xm - master.X)
 
         along = slave.X[:, nodes] * shape_derivatives(xi, slave.edges.shape[1])
+        length = length * np.linalg.norm(along.sum(axis=-1), axis=0)
         weight = length * slave.depth(on_slave(slave.X))
-        weight *= np.linalg.norm(along.sum(axis=-1), axis=0)
         hats = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
         ends = np.stack([edges, edges + 1])
         count = len(slave.edges) + 1
@@ -216,6 +221,8 @@ class Surfaces:
             slip=mean((moved * t).sum(axis=0), partner.faces),
             way=mean((since * t).sum(axis=0), partner.faces),
             edge=_edge_lengths(slave),
+            point_gap=np.where(true.faces > 0, true_gap + offset, np.inf),
+            point_length=length,
             on_slave=_spread(force, nodes, N, len(slave.nodes)),
             on_master=_spread(-force, partner.nodes, partner.shape, len(master.nodes)),
         )

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
+_LEVEL = 1e-6
+"""Fall of the squared pressure over an edge / its largest, below which it does not fall."""
 _WHOLE = 1e-6
 """Share of the hat of a vertex that may not face the master, where the vertex faces it."""
 
@@ -157,7 +159,7 @@ class Tractions:
                 x = s[inner] - s[last]
                 slope = ((x - x.mean()) * square[inner]).sum() / ((x - x.mean()) ** 2).sum()
                 zero = x.mean() - square[inner].mean() / slope if slope else np.nan
-                if slope * way < 0:
-                    edge = abs(s[last + way] - s[last])
+                edge = abs(s[last + way] - s[last])
+                if slope * way * edge < -_LEVEL * square[inner].max():
                     total += way * float(np.clip(zero, -edge, edge))
         return float(total)

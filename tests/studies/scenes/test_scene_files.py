@@ -442,3 +442,62 @@ def test_press_then_slide_by_two_displacements_of_one_boundary() -> None:
     assert record.status is Status.OK, record.message
     assert record.scalars["top_x"] == pytest.approx(0.004, rel=0.05)
     assert record.scalars["top_y"] == pytest.approx(-0.003, rel=1e-9)
+
+
+def test_gaps_that_are_rounding_once_the_load_is_off_are_as_stored(scene: FileScene) -> None:
+    """No load is left between two cycles: gaps and slips are rounding, and so is their scale."""
+    tables = blocks()
+    tables["contacts"][0]["friction"] = "0*$mu"
+    tables["loads"][0]["amplitude"] = {"pressed": 1.0, "off": 0.0}
+    tables["stages"] += [
+        {"name": "off", "increments": 2},
+        {"name": "released", "increments": 2, "release": True},
+    ]
+    record = run(built(tables))
+    assert record.status is Status.OK, record.message
+
+
+def test_a_run_that_stops_is_not_told_that_its_bodies_never_touch() -> None:
+    """It stops at its limit load, pressed, before the first stage has ended."""
+    tables = blocks()
+    tables["loads"][0]["value"] = 900.0
+    tables["stages"][0]["increments"] = 4
+    record = run(built(tables))
+    assert record.status is Status.LIMIT_LOAD, record.message
+    assert "no equilibrium" in record.message
+    assert "touch" not in record.message
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5])
+def test_a_block_pushed_along_by_more_than_friction_bears_is_told_so(share: float) -> None:
+    tables = blocks()
+    tables["bodies"]["upper"]["supports"] = {}
+    tables["loads"] = [
+        {"body": "upper", "kind": "traction", "boundary": "top", "y": -50.0, "x": share * 0.2 * 50}
+    ]
+    record = run(built(tables))
+    if share < 1:
+        assert record.status is Status.OK, record.message
+    else:
+        assert record.status is Status.NOT_CONVERGED
+        assert record.message.endswith("push it along by less than friction bears")
+
+
+def test_pressure_at_the_end_of_coarse_arcs_is_as_stored() -> None:
+    """Three elements on a quarter: what of the last faces the partner is known to some 1e-6."""
+    steel = {"youngs_modulus": 7e4, "poisson_ratio": 0.3}
+    rings = {
+        name: {"material": "steel", "element": element, "supports": {"start": "y", "end": "x"},
+               "shape": {"kind": "sector", "radii": radii, "angles": [0, 90], "size": size}}
+        for name, element, radii, size in (
+            ("inner", "quad9", [23.0, 33.5], 5.26), ("outer", "quad8", [33.5, 67.7], 17.1))
+    }  # fmt: skip
+    tables = {
+        "name": "fit", "materials": {"steel": steel}, "bodies": rings,
+        "contacts": [{"name": "fit", "slave": "outer.inner", "master": "inner.outer",
+                      "interference": 0.0335}],
+        "loads": [{"body": "inner", "kind": "temperature", "rise": 80.0, "expansion": 1.2e-5}],
+        "stages": [{"name": "fitted", "increments": 3}],
+    }  # fmt: skip
+    record = run(built(tables))
+    assert record.status is Status.OK, record.message
