@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from solver.fem.discretisation import Discretisation
 from solver.tensors import deviator
 
 if TYPE_CHECKING:
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from solver.fem.discretisation import Discretisation
     from solver.fem.part import Part
     from solver.materials import Law, PlasticState, Response
 
@@ -116,10 +116,11 @@ def collapses(
         law = part.law(time)
         if share <= _MOVES * elastic.sum():
             continue
-        if not isinstance(part, Discretisation) or np.isinf(law.ultimate_shear_stress):
+        if not part.meshed or np.isinf(law.ultimate_shear_stress):
             return False
-        strain = part.strain(u)
-        if part.body.kinematics == "plane_stress":
+        body = cast("Discretisation", part)
+        strain = body.strain(u)
+        if body.body.kinematics == "plane_stress":
             strain[2] = -strain[0] - strain[1]
         strength = law.ultimate_shear_stress / law.surface.shear(1.0)
         most = strength * (law.surface.power(strain) + np.abs(strain[:3].sum(axis=0)))

@@ -95,8 +95,8 @@ class Contact:
         state, order = converged.state, np.argsort(self._x)
         pressure, shear = contact_pressure(self._system, state, 0)
         gap = self._interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap
-        if not state.contacts[0].normal.any():
-            gap = np.full_like(gap, np.nan)
+        known = np.isfinite(gap) & state.contacts[0].normal.any()
+        gap = np.where(known, gap, np.nan)
 
         def sampled(values: Array, beyond: Array) -> Array:
             left, right = beyond

@@ -473,7 +473,11 @@ MUTATIONS: dict[str, Mutation] = {
         instead(ContactPair, "offset", less_interference), "closed_gap", "overlap"
     ),
     "interference forgotten": _fitted(
-        instead(Interface, "pairing", lambda old: lambda self, u, time=0.0: self._as_meshed(u)),
+        instead(
+            Interface,
+            "pairing",
+            lambda old: lambda self, u, time=0.0, *, finite=False: self._as_meshed(u, finite),
+        ),
         "closed_gap",
         "overlap",
     ),

@@ -114,6 +114,8 @@ class OfStates:
             between(x, at[order], (values + unknown)[order])
             for values in (found.pressure(moved=False), -found.shear(moved=False), found.gap)
         )
+        if found.repeated:  # gaps of the copies of a periodic surface are not measured
+            gap = nowhere
         return Acting(pressure, shear, gap, found.way, found.measured)
 
     def extent(self, stage: str) -> tuple[float, float]:

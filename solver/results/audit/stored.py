@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _FIGURE = AUDIT["audit_stored"].name
+_NEAR = 0.1
+"""Gap / largest way or gap, below which gaps measured by other projections are compared."""
 _LEAST_STRAIN = 1e-6
 """Strain, and times Young's modulus stress, that is next to nothing."""
 
@@ -268,7 +270,10 @@ class _Viewed:
             self._out.add("contact_pressure", pressure[k], own.pressure, scale)
             self._out.add("contact_shear", shear[k], own.shear, scale)
             share = LIMIT / MEASURED if own.measured else 1.0
-            self._out.add("contact_gap", gap[k], own.gap, own.way, share)
+            # far from contact a gap, and whether there is one, depends on how it is projected
+            near = np.isfinite(gap[k]) & (np.abs(own.gap) < _NEAR * own.way)
+            faced = np.where(near | ~np.bool_(own.measured), own.gap, np.nan)
+            self._out.add("contact_gap", gap[k], faced, own.way, share)
             if stage == self._view.loaded:
                 self._number("peak_contact_pressure", peak, peak)
                 self._number("contact_half_width", width, width)

@@ -71,6 +71,11 @@ class Tractions:
         return np.asarray(self._contact.normal > 0)
 
     @property
+    def repeated(self) -> bool:
+        """Whether the surface is that of a periodic body, with copies at its ends."""
+        return len(np.unique(self._chain.nodes)) < len(self._chain.nodes)
+
+    @property
     def measured(self) -> bool:
         """Whether gaps and motions are means over other projections than those of the solver."""
         return self._surfaces.finite or self._surfaces.curved
