@@ -62,7 +62,7 @@ def peak(solution: Solution) -> float:
     return float(solution.contact()[1].max()) / PEAK
 
 
-@pytest.mark.parametrize("edges", [4, 60, 600, 2400, 4800])
+@pytest.mark.parametrize("edges", [4, 60, 1200])
 @pytest.mark.parametrize("slave", ["plane", "cylinder"])
 def test_hertz_holds_whichever_side_is_the_slave_and_however_it_is_divided(
     slave: str, edges: int
