@@ -134,12 +134,9 @@ def test_other_elements_give_the_same_contact(element):
 
 
 def test_it_does_not_matter_which_body_is_the_slave_nor_how_surfaces_are_paired(meshes):
-    # Hertz's surface shrinks under its pressure p by (1 - 2 nu) p / 2 G, and
-    # finite sliding takes the pressure over the area that is left
-    shrunk = (1 - 2 * NU) * (1 + NU) * EXACT.peak_pressure / E
-    for other, area in ((press(20, slave="plane"), 1.0), (press(20, sliding="finite"), 1 - shrunk)):
+    for other in (press(20, slave="plane"), press(20, sliding="finite")):
         assert other.half_width == pytest.approx(meshes[20].half_width, rel=2e-3)
-        assert other.peak * area == pytest.approx(meshes[20].peak, rel=1e-3)
+        assert other.peak == pytest.approx(meshes[20].peak, rel=1e-3)
 
 
 def test_contact_grows_with_the_root_of_the_load(meshes):
