@@ -157,8 +157,9 @@ class SteadyIncrement:
             tangential=np.append(0.0, touching.tangential[:-1]),
             status=status,
             touching=(status != OPEN) | (not from_touch),
-            approach=np.stack([now.gap, closing, np.where(faces, slip, np.nan)]),
             gap=now.gap,
+            rates=np.stack([closing, np.where(faces, slip, np.nan)]),
+            finite=interface.finite,
         )
 
     def solve(self, *, from_touch: bool) -> Converged:
