@@ -40,8 +40,7 @@ class Candidates:
     status : (n,) of the current iterate
     untimed : (n,) whether it touched since then, at a time that is not known
     rows : one per part, None for a part without contact surface
-    covered, area : for each interface, the share of the hats of its candidates that faces the
-        master, and its size [mm2]
+    covered : for each interface, the share of the hats of its candidates that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
@@ -58,7 +57,6 @@ class Candidates:
     untimed: NDArray[np.bool_]
     rows: tuple[Rows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
-    area: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
     slips: tuple[NDArray[np.float64], ...]
     beyond: float
@@ -67,6 +65,10 @@ class Candidates:
     def n(self) -> int:
         """Number of candidate vertices."""
         return len(self.friction)
+
+    def bound(self, N: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest tangential forces (n,) under normal forces N [N]."""
+        return least(bound_lines(self.friction, self.cohesion, self.limit), N)
 
     def smooth(self) -> Candidates:
         """Return the same candidates without friction."""
@@ -115,7 +117,7 @@ class Candidates:
         N = F[:n]
         worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
         if len(F) > n:
-            bound = least(bound_lines(self.friction, self.cohesion, self.limit), N)
+            bound = self.bound(N)
             wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
             worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
         return worst
@@ -183,9 +185,7 @@ def no_candidates(system: System) -> Candidates:
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
     known = empty.astype(bool)
-    return Candidates(
-        none, *(empty,) * 6, status, known, rows, covered, covered, gaps, slips, np.inf
-    )
+    return Candidates(none, *(empty,) * 6, status, known, rows, covered, gaps, slips, np.inf)
 
 
 def find_candidates(
@@ -232,16 +232,15 @@ def find_candidates(
         cohesion[normal] = interface.cohesion * pairing.area[at]
         apart[normal] = np.nan_to_num(apart[normal])
         limit[normal] = interface.shear_strength * pairing.area[at]
-        slip = np.zeros(len(pairing.gap))
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
-                moved = part.motion(surface, u[number]) - part.motion(surface, start.u[number])
-                slip += pairing.tangent[side] @ moved.T.ravel()
             pieces[number].append(Rows(*part.pull_back(surface, u[number], block, n)))
+        slip = np.zeros(len(pairing.gap))
         if frictional:
+            slip = interface.slip(pairing, u, start.u)
             motion[tangent] = slip[at] - apart[normal]
         slips.append(slip)
 
@@ -262,7 +261,6 @@ def find_candidates(
         untimed=untimed,
         rows=tuple(joined(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
-        area=tuple(p.area[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
         slips=tuple(slips),
         beyond=float(beyond),

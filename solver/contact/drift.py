@@ -43,10 +43,8 @@ def _drifts(interface: Interface, state: State, contact: ContactState) -> bool:
     if not pressed.any():
         return False
     share = contact.normal[pressed] / contact.normal[pressed].sum()
-    way = np.zeros(len(contact.normal))
-    for (number, part, chain), block in zip(interface.sides, small.tangent, strict=True):
-        way += block @ part.motion(chain, state.u[number]).T.ravel()
-    far, side = float(np.abs(way[pressed]) @ share), float(small.length[pressed] @ share)
+    way = interface.slip(small, state.u)[pressed]
+    far, side = float(np.abs(way) @ share), float(small.length[pressed] @ share)
     if not _STILL * side < far <= _FAR * side:
         return far > _FAR * side
     now, then = (

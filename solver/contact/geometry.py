@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.normals import end_normals
+from solver.fem.surface import at_vertices
 from solver.mesh.shapes import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
@@ -241,16 +242,15 @@ def _integrate(
                 value = sign * (hat * N.T)[..., None] * direction.T
                 np.add.at(target[kind], (vertex[:, None], nodes), value.swapaxes(0, 1))
 
-    length = np.linalg.norm(np.diff(slave.X[:, slave.vertices]), axis=0)
-    full = _hat_sum(length * slave.depth(slave.X[:, slave.edges[:, :2]]).mean(axis=1) / 2)
+    full = at_vertices(slave.lengths * slave.depth(slave.X[:, slave.edges[:, :2]]).mean(axis=1) / 2)
     covered = area > _MIN_COVERED * full
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
     flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in (on_slave, on_master)]
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
-        covered=facing / _hat_sum(np.ones_like(length)),
-        length=_hat_sum(length) / _hat_sum(np.ones_like(length)),
+        covered=facing / at_vertices(np.ones(len(slave.edges))),
+        length=slave.spacing,
         gap=np.where(covered, gap * scale, np.inf),
         normal=(flat[0][0], flat[1][0]),
         tangent=(flat[0][1], flat[1][1]),
@@ -264,8 +264,3 @@ def _area_per_xi(
     xe, k = x[:, surface.edges[edge]], surface.edges.shape[1]
     along = np.linalg.norm(_combine(xe, shape_derivatives(xi, k)), axis=0)
     return np.asarray(along * surface.depth(_combine(xe, shape_functions(xi, k))))
-
-
-def _hat_sum(of_edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the sum over the one or two edges at each vertex."""
-    return np.append(of_edges, 0.0) + np.append(0.0, of_edges)

@@ -83,6 +83,24 @@ class Interface:
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 
+    def slip(
+        self,
+        pairing: Pairing,
+        u: tuple[NDArray[np.float64], ...],
+        since: tuple[NDArray[np.float64], ...] | None = None,
+    ) -> NDArray[np.float64]:
+        """Return the slip (n,) of the slave's vertices at displacements ``u`` [mm].
+
+        It counts from the displacements ``since``, from those before loading when absent.
+        """
+        slip = np.zeros(len(pairing.gap))
+        for (number, part, chain), rows in zip(self.sides, pairing.tangent, strict=True):
+            moved = part.motion(chain, u[number])
+            if since is not None:
+                moved = moved - part.motion(chain, since[number])
+            slip += rows @ moved.T.ravel()
+        return slip
+
     def _as_meshed(self, u: tuple[NDArray[np.float64], ...], finite: bool) -> Pairing:
         motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
         if self.reference is not None and not finite:

@@ -30,20 +30,15 @@ def parted(system: System, state: State) -> State:
     ``E' = [A, -gap]`` and f the last unit vector, ``q = -r / r_last``. There is none where r is
     zero: bodies that are clamped press each other apart.
     """
-    sizes = [part.rigid.shape[1] for part in system.parts]
-    ends = np.cumsum(sizes)
+    ends = np.cumsum([part.rigid.shape[1] for part in system.parts])
     moved, overlap = state, 0.0
     for _ in range(_ROUNDS + 1):
         rows, gaps = [], []
         for interface in system.interfaces:
             pairing = interface.pairing(moved.u, moved.time)
-            at = np.flatnonzero(np.isfinite(pairing.gap))
-            A = np.zeros((len(at), ends[-1]))
-            for (number, part, chain), block in zip(interface.sides, pairing.normal, strict=True):
-                columns = slice(ends[number] - sizes[number], ends[number])
-                dofs, on = part.pull_back(chain, moved.u[number], block, len(block))
-                A[:, columns] += on[at] @ part.rigid[dofs]
-            rows.append(A)
+            at = np.isfinite(pairing.gap)
+            A = system.rigid_rows(interface, pairing.normal, moved.u, len(at))
+            rows.append(A[at])
             gaps.append(pairing.gap[at])
         A, gap = np.vstack(rows), np.concatenate(gaps)
         if not (gap < -system.touching).any():

@@ -29,7 +29,7 @@ def contact_pressure(
     pairing = system.interfaces[interface].pairing(state.u, finite=contact.finite)
     safe = np.where(pairing.area > 0, pairing.area, 1.0)
     x = chain.X[:, chain.vertices]
-    edge = np.linalg.norm(np.diff(x), axis=0)
+    edge = chain.lengths
     measure = chain.depth(x)
     # consistent mass of the hats on each edge, the depth varying linearly along it
     left = edge / 12 * (3 * measure[:-1] + measure[1:])

@@ -59,8 +59,6 @@ def _edges(slave: Surface, master: Surface) -> float:
     """Return the edges of the slave / those of the master, the median where contact is near."""
     at, partner = slave.X[:, slave.vertices].T, master.X[:, master.vertices].T
     distance, nearest = cKDTree(partner).query(at)
-    own, its = (chain.tributary for chain in (slave, master))
-    own[[0, -1]] *= 2  # an end has the half of a single edge
-    its[[0, -1]] *= 2
+    own, its = slave.spacing, master.spacing
     near = distance <= distance.min() + _NEAR * np.minimum(own, its[nearest])
     return float(np.median(own[near] / its[nearest[near]]))

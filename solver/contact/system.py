@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from solver.contact.interface import Interface
     from solver.contact.state import Converged
     from solver.fem.part import Part
     from solver.fem.surface import Surface
@@ -93,6 +94,7 @@ class System:
             for contact in model.contacts
         )
 
+        self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
         self._check_held()
 
@@ -100,17 +102,13 @@ class System:
         """Raise `ModelError` when a body has a rigid motion that nothing resists."""
         sizes = [part.rigid.shape[1] for part in self.parts]
         ends = np.cumsum(sizes)
+        u = tuple(part.start() for part in self.parts)
         rows = []
         for interface in self.interfaces:
-            pairing = interface.pairing(tuple(part.start() for part in self.parts))
+            pairing = interface.pairing(u)
             kinds = (pairing.normal, pairing.tangent)[: 2 if interface.rough else 1]
             for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
-                A = np.zeros((len(pairing.area), ends[-1]))
-                for (number, part, chain), block in zip(interface.sides, kind, strict=True):
-                    columns = slice(ends[number] - sizes[number], ends[number])
-                    dofs, rows_of = part.pull_back(chain, part.start(), block, gaps)
-                    A[:, columns] += rows_of @ part.rigid[dofs]
-                rows.append(A)
+                rows.append(self.rigid_rows(interface, kind, u, gaps))
         A = np.vstack([np.zeros((0, ends[-1])), *rows])
         loose = null_space(A, rcond=1e-9) if len(A) else np.eye(ends[-1])
         for part, size, end in zip(self.parts, sizes, ends, strict=True):
@@ -121,14 +119,36 @@ class System:
                     f"body {part.body.name!r} can move freely: support it, or hold it by contact",
                 )
 
+    def rigid_rows(
+        self,
+        interface: Interface,
+        kind: tuple[Array, Array],
+        u: tuple[Array, ...],
+        gaps: int,
+    ) -> Array:
+        """Return gaps or slips (n, n_rigid) per rigid motion that the parts are free to make.
+
+        ``kind`` are the rows of a pairing at displacements ``u``, the first ``gaps`` those of gaps.
+        """
+        ends = np.cumsum([0, *(part.rigid.shape[1] for part in self.parts)])
+        A = np.zeros((len(kind[0]), ends[-1]))
+        for (number, part, chain), block in zip(interface.sides, kind, strict=True):
+            dofs, rows = part.pull_back(chain, u[number], block, gaps)
+            A[:, ends[number] : ends[number + 1]] += rows @ part.rigid[dofs]
+        return A
+
     def least(self, time: float) -> tuple[float, float]:
         """Return the force [N] and energy [N mm] below which all is rounding of what acts.
 
         A body may give way to heat, initial stress and prescribed motion: of large forces of its
         elements, which cancel, nothing but their rounding is left.
         """
-        force, energy = np.array([part.resisted(time) for part in self.parts]).T
-        return LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
+        at, found = self._least
+        if at != time:  # an increment asks for it, and then its energy
+            force, energy = np.array([part.resisted(time) for part in self.parts]).T
+            found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
+            self._least = time, found
+        return found
 
     @property
     def n_unknowns(self) -> int:

@@ -54,15 +54,29 @@ class Surface:
         return shortest(self.X, self.edges)
 
     @property
+    def lengths(self) -> NDArray[np.float64]:
+        """Lengths (n_edges,) of the edges between their ends [mm]."""
+        return np.asarray(np.linalg.norm(np.diff(self.X[:, self.vertices]), axis=0))
+
+    @property
     def tributary(self) -> NDArray[np.float64]:
         """Tributary length (n_edges + 1,) of each vertex: half of the edges at it [mm]."""
-        half = np.linalg.norm(np.diff(self.X[:, self.vertices]), axis=0) / 2
-        return np.append(half, 0.0) + np.append(0.0, half)
+        return at_vertices(self.lengths / 2)
+
+    @property
+    def spacing(self) -> NDArray[np.float64]:
+        """Mean length (n_edges + 1,) of the one or two edges at each vertex [mm]."""
+        return at_vertices(self.lengths) / at_vertices(np.ones(len(self.edges)))
 
     @property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()
+
+
+def at_vertices(of_edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum over the one or two edges at each vertex of a chain."""
+    return np.append(of_edges, 0.0) + np.append(0.0, of_edges)
 
 
 def shortest(X: NDArray[np.float64], edges: NDArray[np.int64]) -> float:

@@ -34,8 +34,6 @@ def lost(system: System, before: Converged, now: Converged) -> float:
     for interface, contact in zip(system.interfaces, now.start.contacts, strict=True):
         kept = contact.touching & (contact.normal <= 0) & np.isfinite(contact.gap)
         if contact.normal.any() and kept.any():
-            edges = interface.slave_surface.X[:, interface.slave_surface.vertices]
-            edge = float(np.linalg.norm(np.diff(edges), axis=0).mean())
-            apart = float(contact.gap[kept].max()) / edge
+            apart = float(contact.gap[kept].max() / interface.slave_surface.lengths.mean())
             worst = max(worst, apart) if apart > _APART else worst
     return worst

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from solver.contact.problem import bound_lines, least
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -76,7 +74,7 @@ def slide(
     closed = N > 0
     if not closed.any():
         return None
-    bound = least(bound_lines(candidates.friction, candidates.cohesion, candidates.limit), N)
+    bound = candidates.bound(N)
     for i, part in enumerate(system.parts):
         motion = candidates.of_part(i, part.rigid)
         if len(motion) == n or not motion.size:

@@ -191,7 +191,7 @@ class Stepper:
         surfaces that are paired anew, if that converges.
         """
         state = point.now.state
-        guess, trusted = self._predict(point.past, state, time) if contact else (None, False)
+        guess = self._predict(point.past, state, time) if contact else None
 
         def solved(start: State, guess: State | None) -> Converged:
             return Increment(
@@ -200,7 +200,7 @@ class Stepper:
                 time,
                 guess=guess,
                 contact=contact,
-                elastic_first=guess is None or not trusted,
+                elastic_first=guess is None,
                 patient=patient,
                 tolerances=self.control.tolerances,
             ).solve()
@@ -239,18 +239,16 @@ class Stepper:
         self._report()
         return self._after(point, converged, ())
 
-    def _predict(self, past: Sequence[State], now: State, time: float) -> tuple[State | None, bool]:
-        """Return the state to iterate from, None for the last one, and whether it is a prediction.
+    def _predict(self, past: Sequence[State], now: State, time: float) -> State | None:
+        """Return the state that is predicted for a time, or None.
 
         Under a load that moves along a body the next state is not on the line through the last two:
         where no earlier increment can be carried along with the load, there is no prediction.
         """
         if not self.system.moves:
-            guess = extrapolate(past, now, time)
-            return guess, guess is not None
+            return extrapolate(past, now, time)
         with one_thread():
-            guess = self._carrier.carried(past, now, time)
-        return guess, guess is not None
+            return self._carrier.carried(past, now, time)
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began, and what it has lost."""
@@ -280,8 +278,8 @@ class Stepper:
     def _timed(self, tally: Tally) -> Tally:
         """Return the tally with the CPU time spent since the last call."""
         now = clock.process_time()
-        spent, self._clock = now - self._clock, now
-        return replace(tally, seconds=tally.seconds + spent)
+        seconds, self._clock = tally.seconds + now - self._clock, now
+        return replace(tally, seconds=seconds)
 
 
 class _Size:

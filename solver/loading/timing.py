@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.problem import bound_lines, least
 from solver.contact.state import Timing
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     N = np.maximum(candidates.forces[:n], 0.0)
     bound, strained = np.zeros(n), np.zeros(n)
     if len(candidates.motion) > n:
-        bound = least(bound_lines(candidates.friction, candidates.cohesion, candidates.limit), N)
+        bound = candidates.bound(N)
         slips = zip(candidates.slips, candidates.vertices, strict=True)
         strained = stiffness[n:] * np.abs(np.concatenate([slip[at] for slip, at in slips]))
     unknown = np.where(candidates.untimed, np.minimum(bound, strained), 0.0)

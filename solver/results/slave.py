@@ -74,8 +74,5 @@ def on_slave(system: System, at: Converged, pair: int) -> Slave:
     shared, _ = contact_pressure(system, state, pair, deformed=True)
     pairing = interface.pairing(state.u, state.time, finite=state.contacts[pair].finite)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
-    slip = np.zeros(len(s))
-    for (number, part, surface), block in zip(interface.sides, pairing.tangent, strict=True):
-        slip += block @ part.motion(surface, state.u[number]).T.ravel()
-    slip = np.where(np.isfinite(gap), slip, np.nan)
+    slip = np.where(np.isfinite(gap), interface.slip(pairing, state.u), np.nan)
     return Slave(s, X, pressure, shear, shared, gap, slip, state.contacts[pair].normal > 0)

@@ -20,7 +20,7 @@ from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
 from solver.model.loads import InitialStress
 from solver.results import saved
-from solver.results.audit.pairs import apart
+from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
 from solver.results.mesh_fields import MeshFields, mesh_fields
@@ -198,7 +198,7 @@ class Solution:
         after = self.stages.get("unloaded") if stage == "loaded" else None
         tally = self.tally
         found = audit(self.system, self._at(stage), after, tally.dissipation, tally.lost)
-        own = self.system.model.doubts + apart(self.system, self.stages.values())
+        own = self.system.model.doubts + untouched(self.system, self.stages.values())
         return replace(found, warnings=own + found.warnings)
 
 

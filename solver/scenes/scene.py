@@ -181,7 +181,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     # only who computes needs the solver, which takes half a second to import
     from solver.contact.system import System
     from solver.loading.walker import Walker
-    from solver.results.audit.pairs import apart
+    from solver.results.audit.pairs import untouched
     from solver.results.audit.report import audit
     from solver.results.samples import Samples
     from solver.results.touch import touch_of
@@ -208,7 +208,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             return audit(system, loaded, unloaded, tally.dissipation, tally.lost)
 
         # of a run that stopped nobody knows which pairs would have touched
-        never = () if outcome.error else apart(system, outcome.points.values())
+        never = () if outcome.error else untouched(system, outcome.points.values())
         yield Look(
             parameters=run,
             samples=samples,

@@ -145,10 +145,7 @@ class SteadyIncrement:
         """Return the contact one element before, with the rates at which it comes about."""
         (interface,), touching = self.system.interfaces, self.found.loading
         now, before = interface.pairing(u), interface.pairing(earlier := self.unknowns(2))
-        slip = sum(
-            rows @ (part.motion(chain, u[k]) - part.motion(chain, earlier[k])).T.ravel()
-            for rows, (k, part, chain) in zip(now.tangent, interface.sides, strict=True)
-        )
+        slip = interface.slip(now, u, earlier)
         faces = np.isfinite(now.gap) & np.isfinite(before.gap)
         closing = np.subtract(now.gap, before.gap, out=np.full_like(slip, np.nan), where=faces)
         status = np.append(OPEN, touching.status[:-1])

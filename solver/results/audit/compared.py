@@ -23,6 +23,8 @@ surface that faces its partner."""
 STEADY = 1e-3
 """The same of stress under a load that passes: its strains are those of equilibrium, up to
 `audit_steadiness`."""
+LEAST_STRAIN = 1e-6
+"""Strain, and times Young's modulus stress, that is next to nothing."""
 _COUNT = 24
 """Values of a field that are computed anew, besides the largest."""
 _GOLDEN = (5**0.5 - 1) / 2

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.model.rigid import Moved, RigidBody
-from solver.results.audit.compared import AREA, LIMIT, MEASURED, Compared, some
+from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, Compared, some
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
 from solver.results.audit.values import Places, flowed
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_LEAST_STRAIN = 1e-6
 _LEAST_LENGTH = 1e-9
 """Displacement, gap or slip / size of the bodies, that is next to nothing."""
 _PARTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
@@ -53,10 +52,10 @@ class LookedAt:
         sizes = [np.ptp(look.system.full(name).X, axis=1).max() for name in look.system.names]
         length = _LEAST_LENGTH * float(max(sizes))
         self._least = {"stress": stress_scale, "mises": stress_scale,
-                       "plastic_strain": _LEAST_STRAIN, "displacement": length,
-                       "pressure": _LEAST_STRAIN * stress_scale,
-                       "shear": _LEAST_STRAIN * stress_scale,
-                       "pressure_deformed": _LEAST_STRAIN * stress_scale,
+                       "plastic_strain": LEAST_STRAIN, "displacement": length,
+                       "pressure": LEAST_STRAIN * stress_scale,
+                       "shear": LEAST_STRAIN * stress_scale,
+                       "pressure_deformed": LEAST_STRAIN * stress_scale,
                        "gap": length, "slip": length}  # fmt: skip
 
     def compare(self) -> None:

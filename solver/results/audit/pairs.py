@@ -61,7 +61,7 @@ _STRAY = Stray(way=np.inf, sides=1.0, length=0.01, off=5e-3, x=np.nan, y=np.nan)
 """What it may leave out; of the length of the contact where a surface is curved."""
 
 
-def apart(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
+def untouched(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
     """Return a warning for each pair that touches in none of the states."""
     every = [converged.state for converged in states]
     return tuple(

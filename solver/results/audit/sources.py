@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from solver.results.audit.recomputed import Fields
     from solver.results.look import Look
     from solver.results.steady import HalfPlane
+    from solver.results.view import View
     from solver.steady import Pass
 
     Array = NDArray[np.float64]
@@ -31,11 +32,18 @@ def between(x: Array, at: Array, values: Array) -> Array:
     return np.asarray(np.interp(x, at, values, left=np.nan, right=np.nan))
 
 
+def along(view: View, X: Array) -> Array:
+    """Return how far along the axis of a view places (2, n) are (n,) [mm]."""
+    (x0, y0), (ax, ay) = view.axis
+    return np.asarray((X[0] - x0) * ax + (X[1] - y0) * ay)
+
+
 class OfStates:
     """A run of a system of bodies."""
 
     def __init__(self, look: Look) -> None:
-        self._look, self.system = look, _any(look.system)
+        self._look = look
+        self.system: Any = look.system  # of a run by increments it is a `System`
         self.plain = cache(lambda name: PlainBody(look.system.full(name)))
         self.fields = cache(self._fields)
         self.tractions = cache(self._tractions)
@@ -90,10 +98,6 @@ class OfStates:
         each = (a.centre[0] + load_factor(a.position, self._time(stage)) for a in axles)
         return float(next(each, 0.0))
 
-    def _along(self, X: Array) -> Array:
-        (x0, y0), (ax, ay) = self._look.view.axis
-        return np.asarray((X[0] - x0) * ax + (X[1] - y0) * ay)
-
     def acting(self, stage: str, x: Array) -> Acting:
         """See `Recomputed`."""
         nowhere = np.full_like(x, np.nan)
@@ -104,7 +108,7 @@ class OfStates:
             side = body.periodic and body.box[0]
             return Acting(*hertz(self._travelling, self._time(stage), x, side or 0.0), nowhere)
         found = self.tractions(0, stage)
-        at = self._along(found.X)
+        at = along(self._look.view, found.X)
         order = np.argsort(at)
         if not found.closed.any():
             nothing = between(x, at[order], np.zeros_like(at))
@@ -127,7 +131,7 @@ class OfStates:
             share = load_factor(moving.amplitude, self._time(stage))
             return moving.half_width, share * moving.peak
         found = self.tractions(0, stage)
-        x = self._along(found.X[:, found.closed])
+        x = along(self._look.view, found.X[:, found.closed])
         if not len(x):
             return np.nan, 0.0
         pressure = found.pressure(moved=False)
@@ -213,8 +217,3 @@ class OfPass:
             return np.nan, 0.0
         at, pressure, _ = self._vertices
         return float(np.ptp(at[pressure > 0]) / 2), float(pressure.max())
-
-
-def _any(system: Any) -> Any:
-    """Return what a look knows as bodies: of a run by increments it is a `System`."""
-    return system

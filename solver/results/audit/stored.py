@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.results.audit.compared import LIMIT, MEASURED, STEADY, Compared, some
+from solver.results.audit.compared import LEAST_STRAIN, LIMIT, MEASURED, STEADY, Compared, some
 from solver.results.audit.figures import AUDIT
 from solver.results.audit.looked import LookedAt
-from solver.results.audit.sources import OfStates, between
+from solver.results.audit.sources import OfStates, along, between
 from solver.results.audit.values import Places, equivalent, flowed
 
 if TYPE_CHECKING:
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 _FIGURE = AUDIT["audit_stored"].name
 _NEAR = 0.1
 """Gap / largest way or gap, below which gaps measured by other projections are compared."""
-_LEAST_STRAIN = 1e-6
-"""Strain, and times Young's modulus stress, that is next to nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +131,10 @@ class _Viewed:
         each = [self._source.fields(name, self._view.loaded) for name in names]
         most = max(float(np.nanmax(np.abs(fields.stress))) for fields in each)
         E = max(f.plain.body.material.elasticity.youngs_modulus for f in each)
-        return max(most, _LEAST_STRAIN * E)
+        return max(most, LEAST_STRAIN * E)
 
     def _strain_scale(self, values: Array) -> float:
-        return max(float(np.nanmax(values, initial=0.0)), _LEAST_STRAIN)
+        return max(float(np.nanmax(values, initial=0.0)), LEAST_STRAIN)
 
     # -- fields at places ----------------------------------------------------------------------
 
@@ -241,18 +239,13 @@ class _Viewed:
             assert mises is not None
             fields, name = self._source.fields(view.profile_body, stage), view.profile_body
             nodes = fields.plain.part.boundary_nodes(view.surfaces[name])
-            along = self._along(fields.plain.part.X[:, nodes])
-            order = np.argsort(along)
+            reached = along(self._view, fields.plain.part.X[:, nodes])
+            order = np.argsort(reached)
             most = float(np.max(fields.at_points[1]))
             values = np.clip(fields.mises[nodes][order], 0.0, most)
             centre = self._source.centre(stage)
-            own = between(s + centre, along[order], values)
+            own = between(s + centre, reached[order], values)
             self._out.add("surface_mises", mises[k], own, self.stress_scale)
-
-    def _along(self, X: Array) -> Array:
-        """Return how far along the axis of the view places are (n,) [mm]."""
-        (x0, y0), (ax, ay) = self._view.axis
-        return np.asarray((X[0] - x0) * ax + (X[1] - y0) * ay)
 
     # -- contact and extremes ----------------------------------------------------------------
 
@@ -266,7 +259,7 @@ class _Viewed:
             x = self._axis("s") + self._source.centre(stage)
             own = self._source.acting(stage, x)
             width, peak = self._source.extent(stage)
-            scale = max(peak, _LEAST_STRAIN * self.stress_scale)
+            scale = max(peak, LEAST_STRAIN * self.stress_scale)
             self._out.add("contact_pressure", pressure[k], own.pressure, scale)
             self._out.add("contact_shear", shear[k], own.shear, scale)
             share = LIMIT / MEASURED if own.measured else 1.0
@@ -307,7 +300,7 @@ class _Viewed:
             fields = self._source.fields(name, self._view.unloaded)
             X = fields.plain.part.X
             surface = fields.plain.part.boundary_nodes(boundary)
-            s = self._along(X[:, surface])
+            s = along(self._view, X[:, surface])
             for kind, of in (("max", np.max), ("min", np.min)):
                 for prefix, stress, places, axes in (
                     ("residual", fields.stress, X, ("x", "y")),

@@ -144,7 +144,7 @@ class Surfaces:
             if not any(_bent(chain, vertices) for _, chain, vertices in sides):
                 continue
             longest = max(  # rigid surfaces are what they are
-                float(_edge_lengths(chain)[vertices].max())
+                float(chain.spacing[vertices].max())
                 for (name, _), chain, vertices in sides
                 if name in self._system.names
             )
@@ -220,7 +220,7 @@ class Surfaces:
             true_gap=mean(true_gap, true.faces) + offset,
             slip=mean((moved * t).sum(axis=0), partner.faces),
             way=mean((since * t).sum(axis=0), partner.faces),
-            edge=_edge_lengths(slave),
+            edge=slave.spacing,
             point_gap=np.where(true.faces > 0, true_gap + offset, np.inf),
             point_length=length,
             on_slave=_spread(force, nodes, N, len(slave.nodes)),
@@ -263,11 +263,6 @@ def _spread(force: Array, nodes: NDArray[np.int64], shape: Array, count: int) ->
     return np.stack(
         [np.bincount(nodes.ravel(), (f[:, None] * shape).ravel(), count) for f in force], axis=1
     )
-
-
-def _edge_lengths(surface: Surface) -> Array:
-    length = np.linalg.norm(np.diff(surface.X[:, surface.vertices]), axis=0)
-    return np.asarray((np.append(length, length[-1]) + np.append(length[0], length)) / 2)
 
 
 def _bent(surface: Surface, vertices: NDArray[np.int64]) -> bool:
