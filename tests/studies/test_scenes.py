@@ -120,7 +120,8 @@ def test_the_table_of_the_punch_fits_the_terminal(both: xr.Dataset) -> None:
     wide = xr.concat(
         [sweep.assign_coords(hardening=[h]) for h in ("isotropic", "kinematic")], "hardening"
     )
-    wide["status"][0, 0, 0] = 2
+    wide["status"] = wide["status"].astype(object)
+    wide["status"][0, 0, 0] = "not_converged"
     whole = runs_table(wide.transpose("load_ratio", "friction", "hardening", ...))
     table, footnote = whole.split("\n\n", 1)  # a second block would be between them
     assert footnote.startswith("* ")
