@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 _CORNER = float(np.cos(np.radians(30.0)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Surface:
     """A chain of edges with the body on its left: the outward normal is ``(t_y, -t_x)``.
 
@@ -53,17 +54,17 @@ class Surface:
         """Length of the shortest edge between its ends [mm]."""
         return shortest(self.X, self.edges)
 
-    @property
+    @cached_property
     def lengths(self) -> NDArray[np.float64]:
         """Lengths (n_edges,) of the edges between their ends [mm]."""
         return np.asarray(np.linalg.norm(np.diff(self.X[:, self.vertices]), axis=0))
 
-    @property
+    @cached_property
     def tributary(self) -> NDArray[np.float64]:
         """Tributary length (n_edges + 1,) of each vertex: half of the edges at it [mm]."""
         return at_vertices(self.lengths / 2)
 
-    @property
+    @cached_property
     def spacing(self) -> NDArray[np.float64]:
         """Mean length (n_edges + 1,) of the one or two edges at each vertex [mm]."""
         return at_vertices(self.lengths) / at_vertices(np.ones(len(self.edges)))

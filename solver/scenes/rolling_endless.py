@@ -13,8 +13,7 @@ import numpy as np
 from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
-from solver.results.audit.sources import OfPass
-from solver.results.audit.steady import audit_pass
+from solver.results.audit.steady import OfPass, audit_pass
 from solver.results.look import Look
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState

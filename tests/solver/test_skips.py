@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
+from tests.architecture.sources import ROOT
 from tests.benchmarks.skips import SKIPS, STEADY, Skip, apart
 
 
@@ -21,3 +25,18 @@ def test_a_steady_pass_strains_as_one_by_increments() -> None:
     short, whole = STEADY.short(), STEADY.whole()
     assert short > 1e-4
     assert apart(short, whole) <= STEADY.apart
+
+
+def test_a_run_by_increments_does_not_wait_for_the_compiler_of_steady_passes() -> None:
+    """Importing it takes as long as a small run."""
+    program = (
+        "import sys\n"
+        "from solver.scenes import SCENES\n"
+        "punch = SCENES['punch']\n"
+        "(run,) = punch.path(punch.parameters(accuracy='draft'), [0.3], lambda share: None)\n"
+        "print(run.status.name, 'numba' in sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "OK False\n"

@@ -1,4 +1,4 @@
-"""What a record is compared with: fields and contact of a run, from its states alone."""
+"""What a record is compared with: fields and contact of a run by increments, from its states."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from solver.model.loads import Displacement
 from solver.results.audit.plain import PlainBody, load_factor
 from solver.results.audit.recomputed import Acting
 from solver.results.audit.tractions import Tractions
-from solver.results.audit.values import PassFields, StateFields
-from solver.steady import Touching
+from solver.results.audit.values import StateFields
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,9 +19,7 @@ if TYPE_CHECKING:
     from solver.model.motion import TravellingPressure
     from solver.results.audit.recomputed import Fields
     from solver.results.look import Look
-    from solver.results.steady import HalfPlane
     from solver.results.view import View
-    from solver.steady import Pass
 
     Array = NDArray[np.float64]
 
@@ -149,71 +146,3 @@ def hertz(moving: TravellingPressure, time: float, x: Array, period: float) -> t
     inside = np.clip(1 - (away / moving.half_width) ** 2, 0.0, None)
     pressure = load_factor(moving.amplitude, time) * moving.peak * np.sqrt(inside)
     return pressure, load_factor(moving.shear_ratio, time) * pressure
-
-
-class OfPass:
-    """A steady pass.
-
-    Parameters
-    ----------
-    moving : the pressure as it really goes, where no wheel makes it
-    released : name of the state that the pass leaves
-    """
-
-    def __init__(
-        self,
-        half_plane: HalfPlane,
-        found: Pass,
-        moving: TravellingPressure | None,
-        released: str,
-    ) -> None:
-        self._half_plane, self._found = half_plane, found
-        self._moving, self._released = moving, released
-        self.fields = cache(self._fields)
-        self.plain = cache(lambda name: PlainBody(half_plane.full(name)))
-
-    def _fields(self, name: str, stage: str) -> Fields:
-        del name
-        return PassFields(self._half_plane, self._found, loaded=stage != self._released)
-
-    def exact(self, stage: str) -> bool:
-        """See `Recomputed`: under the load there are two strains, see `audit_steadiness`."""
-        return stage == self._released
-
-    def centre(self, stage: str) -> float:
-        """See `Recomputed`."""
-        del stage
-        return 0.0
-
-    @property
-    def _vertices(self) -> tuple[Array, Array, Array]:
-        """Places along x, and pressure and shear there, as one sees them who stands beside."""
-        touching, chain = self._found.loading, self._half_plane.track.surface
-        assert isinstance(touching, Touching)
-        x, way = chain.X[0, chain.vertices], self._found.direction
-        side = np.abs(np.diff(x)) / 2
-        area = np.append(side, 0.0) + np.append(0.0, side)
-        order = np.argsort(way * x)
-        pressure, shear = touching.normal / area, -way * touching.tangential / area
-        return (way * x)[order], pressure[order], shear[order]
-
-    def acting(self, stage: str, x: Array) -> Acting:
-        """See `Recomputed`."""
-        nowhere = np.full_like(x, np.nan)
-        if self._moving is not None:
-            time = float(stage == self._released)
-            return Acting(*hertz(self._moving, time, x, 0.0), nowhere)
-        if stage == self._released:
-            return Acting(np.zeros_like(x), np.zeros_like(x), nowhere)
-        at, pressure, shear = self._vertices
-        return Acting(between(x, at, pressure), between(x, at, shear), nowhere)
-
-    def extent(self, stage: str) -> tuple[float, float]:
-        """See `Recomputed`."""
-        if self._moving is not None:
-            share = load_factor(self._moving.amplitude, float(stage == self._released))
-            return self._moving.half_width, share * self._moving.peak
-        if stage == self._released:
-            return np.nan, 0.0
-        at, pressure, _ = self._vertices
-        return float(np.ptp(at[pressure > 0]) / 2), float(pressure.max())

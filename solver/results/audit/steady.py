@@ -1,14 +1,16 @@
-"""The audit of a steady pass, in the frame of the load."""
+"""The audit of a steady pass, in the frame of the load, and what its record is compared with."""
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.materials.radial_return import SQRT23
 from solver.materials.state import PlasticState, Response
-from solver.results.audit.plain import PlainBody
+from solver.results.audit.plain import PlainBody, load_factor
+from solver.results.audit.recomputed import Acting
 from solver.results.audit.report import (
     TRAVELLING,
     Audit,
@@ -17,7 +19,9 @@ from solver.results.audit.report import (
     limits_at,
     warnings,
 )
+from solver.results.audit.sources import between, hertz
 from solver.results.audit.theory import Strained, largest_strain
+from solver.results.audit.values import PassFields
 from solver.steady import Touching
 from solver.steady.fields import of_layers, under_load
 from solver.steady.flow import INFLOW, LEAST
@@ -27,6 +31,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.materials.material import Material
+    from solver.model.motion import TravellingPressure
+    from solver.results.audit.recomputed import Fields
+    from solver.results.steady import HalfPlane
     from solver.steady import Pass, Track
 
     Array = NDArray[np.float64]
@@ -179,3 +186,71 @@ def _of_contact(material: Material, found: Pass) -> dict[str, float]:
         "audit_surface_shear": _largest(np.abs(touching.shear)) / strength,
         "audit_friction_over_strength": touching.friction * _largest(touching.pressure) / strength,
     }
+
+
+class OfPass:
+    """A steady pass.
+
+    Parameters
+    ----------
+    moving : the pressure as it really goes, where no wheel makes it
+    released : name of the state that the pass leaves
+    """
+
+    def __init__(
+        self,
+        half_plane: HalfPlane,
+        found: Pass,
+        moving: TravellingPressure | None,
+        released: str,
+    ) -> None:
+        self._half_plane, self._found = half_plane, found
+        self._moving, self._released = moving, released
+        self.fields = cache(self._fields)
+        self.plain = cache(lambda name: PlainBody(half_plane.full(name)))
+
+    def _fields(self, name: str, stage: str) -> Fields:
+        del name
+        return PassFields(self._half_plane, self._found, loaded=stage != self._released)
+
+    def exact(self, stage: str) -> bool:
+        """See `Recomputed`: under the load there are two strains, see `audit_steadiness`."""
+        return stage == self._released
+
+    def centre(self, stage: str) -> float:
+        """See `Recomputed`."""
+        del stage
+        return 0.0
+
+    @property
+    def _vertices(self) -> tuple[Array, Array, Array]:
+        """Places along x, and pressure and shear there, as one sees them who stands beside."""
+        touching, chain = self._found.loading, self._half_plane.track.surface
+        assert isinstance(touching, Touching)
+        x, way = chain.X[0, chain.vertices], self._found.direction
+        side = np.abs(np.diff(x)) / 2
+        area = np.append(side, 0.0) + np.append(0.0, side)
+        order = np.argsort(way * x)
+        pressure, shear = touching.normal / area, -way * touching.tangential / area
+        return (way * x)[order], pressure[order], shear[order]
+
+    def acting(self, stage: str, x: Array) -> Acting:
+        """See `Recomputed`."""
+        nowhere = np.full_like(x, np.nan)
+        if self._moving is not None:
+            time = float(stage == self._released)
+            return Acting(*hertz(self._moving, time, x, 0.0), nowhere)
+        if stage == self._released:
+            return Acting(np.zeros_like(x), np.zeros_like(x), nowhere)
+        at, pressure, shear = self._vertices
+        return Acting(between(x, at, pressure), between(x, at, shear), nowhere)
+
+    def extent(self, stage: str) -> tuple[float, float]:
+        """See `Recomputed`."""
+        if self._moving is not None:
+            share = load_factor(self._moving.amplitude, float(stage == self._released))
+            return self._moving.half_width, share * self._moving.peak
+        if stage == self._released:
+            return np.nan, 0.0
+        at, pressure, _ = self._vertices
+        return float(np.ptp(at[pressure > 0]) / 2), float(pressure.max())
