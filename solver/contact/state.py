@@ -77,6 +77,8 @@ class Energy:
     friction : work of friction on slip, positive
     contact : work against contact where points open or close within an increment: an error of
         integration; and work on contact forces that are taken away with the bodies apart
+    supplied : external work of all increments in which it is positive: it grows with every cycle,
+        as errors of integration do
     scale : the largest of these terms so far, or what is rounding of what acts (`System.least`)
     """
 
@@ -85,6 +87,7 @@ class Energy:
     plastic: float = 0.0
     friction: float = 0.0
     contact: float = 0.0
+    supplied: float = 0.0
     scale: float = 0.0
 
 

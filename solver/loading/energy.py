@@ -39,6 +39,7 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
         "plastic": so_far.plastic + _plastic_work(parts, before, now),
         "friction": so_far.friction + now.contact_work[0],
         "contact": so_far.contact + now.contact_work[1] + _released(before, now),
+        "supplied": so_far.supplied + max(work, 0.0),
     }
     scale = max(so_far.scale, system.least(now.state.time)[1], *map(abs, terms.values()))
     return Energy(stored=so_far.stored, scale=scale, **terms)
