@@ -1,7 +1,8 @@
 """What the pages show works, as a reader would try it.
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies and scene files of `data`; so do those of every page that has any. ``python`` blocks are
+studies and scene files of `data`, the studies on the coarsest meshes; so do those of every page
+that has any. ``python`` blocks are
 programs, each in a file of its own, as workers import it; in ``console`` blocks each line
 ``$ residua …`` runs and must succeed. A block after ``<!-- no-test -->`` is left out, which only
 those may be that need a server or compute for minutes. A block after
@@ -13,11 +14,12 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -35,7 +37,15 @@ BLOCK = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
-COMMAND = "import sys; from studies.command.cli import main; sys.exit(main())"
+COMMANDS = """\
+import shlex, sys
+from studies.command.cli import main
+for line in sys.argv[1:]:
+    print("$ residua", line, flush=True)
+    if code := main(shlex.split(line)):
+        sys.exit(code)
+"""
+"""Commands one after the other in one process: each by itself would import for seconds."""
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -54,16 +64,33 @@ class Block:
     skipped: bool
     script: str = ""
 
-    def programs(self, folder: Path) -> list[list[str]]:
-        """Arguments for the interpreter, one list a program; Python is a file in a folder."""
-        if self.script:
-            return []
-        if self.language == "python":
+    @property
+    def runs(self) -> bool:
+        """Whether it is run here."""
+        return not self.skipped and not self.script
+
+    @property
+    def commands(self) -> list[str]:
+        """The lines of its commands, each without its name."""
+        return re.findall(r"^\$ residua (.*)$", self.text, re.MULTILINE)
+
+
+def programs(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line and the arguments for the interpreter of what a page runs, in order.
+
+    Python is written to a file in a folder, before it is yielded.
+    """
+    together = groupby((block for block in page if block.runs), lambda block: block.language)
+    for language, group in together:
+        some = list(group)
+        if language == "console":
+            if commands := [command for block in some for command in block.commands]:
+                yield some[0].line, ["-c", COMMANDS, *commands]
+            continue
+        for block in some:
             # Empty lines in front: a traceback then names the line of the page.
-            (folder / SNIPPET).write_text("\n" * self.line + self.text)
-            return [[SNIPPET]]
-        commands = re.findall(r"^\$ residua (.*)$", self.text, re.MULTILINE)
-        return [["-c", COMMAND, *shlex.split(command)] for command in commands]
+            (folder / SNIPPET).write_text("\n" * block.line + block.text)
+            yield block.line, [SNIPPET]
 
 
 def blocks(text: str) -> list[Block]:
@@ -88,24 +115,36 @@ def test_the_first_page_is_run_and_fits_two_screens() -> None:
     assert len((ROOT / "README.md").read_text().splitlines()) <= TWO_SCREENS
 
 
+def coarse(study: str) -> str:
+    """Return a study file with the coarsest accuracy, where it does not choose one."""
+    if "accuracy" in study:
+        return study
+    head, table, rest = study.partition("[parameters]\n")
+    if not table:
+        head, table, rest = study.partition("[sweep]\n")
+        rest = f"{table}{rest}"
+    return f'{head}[parameters]\naccuracy = "draft"\n{rest}'
+
+
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
+    for study in (tmp_path / "data" / "studies").iterdir():
+        study.write_text(coarse(study.read_text()))
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    for block in blocks((ROOT / page).read_text()):
-        for program in [] if block.skipped else block.programs(tmp_path):
-            done = subprocess.run(
-                [sys.executable, *program],
-                cwd=tmp_path,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                timeout=300,
-                check=False,
-            )
-            assert done.returncode == 0, f"{page}:{block.line}\n{done.stdout}\n{done.stderr}"
+    for line, program in programs(blocks((ROOT / page).read_text()), tmp_path):
+        done = subprocess.run(
+            [sys.executable, *program],
+            cwd=tmp_path,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+        assert done.returncode == 0, f"{page}:{line}\n{done.stdout}\n{done.stderr}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
@@ -131,7 +170,7 @@ def test_a_line_that_is_not_in_the_script_is_found(tmp_path: Path) -> None:
     head = "<!-- from examples/a.py -->\n```python\n"
     page = f"{head}y = 2\nz = 3\n```\n{head}y = 2\nz = 4\n```\n{head}= 2\n```\n"
     assert [missing(block, tmp_path) for block in blocks(page)] == [False, True, True]
-    assert not any(block.programs(tmp_path) for block in blocks(page))
+    assert not list(programs(blocks(page), tmp_path))
 
 
 def test_every_kind_of_block_is_found(tmp_path: Path) -> None:
@@ -139,13 +178,27 @@ def test_every_kind_of_block_is_found(tmp_path: Path) -> None:
         "A\n\n```python\nx = 1\n```\n\n"
         "<!-- no-test -->\n```console\n$ residua serve\n```\n"
         "```console\n$ residua scenes punch\nthe answer\n```\n"
+        "```console\n$ make run\n$ residua scenes 'a b'\n```\n```python\ny = 2\n```\n"
     )
-    program, server, command = blocks(page)
+    program, server, command, _, last = found = blocks(page)
     assert (program.language, program.text, program.line) == ("python", "x = 1\n", 3)
-    assert program.programs(tmp_path) == [[SNIPPET]]
-    assert (tmp_path / SNIPPET).read_text() == "\n\n\nx = 1\n"
     assert (server.skipped, command.skipped) == (True, False)
-    assert command.programs(tmp_path) == [["-c", COMMAND, "scenes", "punch"]]
+    made = programs(found, tmp_path)
+    assert next(made) == (3, [SNIPPET])
+    assert (tmp_path / SNIPPET).read_text() == "\n\n\nx = 1\n"
+    assert next(made) == (command.line, ["-c", COMMANDS, "scenes punch", "scenes 'a b'"])
+    assert list(made) == [(last.line, [SNIPPET])]
+
+
+def test_the_first_command_that_fails_ends_a_page(tmp_path: Path) -> None:
+    (program,) = programs(
+        blocks("```console\n$ residua scenes\n$ residua scenes no\n```\n"), tmp_path
+    )
+    done = subprocess.run(
+        [sys.executable, *program[1]], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "$ residua scenes no\n" in done.stdout
 
 
 def test_the_page_of_the_audit_names_every_figure_and_no_other():
