@@ -95,7 +95,7 @@ def punch_study(frictions: int) -> dict[str, Any]:
     return {
         "name": "interrupted",
         "scene": "punch",
-        "parameters": COARSE_PUNCH | {"load_step": 0.02},
+        "parameters": COARSE_PUNCH | {"load_step": 0.04},
         "sweep": {
             "load_ratio": [0.4, 0.7],
             "friction": [round(0.1 + i / 50, 2) for i in range(frictions)],

@@ -181,7 +181,7 @@ def test_passes_beside_published_numbers_have_colours_of_their_own(
     assert not any(axes.get_tightbbox().overlaps(box) for axes in sheet.axes)
 
 
-@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("count", [1, 2, 5, 13])
 def test_every_case_has_a_row_beside_published_numbers(count: int, tmp_path: Path) -> None:
     cases = {f"case {number}": 1 for number in range(count)}
     computed = read_profiles([written(data_set(cases), tmp_path / "a.nc")], {})

@@ -67,7 +67,8 @@ def test_all_mistakes_are_told_at_once() -> None:
 
 @pytest.mark.parametrize("kind", APART)
 def test_two_mistakes_bring_no_third(kind: str) -> None:
-    for other in MISTAKES:
+    """Of all pairs a third: each mistake is met with five others."""
+    for other in list(MISTAKES)[APART.index(kind) % 3 :: 3]:
         try:
             both = told(kind, other)
         except (KeyError, TypeError, AttributeError):  # the one took away what the other changes
