@@ -17,8 +17,10 @@ LAYERS = {
         "version", "deprecation", "errors", "tensors", "linear", "mesh", "materials", "model",
         "fem", "contact", "loading", "steady", "results", "scenes",
     ),
-    "studies": (
-        "errors", "toml", "scenes", "definition", "storage", "execution", "views", "command",
+    "studies": ("errors", "toml", "scenes", "definition", "storage", "execution", "views"),
+    "residua": (
+        "neighbours", "status", "client", "cost", "progress", "keys", "commands", "arguments",
+        "cli", "__main__",
     ),
 }  # fmt: skip
 
