@@ -17,6 +17,7 @@ COPY pyproject.toml setup.py constraints.txt README.md LICENSE ./
 COPY solver solver
 COPY studies studies
 COPY service service
+COPY residua residua
 COPY data data
 RUN if [ "$(uname -m)" = x86_64 ]; then extra='[mkl]'; else extra=''; fi \
     && pip install --constraint constraints.txt ".$extra"

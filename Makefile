@@ -37,7 +37,7 @@ stress-service: setup ## put the service under stress, and see what it stands (1
 
 clean: ## remove the environment and caches; results in out/ stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
-	find solver studies service tests -name __pycache__ -prune -exec rm -rf {} +
+	find solver studies service residua tests -name __pycache__ -prune -exec rm -rf {} +
 
 $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \

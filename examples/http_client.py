@@ -67,7 +67,7 @@ def use(client: httpx.Client, target: Path) -> None:
 
 with tempfile.TemporaryDirectory() as home:
     port = free_port()
-    serve = [sys.executable, "-m", "studies.command.cli", "serve", "--port", str(port)]
+    serve = [sys.executable, "-m", "residua", "serve", "--port", str(port)]
     service = subprocess.Popen([*serve, "--data", str(Path(home, "data"))])
     try:
         with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30.0) as client:

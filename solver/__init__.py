@@ -13,6 +13,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from solver.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     from solver.results.record import Record, Status
     from solver.results.solution import Solution, solve
     from solver.scenes import SCENES, Scene
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "Amplitude": "model.amplitude",

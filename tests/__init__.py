@@ -1,1 +1,1 @@
-"""The claims of solver, studies and service, each as a test."""
+"""The claims of solver, studies, service and the command, each as a test."""

@@ -39,7 +39,7 @@ BLOCK = re.compile(
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
 COMMANDS = """\
 import shlex, sys
-from studies.command.cli import main
+from residua.cli import main
 for line in sys.argv[1:]:
     print("$ residua", line, flush=True)
     if code := main(shlex.split(line)):
@@ -49,7 +49,7 @@ for line in sys.argv[1:]:
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
-NAMED = re.compile(r"`((?:solver|studies|service|tests|data|docs|examples)/[a-z0-9_./-]*)`")
+NAMED = re.compile(r"`((?:solver|studies|service|residua|tests|data|docs|examples)/[a-z0-9_./-]*)`")
 TWO_SCREENS = 110
 """Lines of Markdown that the first page may have."""
 

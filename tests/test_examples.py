@@ -45,7 +45,7 @@ def test_the_cells_of_a_notebook_run_after_make_run(notebook: Path, tmp_path: Pa
     study = study.replace("[0.0, 0.1, 0.2, 0.3, 0.4]", "[0.0, 0.2]")
     study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
     (tmp_path / "punch.toml").write_text(study)
-    run(["-m", "studies.command.cli", "run", "punch.toml", "--out", "out"], tmp_path)
+    run(["-m", "residua", "run", "punch.toml", "--out", "out"], tmp_path)
     cells = json.loads(notebook.read_text())["cells"]
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     assert not any(cell.get("outputs") for cell in cells), "a notebook is kept without its outputs"

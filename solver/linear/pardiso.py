@@ -169,7 +169,7 @@ def _pardiso(
 ) -> None:
     mkl = library()
     if mkl is None:
-        raise RuntimeError("MKL is not installed: pip install 'residua[mkl]'")
+        raise RuntimeError("MKL is not installed: pip install mkl")
     error = ctypes.c_int32(0)
 
     def integer(value: int) -> Any:

@@ -178,7 +178,7 @@ def chosen(name: str = "auto") -> str:
         raise ModelError("linear_solver", name, "must be one of " + ", ".join(SOLVERS))
     available = pardiso.library() is not None
     if name == "pardiso" and not available:
-        raise ModelError("linear_solver", name, "needs MKL: pip install 'residua[mkl]'")
+        raise ModelError("linear_solver", name, "needs MKL: pip install mkl")
     return "pardiso" if available and name != "superlu" else "superlu"
 
 

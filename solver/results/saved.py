@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import pickle
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.errors import ModelError
+from solver.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-_PACKAGE = "residua"
 _HEAD = b"residua solution "
 """What the file begins with; the version of the solver follows, and the end of the line."""
 
@@ -32,7 +31,7 @@ def write(path: Path, content: Mapping[str, Any]) -> None:
         raise ModelError("model", "", allowed) from None
     part = path.with_name(f"{path.name}.part")  # a file that is there stays until this is whole
     try:
-        part.write_bytes(_HEAD + version(_PACKAGE).encode() + b"\n" + stored)
+        part.write_bytes(_HEAD + __version__.encode() + b"\n" + stored)
         part.replace(path)
     except OSError as error:
         allowed = f"cannot be written: {error.strerror}"
@@ -54,7 +53,7 @@ def read(path: Path) -> dict[str, Any]:
         raise ModelError("path", str(path), f"cannot be read: {error.strerror}") from None
     if not head.startswith(_HEAD):
         raise ModelError("path", str(path), "must be a file that Solution.save has written")
-    written, here = head.removeprefix(_HEAD).decode(errors="replace"), version(_PACKAGE)
+    written, here = head.removeprefix(_HEAD).decode(errors="replace"), __version__
     if written != here:
         allowed = f"is of version {written} of the solver, and this is {here}"
         raise ModelError("path", str(path), allowed)

@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("solver", "studies", "service")
+PACKAGES = ("solver", "studies", "service", "residua")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 

@@ -1,4 +1,4 @@
-"""Imports run one way: service -> studies -> solver."""
+"""Imports run one way: residua -> service -> studies -> solver."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from tests.architecture.sources import PACKAGES, ROOT, imported, modules
 DATA = {"dask", "distributed", "xarray", "h5netcdf", "h5py", "netCDF4", "zarr", "pandas"}
 WEB = {"fastapi", "starlette", "uvicorn", "httpx", "pydantic", "pydantic_settings"}
 FORBIDDEN = {
-    "solver": {"studies", "service", "tests", "matplotlib"} | DATA | WEB,
-    "studies": {"service", "tests", "fastapi", "starlette", "uvicorn"},
-    "service": {"tests", "dask", "distributed", "netCDF4"},
+    "solver": {"studies", "service", "residua", "tests", "matplotlib"} | DATA | WEB,
+    "studies": {"service", "residua", "tests", "fastapi", "starlette", "uvicorn"},
+    "service": {"residua", "tests", "dask", "distributed", "netCDF4"},
+    "residua": {"tests", "matplotlib", "fastapi", "starlette", "uvicorn"} | DATA,
 }
 
 

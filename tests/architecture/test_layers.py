@@ -14,11 +14,13 @@ from tests.architecture.sources import ROOT, modules
 LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
-        "deprecation", "errors", "tensors", "linear", "mesh", "materials", "model", "fem",
-        "contact", "loading", "steady", "results", "scenes",
+        "version", "deprecation", "errors", "tensors", "linear", "mesh", "materials", "model",
+        "fem", "contact", "loading", "steady", "results", "scenes",
     ),
-    "studies": (
-        "errors", "toml", "scenes", "definition", "storage", "execution", "views", "command",
+    "studies": ("errors", "toml", "scenes", "definition", "storage", "execution", "views"),
+    "residua": (
+        "neighbours", "status", "client", "cost", "progress", "keys", "commands", "arguments",
+        "cli", "__main__",
     ),
 }  # fmt: skip
 

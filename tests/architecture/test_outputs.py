@@ -46,7 +46,7 @@ def inside_functions(source: str) -> list[str]:
     return [name for function in functions for name in declared(ast.unparse(function))]
 
 
-@pytest.mark.parametrize("package", ["studies", "service"])
+@pytest.mark.parametrize("package", ["studies", "service", "residua"])
 def test_nobody_outside_the_solver_declares(package: str) -> None:
     assert not {str(m): names for m in modules(package) if (names := used((ROOT / m).read_text()))}
 

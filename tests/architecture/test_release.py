@@ -22,7 +22,9 @@ def test_changelog_knows_the_version() -> None:
 
 def test_the_distribution_takes_its_version_from_the_solver() -> None:
     assert "version" in PROJECT["project"]["dynamic"]
-    assert PROJECT["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "solver.__version__"}
+    assert PROJECT["tool"]["setuptools"]["dynamic"]["version"] == {
+        "attr": "solver.version.__version__"
+    }
 
 
 def test_the_command_exists() -> None:

@@ -113,7 +113,7 @@ def _own(content: Content) -> Own:
 def _wall(file: Path, out: Path, workers: int) -> float:
     """Return the seconds that the command takes; raise where it fails."""
     began = time.monotonic()
-    residua = [str(Path(sys.executable).with_name("residua"))]
+    residua = [sys.executable, "-m", "residua"]
     subprocess.run(residua + _arguments(file, out, workers), check=True, capture_output=True)
     return time.monotonic() - began
 
@@ -125,7 +125,7 @@ def _arguments(file: Path, out: Path, workers: int) -> list[str]:
 def many(folder: Path, paths: int) -> list[Figure]:
     """Return how long paths that cost nothing take, and memory by the way."""
     content = Content("fake", {}, {"friction": [k / paths for k in range(paths)]})
-    residua = [sys.executable, "-m", "tests.studies.command"]  # it knows the scene
+    residua = [sys.executable, "-m", "tests.residua.command"]  # it knows the scene
     command = residua + _arguments(content.written(folder), folder / "many", 2)
     began = time.monotonic()
     marks, done = [], 0

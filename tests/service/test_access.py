@@ -15,11 +15,11 @@ import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
+from residua.cli import main
 from service.app import create_app
 from service.keys import Keys, KeysError, Scope
 from service.settings import Settings, chosen
 from studies import StudyError
-from studies.command.cli import main
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, environment, fake_study, free_port
 from tests.service.test_errors import UNKNOWN, problem
@@ -202,7 +202,7 @@ def test_where_others_get_in_a_service_without_keys_is_refused(
 
 
 def test_a_refusal_is_one_line(tmp_path: Path) -> None:
-    serve = [sys.executable, "-m", "studies.command.cli", "serve", "--host", "0.0.0.0"]
+    serve = [sys.executable, "-m", "residua", "serve", "--host", "0.0.0.0"]
     ended = subprocess.run(
         [*serve, "--port", str(free_port()), "--data", str(tmp_path / "my data")],
         env=environment(tmp_path / "log"),

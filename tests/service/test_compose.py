@@ -30,7 +30,7 @@ PROGRAMS = {
     "residua": [
         sys.executable,
         "-c",
-        "import sys; from studies.command.cli import main; sys.exit(main())",
+        "import sys; from residua.cli import main; sys.exit(main())",
     ],
     "dask": [sys.executable, "-m", "dask"],
     "python": [sys.executable],

@@ -214,7 +214,7 @@ def test_a_mesh_that_takes_too_much_is_refused(service: Server) -> None:
 def test_the_command_submits_a_study_with_its_scene_file(service: Server, tmp_path: Path) -> None:
     (tmp_path / "blocks.toml").write_text(BLOCKS)
     (tmp_path / "study.toml").write_text('name = "b"\nscene = "blocks.toml"\n[sweep]\nmu = [0.1]\n')
-    command = [sys.executable, "-m", "studies.command.cli", "submit", str(tmp_path / "study.toml"),
+    command = [sys.executable, "-m", "residua", "submit", str(tmp_path / "study.toml"),
                "--url", str(service.client.base_url)]  # fmt: skip
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stderr

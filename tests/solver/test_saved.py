@@ -44,7 +44,7 @@ def test_other_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     path.write_bytes(path.read_bytes()[:-3])
     with pytest.raises(ModelError, match="is damaged"):
         Solution.load(path)
-    monkeypatch.setattr(saved, "version", lambda package: "9.9")
+    monkeypatch.setattr(saved, "__version__", "9.9")
     with pytest.raises(ModelError, match=r"is of version .* of the solver, and this is 9\.9"):
         Solution.load(path)
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from residua.cli import main
 from studies import Store, Study, StudyError, StudyEvent, open_study, run_study
-from studies.command.cli import main
 from studies.execution.estimate import estimate
 from studies.views.tables import runs_table
 from tests.studies.fakes import FAKE

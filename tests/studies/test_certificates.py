@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.command.cli import main
+from residua.cli import main
 
 
 def context(side: int, certificates: Path) -> ssl.SSLContext:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from residua.cli import main
+from residua.cost import long_run
 from studies import Store, Study, StudyError
-from studies.command.cli import main
-from studies.command.cost import long_run
 from studies.execution.estimate import Bounds, estimate
 from tests.studies.conftest import fake_study
 from tests.studies.test_study import many

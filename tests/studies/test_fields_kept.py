@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from residua.cli import main
 from solver import Body, ContactPair, Material, Model, Solution, solve
 from solver.mesh import grid
 from studies import Store, Study, StudyError, run_study
-from studies.command.cli import main
 from studies.scenes.scene import read_scene
 from studies.storage import ugrid
 from studies.views.reading import open_netcdf

@@ -31,7 +31,7 @@ LIMITED = """
 import resource, sys
 limit = int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-from studies.command.cli import main
+from residua.cli import main
 import tests.studies.fakes
 sys.exit(main(sys.argv[1:]))
 """

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from residua.cli import main
 from studies import Store, Study, run_study
-from studies.command.cli import main
 from studies.storage import made
 from tests.studies.conftest import compute_here
 from tests.studies.test_damage import true_numbers
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {
-    "dask", "distributed", "h5netcdf", "h5py", "matplotlib", "netCDF4", "numba", "pandas", "scipy",
-    "skfem", "xarray",
+    "dask", "distributed", "fastapi", "h5netcdf", "h5py", "matplotlib", "netCDF4", "numba",
+    "pandas", "scipy", "service", "skfem", "xarray",
 }  # fmt: skip
 RESULTS = ["dataset.nc", "report.txt", "residual_stress_xx.png"]
 REPORT = RESULTS[1:]
@@ -85,7 +85,7 @@ def test_a_complete_study_imports_nothing_that_computes_or_draws(
 ) -> None:
     """These imports take two seconds, and the answer less than one."""
     code = (
-        "import sys, tests.studies.fakes; from studies.command.cli import main;"
+        "import sys, tests.studies.fakes; from residua.cli import main;"
         "assert main(sys.argv[1:]) == 0; print(*sys.modules, file=sys.stderr)"
     )
     command = [sys.executable, "-c", code, *arguments(tmp_path)]
@@ -97,7 +97,7 @@ def test_a_complete_study_imports_nothing_that_computes_or_draws(
 @pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["scenes", "punch"]])
 def test_scenes_are_told_without_libraries_that_compute_or_draw(arguments: list[str]) -> None:
     code = (
-        "import atexit, sys; from studies.command.cli import main;"
+        "import atexit, sys; from residua.cli import main;"
         "atexit.register(lambda: print(*sys.modules, file=sys.stderr)); main(sys.argv[1:])"
     )
     command = [sys.executable, "-c", code, *arguments]

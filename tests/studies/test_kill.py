@@ -28,7 +28,7 @@ def start(study: Study, out: Path, directory: Path) -> subprocess.Popen[str]:
         f'name = "{study.name}"\nscene = "fake"\n[parameters]\n{fixed}\n'
         f"[sweep]\nfriction = {study.sweep['friction']}\n"
     )
-    command = ["-m", "tests.studies.command", "run", str(file), "--out", str(out), "--workers", "2"]
+    command = ["-m", "tests.residua.command", "run", str(file), "--out", str(out), "--workers", "2"]
     return subprocess.Popen(
         [sys.executable, *command],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from residua.cli import main
 from solver.results.quantities import QUANTITIES
 from studies import Store, Study, StudyError, open_netcdf, open_study
-from studies.command.cli import main
 from studies.definition.vocabulary import LABEL_ATTRIBUTES
 from studies.views.picking import one_run
 from studies.views.plots.lines import line_figure

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from residua.cli import main
 from studies import Store, Study, StudyEvent, StudyOutcome, open_study, run_study
-from studies.command.cli import main
 from studies.definition.identity import solver_hash
 from studies.execution.proof import Unfit
 from studies.execution.task import PathTask, walk

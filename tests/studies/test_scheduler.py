@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from distributed import Security
 
+from residua.cli import main
 from studies import (
     Access,
     GridLost,
@@ -27,7 +28,6 @@ from studies import (
     StudyOutcome,
     run_study,
 )
-from studies.command.cli import main
 from studies.execution.cluster import connect
 from tests.studies.conftest import fake_study
 

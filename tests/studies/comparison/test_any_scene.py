@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from annotated_types import Interval, Unit
 
+from residua.cli import main
 from solver.results.record import Record, Status
 from solver.scenes import SCENES, Monitor
 from solver.scenes.parameters import check, described
 from studies import Store, Study, StudyError
-from studies.command.cli import main
 from studies.storage.combine import combine
 from studies.storage.dataset import run_dataset
 from studies.views.comparison.profiles import read_profiles

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from residua.cli import main
 from solver.results.record import Record, Status
 from solver.scenes import SCENES, Scene
 from studies import Store, Study
-from studies.command.cli import main
 from studies.definition.parameters import defaults, parameters_of
 from studies.errors import StudyError
 from studies.storage.combine import combine

@@ -74,7 +74,7 @@ def test_a_wheel_holds_every_module_and_the_published_numbers(installed: Path) -
 
 def test_compare_works_from_a_wheel(installed: Path, tmp_path: Path) -> None:
     written(data_set({"T1": 2, "T3": 2}), tmp_path / "table.nc")
-    command = [sys.executable, "-m", "studies.command.cli", "compare", "table.nc"]
+    command = [sys.executable, "-m", "residua", "compare", "table.nc"]
     where = [sys.executable, "-c", "import studies; print(studies.__file__)"]
     elsewhere = {"PYTHONPATH": str(installed)}
     assert finished(where, tmp_path, elsewhere).stdout.startswith(str(installed))

@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.contour import QuadContourSet
 from matplotlib.lines import Line2D
 
+from residua.cli import main
 from studies import StudyError
-from studies.command.cli import main
 from studies.storage.dataset import attributes_of
 from studies.views.plots.picture import picture
 from studies.views.plots.sweep import sweep_figure

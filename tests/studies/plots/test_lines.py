@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from residua.cli import main
 from studies import Store, Study, StudyError, open_study
-from studies.command.cli import main
 from studies.views.plots.lines import line_figure
 from studies.views.plots.picture import picture
 from tests.studies.plots.test_maps import grid_map, texts_of

@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
+from residua.cli import main
 from solver.results.sliding_limits import johnson_limit, melan_limit
 from studies import Store, Study, StudyError, open_study
-from studies.command.cli import main
 from studies.storage.dataset import attributes_of
 from studies.views.plots.fields import sweep_fields
 from studies.views.plots.sweep import sweep_figure

@@ -16,12 +16,12 @@ import xarray as xr
 from fastapi.testclient import TestClient
 
 import studies.scenes.registry as registry
+from residua.cli import main
 from service.app import create_app
 from service.settings import Settings
 from solver import SCENES, ModelError, Record, Status, System
 from solver.scenes.punch import PUNCH, PunchParameters
 from studies import Store, Study, StudyError, open_study, run_study, scene_schema
-from studies.command.cli import main
 from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named, scene_of

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -12,21 +11,20 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
-
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
-    from studies.command.cost import dry_run, long_run
-    from studies.command.progress import Progress
-    from studies.command.report import prepare, report
+    from residua.cost import dry_run, long_run
+    from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
+    from studies.views.report import prepare, report
 
     limits = Limits(
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
@@ -160,9 +158,9 @@ def compare(options: argparse.Namespace) -> int:
 
 def serve(options: argparse.Namespace) -> int:
     """Start the HTTP service."""
-    # By name, since studies must work where the service is not installed.
-    service: Any = importlib.import_module("service.app")
-    service.serve(options.host, options.port, options.data, options.scheduler)
+    from service.app import serve as start
+
+    start(options.host, options.port, options.data, options.scheduler)
     return OK
 
 
@@ -170,7 +168,7 @@ def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
     import httpx
 
-    from studies.command.client import Refused, Service, api_key
+    from residua.client import Refused, Service, api_key
 
     try:
         with closing(Service(options.url, api_key(options.api_key_file))) as service:
@@ -258,9 +256,3 @@ def _selection(texts: Sequence[str]) -> dict[str, str]:
             raise StudyError("--select", text, f"{name} is selected already, as {chosen[name]}")
         chosen[name] = value
     return chosen
-
-
-def complain(reason: object, status: int) -> int:
-    """Say why a command ends, and return its exit status."""
-    print(f"residua: {reason}", file=sys.stderr)
-    return status

@@ -1,56 +1,22 @@
-"""The command ``residua``: its arguments and exit status."""
+"""The arguments of the command ``residua``."""
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from studies.command import commands, keys
-from studies.command.commands import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
-from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError
+from residua import commands, keys
 from studies.execution.limits import Limits
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status.
-
-    0: all went well. 1: not all runs are ok: some failed, or something kept them from being
-    computed, such as another process in the directory. 2: bad input. 130: interrupted.
-    """
-    options = _parser().parse_args(arguments)
-    try:
-        return options.command(options)
-    except StudyError as error:
-        return complain(error, BAD_INPUT)
-    except (CatalogueDamaged, GridLost, StoreBusy, StoreFull) as error:
-        return complain(error, FAILED)
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output has left; say no more
-        return OK
-    except OSError as error:
-        return complain(error, FAILED)
-
-
-def _integer(least: int, most: int) -> Callable[[str], int]:
-    def checked(text: str) -> int:
-        if not text.isdecimal() or not least <= int(text) <= most:
-            allowed = f"must be an integer >= {least} and <= {most}"
-            raise argparse.ArgumentTypeError(f"{text!r}: {allowed}")
-        return int(text)
-
-    return checked
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """Return the parser; `command` of its options is the function that carries them out."""
+    whole = argparse.ArgumentParser(
         prog="residua", description="Residual stress after elastic-plastic contact."
     )
-    known = parser.add_subparsers(required=True, metavar="COMMAND")
+    known = whole.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, **defaults: Any) -> argparse.ArgumentParser:
         text = defaults.get("talk", command).__doc__
@@ -125,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
 
     _add_access(add)
     _add_remote(add)
-    return parser
+    return whole
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -162,5 +128,11 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
             one.add_argument("--out", type=Path, metavar="FILE")
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _integer(least: int, most: int) -> Callable[[str], int]:
+    def checked(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= most:
+            allowed = f"must be an integer >= {least} and <= {most}"
+            raise argparse.ArgumentTypeError(f"{text!r}: {allowed}")
+        return int(text)
+
+    return checked

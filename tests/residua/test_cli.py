@@ -15,10 +15,10 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from residua.cli import main
+from residua.progress import Progress
 from solver.results.shakedown import ShakedownState
 from studies import Store, Study, StudyEvent, open_netcdf
-from studies.command.cli import main
-from studies.command.progress import Progress
 from studies.storage.dataset import attributes_of
 from tests.studies.conftest import compute_here, fake_study
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 import tests.studies.fakes  # noqa: F401
-from studies.command.cli import main
+from residua.cli import main
 
 if __name__ == "__main__":
     sys.exit(main())

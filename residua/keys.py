@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import os
 import sys
 from pathlib import Path
 from typing import Any
 
-OK = 0
+from residua.status import OK
 
 
 def keys(options: argparse.Namespace) -> int:
     """Make, list or remove the API keys of a service."""
-    # By name, since studies must work where the service is not installed.
-    service: Any = importlib.import_module("service.keys")
-    settings: Any = importlib.import_module("service.settings").Settings
+    from service.keys import Keys, KeysError
+    from service.settings import Settings
+
     # The other settings do not matter here, and may name what is not there yet.
-    data = options.data or os.environ.get("RESIDUA_DATA") or settings.model_fields["data"].default
+    data = options.data or os.environ.get("RESIDUA_DATA") or Settings.model_fields["data"].default
     try:
-        options.act(service.Keys(Path(data)), options)
-    except service.KeysError as error:
+        options.act(Keys(Path(data)), options)
+    except KeysError as error:
         raise OSError(str(error)) from None
     return OK
 

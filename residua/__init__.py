@@ -1,0 +1,1 @@
+"""The command ``residua``: it computes studies, shows their results, and starts the service."""
