@@ -19,7 +19,7 @@ COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
 @cache
 def roll(**fields):
     """The record of one run."""
-    parameters = RollingParameters(**fields)
+    parameters = RollingParameters(**({"growth": 1.3} | fields))
     (record,) = SCENES["rolling"].path(parameters, [parameters.passes], lambda share: None)
     assert record.status is Status.OK, record.message
     return record

@@ -40,6 +40,7 @@ def rolled(pressure, passes, *, half_width=8.0, status=None, **fields):
             "track": 10 * half_width,
             "element_size": half_width / 4,
             "advance_step": half_width / 2,
+            "growth": 1.3,
             "passes": passes,
         }
         | fields
