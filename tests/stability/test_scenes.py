@@ -8,9 +8,10 @@ import pytest
 
 from tests.stability.families import EVERY, FAMILIES, NAMES
 from tests.stability.table import describe
-from tests.stability.trial import Trial
+from tests.stability.trial import Trial, Verdict
 
 Trials = Callable[[str], Trial]
+RARE = 0.02
 
 
 def test_there_are_a_thousand_scenes_of_which_the_test_suite_runs_three_hundred() -> None:
@@ -30,3 +31,12 @@ def test_a_scene_is_the_same_however_many_there_are(family: str) -> None:
 def test_every_scene_ends_as_it_must(name: str, trial: Trials) -> None:
     this = trial(name)
     assert this.right, describe(this)
+
+
+def test_the_punches_are_carried_collapse_and_are_hardly_ever_given_up(trial: Trials) -> None:
+    """Here, for the process that has run them."""
+    punches = [name for name in NAMES if name.startswith("punch-")]
+    count = {v: sum(trial(name).verdict is v for name in punches) for v in Verdict}
+    assert count[Verdict.ANSWER] >= 0.6 * len(punches)
+    assert count[Verdict.LIMIT] >= 0.1 * len(punches)
+    assert count[Verdict.HONEST] + count[Verdict.NOT_CONVERGED] <= RARE * len(punches)
