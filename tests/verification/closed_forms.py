@@ -18,6 +18,14 @@ def plane_strain_modulus(youngs_modulus: float, poisson_ratio: float) -> float:
     return youngs_modulus / (1 - poisson_ratio**2)
 
 
+def carter_creepage(friction: float, half_width: float, radius: float, share: float) -> float:
+    """Return mu a / R (1 - sqrt(1 - T / mu P)) of equal rollers, ``share`` T / mu P.
+
+    F.W. Carter, Proc. R. Soc. A 112 (1926) 151; K.L. Johnson, Contact Mechanics (1985), 8.3.
+    """
+    return friction * half_width / radius * (1 - sqrt(1 - share))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HertzLine:
     """A parabolic cylinder on a half-plane, frictionless.

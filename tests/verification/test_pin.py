@@ -2,31 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from solver import Record, Status
-from studies.scenes.scene import read_scene
+from solver import Status
 from tests.reference.persson import DiscInHole
-from tests.verification.closed_forms import plane_strain_modulus
-
-PIN = Path(__file__).parents[2] / "data/scenes/pin.toml"
-RADIUS, YIELD = 10.0, 350.0
-
-
-def solved(clearance: float, load_ratio: float) -> tuple[Record, DiscInHole]:
-    scene = read_scene(PIN)
-    parameters = scene.parameters(clearance=clearance, load_ratio=load_ratio)
-    (record,) = scene.path(parameters, [load_ratio], lambda share: None)
-    exact = DiscInHole(
-        force=load_ratio * YIELD * 2 * RADIUS,
-        radius=RADIUS,
-        clearance=clearance,
-        modulus=plane_strain_modulus(2e5, 0.3),
-    )
-    return record, exact
+from tests.verification.scene_files import RADIUS, pin
 
 
 def test_the_closed_form_is_in_balance_and_is_that_of_hertz_where_contact_is_short() -> None:
@@ -45,7 +26,7 @@ def test_the_closed_form_is_in_balance_and_is_that_of_hertz_where_contact_is_sho
 def test_contact_angle_and_pressure_are_those_of_persson(
     clearance: float, load_ratio: float
 ) -> None:
-    record, exact = solved(clearance, load_ratio)
+    record, exact = pin(clearance, load_ratio)
     assert record.status is Status.OK, record.message
     assert record.scalars["plastic_strain_plate"] == 0.0
     assert record.scalars["contact_length"] / RADIUS == pytest.approx(exact.angle, rel=0.02)

@@ -18,7 +18,7 @@ import pytest
 
 from solver import SCENES, Status
 from solver.scenes.rolling_parameters import RollingParameters
-from tests.verification.closed_forms import HertzLine
+from tests.verification.closed_forms import HertzLine, carter_creepage
 
 YIELD, MODULUS, PEAK = 1e6, 2e5, 1360.0
 
@@ -134,9 +134,9 @@ def carter_shear(x, share):
     return np.sqrt(np.maximum(0.0, 1 - x**2)) - b * np.sqrt(stick)
 
 
-def carter_creepage(p, share):
-    """Return mu a / R (1 - sqrt(1 - T / mu P))."""
-    return p.friction * p.half_width / p.radius * (1 - sqrt(1 - share))
+def creepage_of(p, share):
+    """Return Carter's creepage for the parameters of a run."""
+    return carter_creepage(p.friction, p.half_width, p.radius, share)
 
 
 DRIVEN = [0.25, 0.5, 0.75, -0.25, -0.5, -0.75]
@@ -172,14 +172,14 @@ def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction
 @pytest.mark.parametrize(("share", "steps"), [(0.25, 8), (0.5, 8), (0.75, 8), (0.5, 4)])
 def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(share, steps):
     free, braking, accelerating = (rolled(steps, traction=t) for t in (0.0, share, -share))
-    exact = carter_creepage(free.parameters, share)
+    exact = creepage_of(free.parameters, share)
     assert braking.creepage - free.creepage == pytest.approx(exact, rel=0.02)
     assert accelerating.creepage - free.creepage == pytest.approx(-exact, rel=0.02)
 
 
 def test_given_creepage_makes_carters_force():
     free = rolled(4)
-    wanted = float(free.creepage + carter_creepage(free.parameters, 0.5))
+    wanted = float(free.creepage + creepage_of(free.parameters, 0.5))
     # force grows as the track that was rolled, over about 6 a, until creepage takes no more of it
     run = rolled(4, widths=20, control="creepage", given_creepage=wanted)
     assert run.creepage == pytest.approx(wanted, rel=1e-9)

@@ -19,6 +19,7 @@ from solver.results.audit.steady import audit_pass
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import rim_of
 from solver.steady import RollingWheel, rolling, track_of
+from tests.verification.closed_forms import carter_creepage
 
 A, YIELD, FRICTION = 8.0, 502.0, 0.3
 MODULUS = 2e5 / (2 * (1 - 0.3**2))
@@ -80,7 +81,7 @@ def test_creepage_is_carters(share):
     """Braking and driving are averaged: a wheel without a force creeps by 1e-4 of its own."""
     parameters, brakes = elastic(size=0.5, share=share)
     _, drives = elastic(size=0.5, share=-share)
-    carter = FRICTION * A / parameters.radius * (1 - sqrt(1 - share))
+    carter = carter_creepage(FRICTION, A, parameters.radius, share)
     assert (brakes.creepage - drives.creepage) / 2 == pytest.approx(carter, rel=0.05)
     for touching in (brakes, drives):
         sticks = touching.x[touching.status == STICK]
