@@ -19,7 +19,7 @@ def nothing_solved_outlives_its_module() -> Iterator[None]:
     """Forget solved problems, which hold factors of hundreds of megabytes."""
     yield
     for name, module in list(sys.modules.items()):
-        if name.startswith("tests.verification") or name.startswith("tests.solver"):
+        if name.startswith(("tests.verification", "tests.solver")):
             for value in list(vars(module).values()):
                 if hasattr(value, "cache_clear") and value.__module__.startswith("tests."):
                     value.cache_clear()

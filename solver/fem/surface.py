@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _CORNER = float(np.cos(np.radians(30.0)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True)  # without slots, which would leave no room for lengths once found
 class Surface:
     """A chain of edges with the body on its left: the outward normal is ``(t_y, -t_x)``.
 
