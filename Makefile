@@ -15,9 +15,8 @@ setup: $(STAMP) ## make the environment .venv, or bring it up to date
 run: setup ## compute the punch study into out/
 	$(BIN)/residua run data/studies/punch.toml --out out
 
-# One worker more than cores: tests of the service wait most of their time.
 test: setup ## run the whole test suite on all cores
-	$(BIN)/python -m pytest --numprocesses $$(($$(nproc) + 1)) --dist loadfile --durations=15
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --durations=15
 
 serve: setup ## start the HTTP service
 	$(BIN)/residua serve
