@@ -15,22 +15,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from solver.materials.law import Law
 from solver.materials.state import Response
+from solver.materials.wrapped import Wrapped
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from solver.materials.elasticity import Elasticity
+    from solver.materials.law import Law
     from solver.materials.state import PlasticState
-    from solver.materials.yield_surface import YieldSurface
 
     Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Heated(Law):
+class Heated(Wrapped):
     """A law with less stiffness and strength at each point.
 
     Attributes
@@ -45,38 +44,9 @@ class Heated(Law):
     strong: Array
 
     @property
-    def elasticity(self) -> Elasticity:
-        """The elastic constants of the law."""
-        return self.law.elasticity
-
-    @property
-    def surface(self) -> YieldSurface:
-        """The yield surface of the law."""
-        return self.law.surface
-
-    @property
-    def yield_stress(self) -> float:
-        """The yield stress of the law [MPa]."""
-        return self.law.yield_stress
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether the tangent of the law is."""
-        return self.law.symmetric
-
-    @property
-    def hardens(self) -> bool:
-        """Whether the law hardens without bound."""
-        return self.law.hardens
-
-    @property
-    def cornered(self) -> bool:
-        """Whether the yield surface of the law has corners."""
-        return self.law.cornered
-
-    def initial(self, n_points: int, n_components: int) -> PlasticState:
-        """Return the initial state of the law."""
-        return self.law.initial(n_points, n_components)
+    def ultimate_shear_stress(self) -> float:
+        """That of the strongest point [MPa]."""
+        return self.law.ultimate_shear_stress * float(self.strong.max())
 
     @property
     def _stretch(self) -> Array:
@@ -84,7 +54,8 @@ class Heated(Law):
 
     def at(self, points: NDArray[np.int64]) -> Heated:
         """Return the law of some points."""
-        return Heated(law=self.law, stiff=self.stiff[points], strong=self.strong[points])
+        law = self.law.at(points)
+        return Heated(law=law, stiff=self.stiff[points], strong=self.strong[points])
 
     def flow_stress(self, state: PlasticState) -> Array:
         """Return the size of the yield surface (n_points,) [MPa]."""
@@ -106,6 +77,16 @@ class Heated(Law):
         """Return the yield function (n_points,) [MPa]."""
         own = self.law.yield_value(stress / self.strong, state.stretched(self._stretch))
         return self.strong * own
+
+    def flow_direction(self, stress: Array, state: PlasticState) -> Array:
+        """Return the flow direction (n_components, n_points), Mandel."""
+        return self.law.flow_direction(stress / self.strong, state.stretched(self._stretch))
+
+    def stray(self, stress: Array, flow: Array, growth: Array, after: PlasticState) -> Array:
+        """Return the error (n_points,) of a plastic flow with respect to this law."""
+        k = self._stretch
+        own = stress / self.strong, flow * k, growth * k, after.stretched(k)
+        return self.law.stray(*own) / k
 
     def energy_density(self, stress: Array) -> Array:
         """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""

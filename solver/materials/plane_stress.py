@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.materials.law import Law
 from solver.materials.state import Response
+from solver.materials.wrapped import Wrapped
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.materials.elasticity import Elasticity
+    from solver.materials.law import Law
     from solver.materials.state import PlasticState
-    from solver.materials.yield_surface import YieldSurface
 
     Array = NDArray[np.float64]
 
@@ -49,7 +48,7 @@ def _without_zz(strain: Array, state: PlasticState, C: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class PlaneStress(Law):
+class PlaneStress(Wrapped):
     """Any law in plane stress, with four components; the zz row of strain is not read.
 
     1. strain zz from the elastic stiffness, plastic strain frozen
@@ -69,82 +68,9 @@ class PlaneStress(Law):
 
     law: Law
 
-    @property
-    def elasticity(self) -> Elasticity:
-        """The elastic constants of the wrapped law."""
-        return self.law.elasticity
-
-    @property
-    def surface(self) -> YieldSurface:
-        """The yield surface of the wrapped law."""
-        return self.law.surface
-
-    @property
-    def yield_stress(self) -> float:
-        """The yield stress of the wrapped law [MPa]."""
-        return self.law.yield_stress
-
-    @property
-    def shear_yield_stress(self) -> float:
-        """The yield stress in shear of the wrapped law [MPa]."""
-        return self.law.shear_yield_stress
-
-    @property
-    def ultimate_shear_stress(self) -> float:
-        """The ultimate shear stress of the wrapped law [MPa]."""
-        return self.law.ultimate_shear_stress
-
-    @property
-    def elastic(self) -> bool:
-        """Whether the wrapped law never yields."""
-        return self.law.elastic
-
-    @property
-    def cornered(self) -> bool:
-        """Whether the yield surface of the wrapped law has corners or edges."""
-        return self.law.cornered
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether the tangent of the wrapped law is symmetric."""
-        return self.law.symmetric
-
-    @property
-    def hardens(self) -> bool:
-        """Whether the wrapped law hardens."""
-        return self.law.hardens
-
-    def initial(self, n_points: int, n_components: int) -> PlasticState:
-        """Return the initial state of the wrapped law."""
-        return self.law.initial(n_points, n_components)
-
-    def flow_stress(self, state: PlasticState) -> Array:
-        """Return the flow stress of the wrapped law [MPa]."""
-        return self.law.flow_stress(state)
-
-    def back_stress(self, state: PlasticState) -> Array:
-        """Return the back stress of the wrapped law [MPa]."""
-        return self.law.back_stress(state)
-
-    def strength(self, state: PlasticState) -> Array:
-        """Return the strength of the wrapped law [MPa]."""
-        return self.law.strength(state)
-
-    def shear_strength(self, state: PlasticState) -> Array:
-        """Return the strength in shear of the wrapped law [MPa]."""
-        return self.law.shear_strength(state)
-
-    def yield_value(self, stress: Array, state: PlasticState) -> Array:
-        """Return the yield function of the wrapped law [MPa]."""
-        return self.law.yield_value(stress, state)
-
-    def flow_direction(self, stress: Array, state: PlasticState) -> Array:
-        """Return the flow direction of the wrapped law."""
-        return self.law.flow_direction(stress, state)
-
-    def dissipation(self, before: PlasticState, response: Response) -> Array:
-        """Return the dissipation of the wrapped law [N mm/mm3]."""
-        return self.law.dissipation(before, response)
+    def at(self, points: NDArray[np.int64]) -> PlaneStress:
+        """Return the law of some points."""
+        return replace(self, law=self.law.at(points))
 
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
