@@ -13,7 +13,7 @@ ENV PIP_NO_CACHE_DIR=1 \
     no_proxy=127.0.0.1,localhost
 
 WORKDIR /app
-COPY pyproject.toml setup.py constraints.txt README.md LICENSE ./
+COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY solver solver
 COPY studies studies
 COPY service service

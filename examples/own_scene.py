@@ -91,7 +91,6 @@ SCENES["die"] = Scene(
     summary="a block pressed in a die, and released",
     parameters=DieParameters,
     branch="load_ratio",
-    refining=frozenset({"element_size", "load_step"}),
     model=model,
     program=program,
     view=view,

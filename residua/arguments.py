@@ -76,13 +76,6 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument("--vtu", type=Path, required=True, metavar="FOLDER", help="where they go")
 
-    one = add("compare", commands.compare)
-    one.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="data set, study or DIR")
-    one.add_argument("--reference", type=Path, metavar="CSV", help="published numbers of your own")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument("--out", type=Path, metavar="PNG", help="draw profiles and published numbers")
-    one.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
-
     one = add("serve", commands.serve)
     one.add_argument("--host", help="default: 127.0.0.1; elsewhere callers need API keys")
     one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")

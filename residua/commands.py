@@ -133,29 +133,6 @@ def export(options: argparse.Namespace) -> int:
     return OK
 
 
-def compare(options: argparse.Namespace) -> int:
-    """Set computed residual stress beside published numbers."""
-    from studies.views.comparison.compare import compare as compared_with
-    from studies.views.comparison.plot import comparison_figure
-    from studies.views.comparison.profiles import read_profiles
-    from studies.views.comparison.reference import published_cases, read_reference, reference_of
-    from studies.views.comparison.table import comparison_table, write_comparisons
-
-    computed = read_profiles(options.paths, _selection(options.select))
-    published = read_reference(options.reference or reference_of(computed.scene))
-    cases = {} if options.reference else published_cases(computed.scene)
-    compared, absent = compared_with(computed, published)
-    if options.csv:
-        with _written("--csv", options.csv) as part:
-            write_comparisons(part, computed, compared)
-    if options.out:
-        _save(comparison_figure(computed, published), options.out)
-    print(comparison_table(computed, compared, absent, cases))
-    for written in filter(None, (options.out, options.csv)):
-        print(f"wrote {written}")
-    return OK
-
-
 def serve(options: argparse.Namespace) -> int:
     """Start the HTTP service."""
     from service.app import serve as start

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
     from solver.loading.control import PathControl, Tolerances
     from solver.loading.outcome import Outcome
-    from solver.loading.path import Branch, Path
     from solver.loading.program import Program, Stage
     from solver.loading.walker import Walker
     from solver.materials.material import Material
@@ -39,7 +38,6 @@ _HOMES = {
     "Amplitude": "model.amplitude",
     "Audit": "results.audit.report",
     "Body": "model.body",
-    "Branch": "loading.path",
     "ContactPair": "model.model",
     "Displacement": "model.loads",
     "InitialStress": "model.loads",
@@ -50,7 +48,6 @@ _HOMES = {
     "Moved": "model.rigid",
     "NotConverged": "errors",
     "Outcome": "loading.outcome",
-    "Path": "loading.path",
     "PathControl": "loading.control",
     "Pressure": "model.loads",
     "Program": "loading.program",
@@ -77,7 +74,6 @@ __all__ = [
     "Amplitude",
     "Audit",
     "Body",
-    "Branch",
     "ContactPair",
     "Displacement",
     "InitialStress",
@@ -88,7 +84,6 @@ __all__ = [
     "Moved",
     "NotConverged",
     "Outcome",
-    "Path",
     "PathControl",
     "Pressure",
     "Program",

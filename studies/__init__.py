@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -52,9 +51,6 @@ _HOMES = {
     "to_xarray": "views.solution",
 }
 
-_RENAMED = {"Path": "LoadingPath"}
-"""Old public names that still work, and their new ones."""
-
 __all__ = [
     "Access",
     "Bounds",
@@ -85,14 +81,6 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: reading a study file needs no xarray."""
-    if name in _RENAMED:
-        new = _RENAMED[name]
-        warnings.warn(
-            f"studies.{name} is now studies.{new}; the old name goes with the next release",
-            DeprecationWarning,
-            stacklevel=2,
-        )
-        name = new
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"studies.{_HOMES[name]}"), name)

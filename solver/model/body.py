@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.deprecation import renamed
 from solver.errors import ModelError
 from solver.materials import PlaneStress
 from solver.model.kinematics import KINEMATICS, Kinematics
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from solver.model.motion import Axle, TravellingPressure
 
 
-@renamed(state="kinematics")
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
     """A deformable body.

@@ -208,7 +208,6 @@ BALL = Scene(
     summary="ball pressed on a half-space that yields, or yielding under a rigid plane",
     parameters=BallParameters,
     branch="cycles",
-    refining=frozenset({"accuracy", "element_size", "growth", "load_step", "unload_steps"}),
     model=model,
     program=program,
     view=view,

@@ -199,7 +199,6 @@ ELASTIC_PUNCH = Scene(
     summary="elastic punch pressed on an elastic half-plane with friction, relief grooves or none",
     parameters=ElasticPunchParameters,
     branch="mean_pressure",
-    refining=frozenset({"accuracy", "element", "smallest_element", "growth"}),
     model=model,
     program=program,
     view=view,

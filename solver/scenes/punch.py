@@ -236,16 +236,6 @@ PUNCH = Scene(
     summary="elastic-plastic punch pressed on an elastic-plastic half-plane, and released",
     parameters=PunchParameters,
     branch="load_ratio",
-    refining=frozenset(
-        {
-            "accuracy",
-            "element",
-            "smallest_element",
-            "growth",
-            "load_step",
-            "unload_steps",
-        }
-    ),
     model=model,
     program=program,
     view=view,

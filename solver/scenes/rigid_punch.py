@@ -171,7 +171,6 @@ RIGID_PUNCH = Scene(
     summary="rigid flat punch pressed on an elastic half-plane, with friction or without",
     parameters=RigidPunchParameters,
     branch="mean_pressure",
-    refining=frozenset({"accuracy", "smallest_element", "growth", "largest_element"}),
     model=model,
     program=program,
     view=view,

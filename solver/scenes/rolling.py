@@ -237,12 +237,6 @@ ROLLING = Scene(
     parameters=RollingParameters,
     branch="passes",
     method=method,
-    refining=frozenset(
-        {
-            "accuracy", "element_size", "growth", "advance_step", "advance_tolerance",
-            "press_steps", "unload_steps",
-        }
-    ),
     model=model,
     program=program,
     view=view,

@@ -49,8 +49,6 @@ class Scene:
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
     branch : the parameter for whose values runs share increments: the run of a larger value goes
         on where that of a smaller one ends, or leaves it later; empty where there is none
-    refining : parameters that change the accuracy of a result, not the problem: runs that differ
-        in these alone solve the same problem, and can be compared
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
     view : (parameters) -> where results are taken
@@ -82,7 +80,6 @@ class Scene:
     outputs: tuple[Output, ...]
     costs: tuple[Output, ...]
     looked: Callable[[Any], Looked] | None = None
-    refining: frozenset[str] = frozenset()
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
     watch: Callable[[Samples, Any], Any] | None = None

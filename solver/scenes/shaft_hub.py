@@ -265,7 +265,6 @@ SHAFT_HUB = Scene(
     summary="hub on a longer shaft, under a pressure around it or by an interference fit",
     parameters=ShaftHubParameters,
     branch="mean_pressure",
-    refining=frozenset({"accuracy", "smallest_element", "growth"}),
     model=model,
     program=program,
     view=view,

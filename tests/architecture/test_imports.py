@@ -36,9 +36,9 @@ def test_two_modules_of_studies_import_dask() -> None:
     assert users == {"studies/execution/cluster.py", "studies/execution/grid.py"}
 
 
-def test_what_draws_is_in_its_folders() -> None:
+def test_what_draws_is_in_its_folder() -> None:
     users = {Path(m).parent for m, names in imports("studies").items() if "matplotlib" in names}
-    assert users == {Path("studies/views/plots"), Path("studies/views/comparison")}
+    assert users == {Path("studies/views/plots")}
 
 
 @pytest.mark.parametrize(

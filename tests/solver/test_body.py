@@ -239,19 +239,3 @@ def test_unknown_linear_solver_is_refused():
     model = Model(bodies=(square(supports={"left": "xy"}, pressure={"top": 1.0}),))
     with pytest.raises(ModelError, match="linear_solver = 'lapack': must be one of"):
         solve(model, linear_solver="lapack")
-
-
-def test_the_old_name_of_the_kinematics_works_with_a_warning():
-    with pytest.warns(DeprecationWarning, match="Body.state is called Body.kinematics now"):
-        body = Body(name="square", mesh=LEFT, material=STEEL, state="plane_stress")
-    assert body.kinematics == "plane_stress"
-    with pytest.warns(DeprecationWarning, match="Body.kinematics"):
-        assert body.state == "plane_stress"
-    with pytest.raises(TypeError, match="both"), pytest.warns(DeprecationWarning):
-        Body(
-            name="square",
-            mesh=LEFT,
-            material=STEEL,
-            state="plane_stress",
-            kinematics="plane_strain",
-        )

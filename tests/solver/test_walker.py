@@ -15,7 +15,6 @@ from solver import (
     Model,
     ModelError,
     NotConverged,
-    Path,
     PathControl,
     Program,
     Stage,
@@ -457,15 +456,6 @@ def test_a_refined_stage_has_as_many_times_more_increments_either_way():
     by_step = Stage(name="loaded", target=1.0, step=0.25, refined=True)
     for stage in (by_steps, by_step):
         assert Program(laps=(Lap((stage,)),)).refined(3).count == 12
-
-
-def test_the_old_path_gives_what_the_walker_gives(system):
-    with pytest.warns(DeprecationWarning, match="Walker"):
-        path = Path(system, CONTROL)
-    (branch,) = path.branches([0.4])
-    outcome = outcome_at(system, 0.4)
-    pairs = zip(arrays(branch.unloaded), arrays(outcome.points["unloaded"]), strict=True)
-    assert all(np.array_equal(one, other) for one, other in pairs)
 
 
 # -- solvers and elements ----------------------------------------------------------------------

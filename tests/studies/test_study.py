@@ -232,11 +232,6 @@ def test_a_scene_is_read_once_for_a_study(monkeypatch: pytest.MonkeyPatch) -> No
     assert len(calls) == 1
 
 
-def test_the_old_name_of_a_loading_path_works_with_a_warning() -> None:
-    with pytest.warns(DeprecationWarning, match=r"studies\.Path is now studies\.LoadingPath"):
-        assert studies.Path is studies.LoadingPath
-
-
 def test_a_sweep_too_large_is_refused_before_it_is_expanded() -> None:
     thousand = [(i + 1) / 1000 for i in range(1000)]
     sweep = {"friction": thousand, "load_ratio": thousand, "half_width": thousand}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +12,11 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from studies import StudyError
-from studies.views.comparison.plot import comparison_figure
-from studies.views.comparison.profiles import read_profiles
 from studies.views.plots.picture import picture
 from tests.studies.plots.test_curves import swept
 from tests.studies.plots.test_lines import legend_of, lines_of
 from tests.studies.plots.test_maps import grid_map
-from tests.studies.rolled import data_set, written
+from tests.studies.rolled import data_set
 
 COUNTS = (1, 2, 5, 13, 40)
 
@@ -161,32 +158,3 @@ def test_a_map_is_that_of_the_last_stage(count: int) -> None:
     run["map_stress"] = (("stage", "y", "x"), values, {"units": "MPa"})
     (mesh,) = picture(run, "map_stress").axes[0].collections
     assert np.unique(mesh.get_array().compressed()) == [count]
-
-
-@pytest.mark.parametrize("count", COUNTS)
-def test_passes_beside_published_numbers_have_colours_of_their_own(
-    count: int, tmp_path: Path
-) -> None:
-    computed = read_profiles([written(data_set({"A": count}), tmp_path / "a.nc")], {})
-    sheet = comparison_figure(computed, [])
-    drawn = [line for line in sheet.axes[0].lines if len(line.get_xdata()) > 2]
-    assert len({to_rgba(line.get_color()) for line in drawn}) == len(drawn) == count
-    (legend,) = sheet.legends
-    names = [text.get_text() for text in legend.get_texts() if text.get_text().startswith("pass")]
-    assert len(names) == min(count, 12)
-    assert (names[0], names[-1]) == ("pass 1", f"pass {count}")
-    sheet.draw_without_rendering()
-    box = legend.get_window_extent()
-    assert (box.x0 >= 0.0, box.x1 <= sheet.bbox.x1, box.y0 >= 0.0) == (True, True, True)
-    assert not any(axes.get_tightbbox().overlaps(box) for axes in sheet.axes)
-
-
-@pytest.mark.parametrize("count", [1, 2, 5, 13])
-def test_every_case_has_a_row_beside_published_numbers(count: int, tmp_path: Path) -> None:
-    cases = {f"case {number}": 1 for number in range(count)}
-    computed = read_profiles([written(data_set(cases), tmp_path / "a.nc")], {})
-    sheet = comparison_figure(computed, [])
-    assert len(sheet.axes) == 3 * count
-    sheet.draw_without_rendering()
-    (legend,) = sheet.legends
-    assert not sheet.axes[-1].get_tightbbox().overlaps(legend.get_window_extent())
