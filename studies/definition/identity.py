@@ -2,7 +2,7 @@
 
 A change of the solver that may change a number, a name or a unit changes every id, so that no old
 run is taken for a new one; a change of a scene of the user's own changes the ids of its runs. A
-change of words alone changes none: `studies.definition.meaning` says what words are.
+change of comments and docstrings alone changes none (`studies.definition.meaning`).
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ NO_NUMBERS = frozenset({"effort"})
 
 @cache
 def solver_hash() -> str:
-    """Return the digest of all that decides what a run's file holds, but for its words.
+    """Return the digest of all that decides what a run's file holds.
 
     These are the sources of the solver, and the modules that lay its records out as data sets,
     each with its place: to move a file changes the digest.

@@ -1,25 +1,20 @@
 """Arithmetic in scene files: ``"2*$radius"`` is a number once the parameters are known.
 
-The grammar, from the loosest binding to the tightest; nothing else is evaluated::
-
-    sum      = product (("+" | "-") product)*
-    product  = signed (("*" | "/") signed)*
-    signed   = ("+" | "-")* power
-    power    = atom ("^" signed)?
-    atom     = number | "$" name | "pi" | function "(" sum ("," sum)* ")" | "(" sum ")"
+An expression has numbers, parameters (``$name``), ``pi``, ``+ - * / ^``, parentheses and the
+functions of `FUNCTIONS`. Python's own parser reads it; nothing else of Python is evaluated.
 """
 
 from __future__ import annotations
 
+import ast
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping
-from typing import Any, NoReturn
+from typing import Any
 
 LONGEST = 200
 """Characters an expression may have."""
-_DEEPEST = 20
-"""Parentheses within each other."""
 
 FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
     "sqrt": (math.sqrt, 1),
@@ -37,12 +32,19 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
 }
 """Name -> function, number of its arguments; angles are in radians."""
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)"
-    r"|\$(?P<parameter>[A-Za-z_]\w*)|(?P<word>[A-Za-z_]\w*)|(?P<sign>[-+*/^(),]))",
-    re.ASCII,
-)
+_OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: math.pow,  # floats: a power of whole numbers could have any number of digits
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
 _PARAMETER = re.compile(r"\$([A-Za-z_]\w*)", re.ASCII)
+_MARK = "parameter__"
+"""What stands for ``$`` where Python reads the text."""
+_FOREIGN = re.compile(rf"\*\*|//|{_MARK}|[^\w\s$.,()*/^+-]", re.ASCII)
 
 
 class ExpressionError(ValueError):
@@ -72,14 +74,14 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     Raises
     ------
     ExpressionError
-        where the text breaks the grammar, names an unknown parameter, or is no finite number
+        where the text is no arithmetic, names an unknown parameter, or is no finite number
     """
     if len(text) > LONGEST:
         raise ExpressionError(f"must be at most {LONGEST} characters long")
     if whole := _PARAMETER.fullmatch(text):
         return _known(whole[1], values)
     try:
-        number = _Reader(text, values).whole()
+        number = _value(_read(text), values)
         if not math.isfinite(number):
             raise ExpressionError("must be a finite number")
     except ExpressionError:
@@ -89,114 +91,47 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     return number
 
 
+def _read(text: str) -> ast.expr:
+    if found := _FOREIGN.search(text):
+        raise ExpressionError(f"cannot be read from {text[found.start() :]!r} on")
+    python = _PARAMETER.sub(rf" {_MARK}\1 ", text).replace("^", "**")
+    try:
+        return ast.parse(" ".join(python.split()), mode="eval").body
+    except SyntaxError:
+        allowed = f"numbers, $parameters, pi, + - * / ^ ( ) and {', '.join(FUNCTIONS)}"
+        raise ExpressionError(f"cannot be read as arithmetic: {allowed}") from None
+
+
+def _value(node: ast.expr, values: Mapping[str, Any]) -> float:
+    match node:
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return number
+        case ast.Name(id="pi"):
+            return math.pi
+        case ast.Name(id=name) if name.startswith(_MARK):
+            name = name.removeprefix(_MARK)
+            value = _known(name, values)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ExpressionError(f"${name} is {value!r}: only numbers can be computed with")
+            return value
+        case ast.UnaryOp(op=sign, operand=one) if type(sign) in _OPERATORS:
+            return _OPERATORS[type(sign)](_value(one, values))
+        case ast.BinOp(left=one, op=sign, right=other) if type(sign) in _OPERATORS:
+            return _OPERATORS[type(sign)](_value(one, values), _value(other, values))
+        case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name in FUNCTIONS:
+            function, count = FUNCTIONS[name]
+            if len(given) != count:
+                raise ExpressionError(f"{name} takes {count} number(s), not {len(given)}")
+            return function(*(_value(each, values) for each in given))
+        case ast.Name(id=name) | ast.Call(func=ast.Name(id=name)):
+            known = ", ".join(("pi", *FUNCTIONS))
+            raise ExpressionError(f"{name} is unknown: write ${name} for a parameter; {known}")
+    text = ast.unparse(node).replace(_MARK, "$")
+    raise ExpressionError(f"{text} cannot be read as arithmetic")
+
+
 def _known(name: str, values: Mapping[str, Any]) -> Any:
     if name not in values:
         known = ", ".join(f"${each}" for each in values)
         raise ExpressionError(f"${name} is no parameter; the scene has {known or 'none'}")
     return values[name]
-
-
-class _Reader:
-    """Reads one expression from left to right, evaluating as it goes."""
-
-    def __init__(self, text: str, values: Mapping[str, Any]) -> None:
-        self._values = values
-        self._tokens = list(_tokens(text))
-        self._depth = 0
-
-    def whole(self) -> float:
-        number = self._sum()
-        if self._tokens:
-            self._refuse()
-        return number
-
-    def _refuse(self) -> NoReturn:
-        if not self._tokens:
-            raise ExpressionError("ends too early")
-        raise ExpressionError(f"cannot be read from {self._tokens[0][1]!r} on")
-
-    def _take(self, signs: str) -> str:
-        """Return the next sign and go on, if it is one of these; else nothing."""
-        if self._tokens and self._tokens[0][0] == "sign" and self._tokens[0][1] in signs:
-            return self._tokens.pop(0)[1]
-        return ""
-
-    def _expect(self, sign: str) -> None:
-        if not self._take(sign):
-            self._refuse()
-
-    def _sum(self) -> float:
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise ExpressionError(f"must have at most {_DEEPEST} parentheses within each other")
-        number = self._product()
-        while sign := self._take("+-"):
-            other = self._product()
-            number = number + other if sign == "+" else number - other
-        self._depth -= 1
-        return number
-
-    def _product(self) -> float:
-        number = self._signed()
-        while sign := self._take("*/"):
-            other = self._signed()
-            number = number * other if sign == "*" else number / other
-        return number
-
-    def _signed(self) -> float:
-        negative = False
-        while sign := self._take("+-"):
-            negative ^= sign == "-"
-        number = self._power()
-        return -number if negative else number
-
-    def _power(self) -> float:
-        number = self._atom()
-        if self._take("^"):
-            # floats: a power of whole numbers could have any number of digits
-            return math.pow(number, self._signed())
-        return number
-
-    def _atom(self) -> float:
-        if self._take("("):
-            number = self._sum()
-            self._expect(")")
-            return number
-        if not self._tokens or self._tokens[0][0] == "sign":
-            self._refuse()
-        kind, text = self._tokens[0]
-        if kind == "word" and text != "pi" and text not in FUNCTIONS:
-            known = ", ".join(("pi", *FUNCTIONS))
-            raise ExpressionError(f"{text} is unknown: write ${text} for a parameter; {known}")
-        del self._tokens[0]
-        if kind == "number":
-            return float(text) if set(text) & set(".eE") else int(text)
-        if kind == "parameter":
-            value = _known(text, self._values)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ExpressionError(f"${text} is {value!r}: only numbers can be computed with")
-            return value
-        return math.pi if text == "pi" else self._call(text)
-
-    def _call(self, name: str) -> float:
-        function, count = FUNCTIONS[name]
-        self._expect("(")
-        given = [self._sum()]
-        while self._take(","):
-            given.append(self._sum())
-        self._expect(")")
-        if len(given) != count:
-            raise ExpressionError(f"{name} takes {count} number(s), not {len(given)}")
-        return function(*given)
-
-
-def _tokens(text: str) -> list[tuple[str, str]]:
-    found, at = [], 0
-    while rest := text[at:].strip():
-        token = _TOKEN.match(text, at)
-        if token is None:
-            raise ExpressionError(f"cannot be read from {rest!r} on")
-        kind = str(token.lastgroup)
-        found.append((kind, token[kind]))
-        at = token.end()
-    return found

@@ -115,7 +115,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].friction",
         "$nu is no parameter",
     ),
-    "no arithmetic": (put("loads", 0, "value", "2*($wide"), "loads[0].value", "ends too early"),
+    "no arithmetic": (put("loads", 0, "value", "2*($wide"), "loads[0].value", "read as arithmetic"),
     "without effect": (put("contacts", 0, "friction", 0.1), "parameters.mu", "has no effect"),
     "default out of range": (
         put("parameters", "mu", "default", 2.0),
