@@ -37,8 +37,9 @@ def _write(value: Any, out: list[str]) -> None:
     if isinstance(value, ast.Constant):
         out.append(f"{type(value.value).__name__}:{value.value!a}")
     elif isinstance(value, ast.AST):
-        out.append(f"{type(value).__name__}(")
-        for name in _fields(type(value)):
+        kind: Any = type(value)
+        out.append(f"{kind.__name__}(")
+        for name in _fields(kind):
             item = getattr(value, name, None)
             if item is not None and item != []:
                 out.append(f"{name}=")

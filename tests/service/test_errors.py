@@ -336,7 +336,7 @@ def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI
 def test_too_many_studies_to_examine_are_put_off(
     app: FastAPI, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.examiner.WAITING", 0)
+    monkeypatch.setattr(app.state.examiner.process, "waiting", 0)
     for path in ("/studies", "/estimate"):
         answer = ask(app, path, "POST", json={"name": "a", "scene": "punch"})
         problem(answer, 503)
