@@ -18,7 +18,6 @@ from solver.scenes import SCENES, Monitor
 from solver.scenes.parameters import check, described
 from studies import Store, Study, StudyError
 from studies.storage.combine import combine
-from studies.storage.dataset import run_dataset
 from studies.views.comparison.profiles import read_profiles
 from tests.studies.fakes import Canned
 
@@ -74,7 +73,7 @@ def stored(directory: Path, sweep: dict[str, Any]) -> Store:
     content = {"name": "layers", "scene": "layer", "sweep": {"case": {"A": {"coat": 3}}} | sweep}
     study, store = Study.from_dict(content), Store(directory)
     for case in study.cases():
-        store.write_run(run_dataset(LAYER, case, record(case.parameters)))
+        store.write_run(case, record(case.parameters))
     store.save_study(study)
     combine(study, store, list(study.cases()))
     return store

@@ -17,7 +17,6 @@ from studies import Store, Study
 from studies.definition.parameters import defaults, parameters_of
 from studies.errors import StudyError
 from studies.storage.combine import combine
-from studies.storage.dataset import run_dataset
 from studies.views.comparison.compare import Comparison, _line, compare
 from studies.views.comparison.problem import differences, other_problem
 from studies.views.comparison.profiles import Computed, Profile, read_profiles
@@ -229,7 +228,7 @@ def test_profiles_are_found_in_the_data_set_of_a_study(tmp_path: Path) -> None:
             },
             fields={"residual_profile": (("pass", "station", "component", "depth"), stress)},
         )
-        store.write_run(run_dataset(SCENES["rolling"], case, record))
+        store.write_run(case, record)
     store.save_study(study)
     combine(study, store, list(study.cases()))
     computed = read_profiles([store.directory], {})
