@@ -61,19 +61,33 @@ def verified(path: Path, case: Case, outcome: Record | str, keep: str = "") -> d
     FileDiffers
         when anything else is in the file
     """
-    import h5py  # a complete study does not wait for it
-
     sweep = layout.usual_dimensions(case.scene)
     meant = dict(_meant(case, outcome, sweep, keep))
-    found: list[str] = []
-    values: dict[str, Any] = {}
+    try:
+        attributes, values, found = _read(path, meant)
+        found += _of_the_whole(attributes, case, outcome, keep)
+    except (OSError, RuntimeError, LookupError, TypeError, ValueError) as error:  # all of h5py
+        told = f"it cannot be read: {type(error).__name__}: {error}"
+        raise FileDiffers(case.id, [told]) from None
+    if found:
+        raise FileDiffers(case.id, sorted(found))
+    single = {name: values[name].item() for name in meant if meant[name].dims == sweep}
+    return layout.summary(attributes, single)
+
+
+def _read(
+    path: Path, meant: Mapping[str, _Meant]
+) -> tuple[dict[str, Any], dict[str, np.ndarray], list[str]]:
+    """Return the attributes of a file, the values of its variables, and what is wrong."""
+    import h5py  # a complete study does not wait for it
+
+    values: dict[str, np.ndarray] = {}
     with h5py.File(path, "r") as file:
         attributes = runfile.global_attributes(file)
-        found += _of_the_whole(attributes, case, outcome, keep)
         every = {name: file[name] for name in file}
         scales = {each.id: name for name, each in every.items() if each.is_scale}
         there = {name: each for name, each in every.items() if not _is_bare(each, scales)}
-        found += [f"{name} is missing" for name in meant.keys() - there.keys()]
+        found = [f"{name} is missing" for name in meant.keys() - there.keys()]
         found += [f"{name} does not belong there" for name in there.keys() - meant.keys()]
         own = {name for name, each in meant.items() if not _of_mesh(name, each.dims)}
         if set(runfile.variables(file)) != own:
@@ -81,10 +95,7 @@ def verified(path: Path, case: Case, outcome: Record | str, keep: str = "") -> d
         for name in there.keys() & meant.keys():
             values[name], wrong = _compared(name, there[name], meant[name], scales)
             found += wrong
-    if found:
-        raise FileDiffers(case.id, sorted(found))
-    single = {name: values[name].item() for name in meant if meant[name].dims == sweep}
-    return layout.summary(attributes, single)
+    return attributes, values, found
 
 
 def _meant(

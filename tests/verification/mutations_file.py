@@ -92,6 +92,12 @@ def turned(of: np.ndarray) -> np.ndarray:
     return of.swapaxes(-1, -2).reshape(of.shape)
 
 
+def cut_short(patch: Patch) -> None:
+    """Half of the file is lost, and its checksum vouches for what is left."""
+    packed = runfile._packed
+    patch.setattr(runfile, "_packed", lambda run: packed(run)[: len(packed(run)) // 2])
+
+
 def not_listed(patch: Patch) -> None:
     """A variable is in the file, and no study will combine it."""
     owns = ugrid.owns
@@ -185,6 +191,7 @@ FILE_FAULTS: dict[str, FileFault] = {
     "a range of what is valid": FileFault(
         fault=attribute("mises_loaded", valid_max=100.0), told="the valid_max 100.0"
     ),
+    "cut short": FileFault(fault=cut_short, told="it cannot be read: OSError"),
     # the mesh
     "nodes in another order": FileFault(
         fault=in_mesh("mesh_node_x", lambda v: v[::-1]), told="mesh_node_x"
