@@ -19,14 +19,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if reason := stranger():
         return complain(reason, BAD_INPUT)
     from residua.arguments import parser  # imports the neighbours, which are known now
-    from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError
+    from studies.errors import (
+        CatalogueDamaged,
+        FileDiffers,
+        GridLost,
+        StoreBusy,
+        StoreFull,
+        StudyError,
+    )
 
     options = parser().parse_args(arguments)
     try:
         return options.command(options)
     except StudyError as error:
         return complain(error, BAD_INPUT)
-    except (CatalogueDamaged, GridLost, StoreBusy, StoreFull) as error:
+    except (CatalogueDamaged, FileDiffers, GridLost, StoreBusy, StoreFull) as error:
         return complain(error, FAILED)
     except KeyboardInterrupt:
         return INTERRUPTED

@@ -91,6 +91,26 @@ class RunUnreadable(RuntimeError):
         return f"run {self.run_id} cannot be read: {self.reason}"
 
 
+class FileDiffers(RuntimeError):
+    """The file of a run would say something else than what was computed and audited.
+
+    Parameters
+    ----------
+    run_id : of the run
+    differences : what is wrong with the file, in words
+    """
+
+    def __init__(self, run_id: str, differences: Sequence[str]) -> None:
+        super().__init__(run_id, differences)
+        self.run_id = run_id
+        self.differences = tuple(differences)
+
+    def __str__(self) -> str:
+        first, more = "; ".join(self.differences[:3]), len(self.differences) - 3
+        told = first + (f"; and {more} more differences" if more > 0 else "")
+        return f"the file would not say what was computed, and is not kept: {told}"
+
+
 class CatalogueDamaged(RuntimeError):
     """The catalogue cannot be used; whoever computes next makes it anew from the runs."""
 

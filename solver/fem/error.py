@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_INWARD = 1e-6
+"""Part of the way to the middle of an element, by which points are moved inside for their weights.
+"""
 _SMALL = 1e-9
 """Weight of the terms of highest degree beside the misfit: patches of one row do not tell them."""
 
@@ -96,15 +99,36 @@ class ErrorPoints:
 
     def recovered(self, stress: Array) -> Array:
         """Return the recovered stress (4, n_elements, n) from that of the elements' points."""
-        out = np.zeros((len(stress), *self._volume.shape))
-        total = np.zeros(self._volume.shape)
+        return self._recovered(stress, self._X, self.x)
+
+    def at_nodes(self, stress: Array) -> Array:
+        """Return the recovered stress at the nodes (4, n_nodes): means over the elements there.
+
+        At the boundary it is that of inner vertices, carried on: no value of the edge itself.
+        """
+        basis = self._part.basis
+        local = np.asarray(basis.elem.doflocs, dtype=float).T
+        # on an edge of the boundary all that is left of the inner vertices is their ratio
+        within = local + _INWARD * ((1 / 2 if self._corners == 4 else 1 / 3) - local)
+        values = self._recovered(stress, within, np.asarray(basis.mapping.F(local)))
+        nodes = self._part.same[basis.element_dofs.T].ravel()
+        count = self._part.X.shape[1]
+        sums = np.stack([np.bincount(nodes, one.ravel(), count) for one in values])
+        return np.asarray(
+            (sums / np.maximum(np.bincount(nodes, minlength=count), 1))[:, self._part.same]
+        )
+
+    def _recovered(self, stress: Array, local: Array, x: Array) -> Array:
+        """Return the recovered stress at x (2, n_elements, n), with the weights of local points."""
+        out = np.zeros((len(stress), *x.shape[1:]))
+        total = np.zeros(x.shape[1:])
         fitted, scale = self._fitted(stress)
         vertices, taken = self._vertices, self._taken
-        for k, hat in enumerate(_hats(self._X, self._corners)):
+        for k, hat in enumerate(_hats(local, self._corners)):
             vertex = self._part.basis.mesh.t[k]
-            local = (self.x - vertices[:, vertex, None]) / scale[:, vertex, None]
+            away = (x - vertices[:, vertex, None]) / scale[:, vertex, None]
             share = hat * taken[k][:, None]
-            value = np.einsum("keq,eck->ceq", _polynomial(local, self._degree), fitted[vertex])
+            value = np.einsum("keq,eck->ceq", _polynomial(away, self._degree), fitted[vertex])
             out += share * value
             total += share
         return out / total

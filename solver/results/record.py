@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -54,3 +55,7 @@ class Record:
     scalars: Mapping[str, float] = field(default_factory=dict)
     symmetric: bool = False
     mesh: Callable[[], MeshFields] | None = field(default=None, compare=False)
+
+    def with_one_mesh(self) -> Record:
+        """Return the record with fields at the nodes that are computed once."""
+        return self if self.mesh is None else replace(self, mesh=cache(self.mesh))

@@ -24,7 +24,6 @@ from studies.execution.proof import Proof, proof_of
 from studies.execution.result import result
 from studies.execution.task import PathTask, walk
 from studies.execution.watch import Waiting
-from studies.storage import dataset as layout
 from studies.storage.store import Store
 
 DEFAULT = Limits()
@@ -134,6 +133,8 @@ def run_study(
         where its workers would call it too
     StoreFull
         when the disk is full; with room, the same call computes the rest
+    FileDiffers
+        when no file says what was computed, not even that of a run that failed
     GridLost
         when the scheduler is gone, or no worker took the work for too long; the same call
         computes the rest
@@ -281,8 +282,7 @@ class _Work:
             if case.id in stored:
                 self._keep(task.path.id, [stored[case.id]])
             elif error is not None:
-                broken = layout.broken_dataset(task.scene, case, str(error))
-                self._keep(task.path.id, [self.store.write_run(broken)])
+                self._keep(task.path.id, [self.store.write_run(case, str(error))])
 
     def _progress(self) -> float:
         """Return the fraction of the study that is done, runs found finished included."""

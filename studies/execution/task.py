@@ -15,7 +15,6 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
 from studies.errors import StoreFull, StudyError
 from studies.execution.proof import Proof, Unfit
-from studies.storage import dataset as layout
 from studies.storage.store import Store
 
 NO_RECORD = "the scene ended its loading path without a record of this run"
@@ -71,12 +70,15 @@ def walk(
 
     A run whose file exists is not computed again: where a worker died, the next one continues.
     When the scene raises an error, the runs that have no record yet are written as broken, with
-    the error as their message. A record that cannot be written breaks its own run only.
+    the error as their message. A record that cannot be written, or whose file would say something
+    else, breaks its own run only.
 
     Raises
     ------
     StoreFull, StudyError
         when nothing can be written to the store, which is no run's fault
+    FileDiffers
+        when not even the file of a broken run says what it should
     """
     if task.proof is not None:
         task.proof.check(should_stop)
@@ -129,17 +131,17 @@ def walk(
     except Exception as error:
         reason = _reason(error)
     for case in owed.values():
-        keep(store.write_run(layout.broken_dataset(task.scene, case, reason)))
+        keep(store.write_run(case, reason))
 
 
 def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:
     """Write the run a record tells of, as broken when the record cannot be written."""
     try:
-        return store.write_run(layout.run_dataset(task.scene, case, record, task.keep))
+        return store.write_run(case, record, task.keep)
     except (StoreFull, StudyError):
         raise
     except Exception as error:
-        return store.write_run(layout.broken_dataset(task.scene, case, _reason(error)))
+        return store.write_run(case, _reason(error))
 
 
 def _reason(error: Exception) -> str:

@@ -92,16 +92,6 @@ def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     return chosen
 
 
-def singles(run: xr.Dataset) -> dict[str, Any]:
-    """Return the variables of a run that have one value."""
-    rank = run["status"].ndim
-    return {
-        str(name): each.item()
-        for name, each in run.data_vars.items()
-        if each.ndim == rank and not ugrid.owns(str(name), each.dims)
-    }
-
-
 def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the catalogue keeps of a run: identity, outcome, parameters and figures.
 

@@ -9,9 +9,10 @@ studies/<study id>/made.json  what it was made of, and what was made of it
 catalogue.sqlite              made anew from the files when it is missing or damaged
 unreadable/                   files that were damaged or in a wrong place
 ```
-A file appears under its name only when it is complete. The file of a run is believed as long as
-its checksum is right and its id is its name; it is verified in full when a study relies on it, and
-when its length or time of change is not what the catalogue noted.
+A file appears under its name only when it is complete; that of a run, when it has been read back
+and says what was computed. It is believed as long as its checksum is right and its id is its name;
+it is verified in full when a study relies on it, and when its length or time of change is not what
+the catalogue noted.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from solver.results.record import Record
 from solver.scenes import Scene
+from studies.definition.cases import Case
 from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.errors import CatalogueDamaged, RunUnreadable, Unusable
@@ -37,10 +40,8 @@ from studies.storage import runfile, shelf
 from studies.storage.appearing import appearing
 from studies.storage.catalogue import Catalogue, Row
 from studies.storage.lock import locked
+from studies.storage.readback import verified
 from studies.storage.room import needs_room
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 ENGINE: Literal["h5netcdf"] = "h5netcdf"
 """netCDF backend of every file read here; safe with several threads."""
@@ -115,15 +116,32 @@ class Store:
                     part.write_text(json.dumps(study.to_dict(), indent=2) + "\n", encoding="utf-8")
         return directory
 
-    def write_run(self, run: xr.Dataset) -> Row:
-        """Write the file of one run, and return its row for the catalogue."""
-        path = self.run_path(run.attrs["id"])
+    def write_run(self, case: Case, outcome: Record | str, keep: str = "") -> Row:
+        """Write the file of one run, read it back, and return its row for the catalogue.
+
+        Parameters
+        ----------
+        outcome : the record of the run, or why there is none
+        keep : what is kept beyond the results of the scene
+
+        Raises
+        ------
+        FileDiffers
+            when the file does not say what the record says; then there is no file
+        """
+        if isinstance(outcome, str):
+            run = layout.broken_dataset(case.scene, case, outcome)
+        else:
+            outcome = outcome.with_one_mesh()
+            run = layout.run_dataset(case.scene, case, outcome, keep)
+        path = self.run_path(case.id)
         content = runfile.sealed(run)
         with self._writable():
             path.parent.mkdir(parents=True, exist_ok=True)
             with appearing(path) as part:
                 part.write_bytes(content)
-            return layout.summary(run.attrs, layout.singles(run)) | runfile.stamp(path)
+                row = verified(part, case, outcome, keep)
+            return row | runfile.stamp(path)
 
     def read_row(self, run_id: str) -> Row:
         """Return the catalogue's row of a run, read from its file.

@@ -16,9 +16,7 @@ import pytest
 from service.app import create_app
 from service.jobs import Jobs
 from service.settings import Settings
-from solver.scenes import SCENES
 from studies import Store, Study, open_netcdf
-from studies.storage.dataset import broken_dataset
 from tests.architecture.sources import ROOT
 from tests.service.servers import (
     COARSE_PUNCH,
@@ -227,7 +225,7 @@ def test_a_damaged_catalogue_is_made_anew_from_the_runs(tmp_path: Path) -> None:
     study = Study.from_dict(punch_study(frictions=1))
     store = Store(tmp_path)
     case = next(study.cases())
-    store.write_run(broken_dataset(SCENES["punch"], case, "reason"))
+    store.write_run(case, "reason")
     store.catalogue.path.write_text("no catalogue" * 1000)
     create_app(Settings(data=tmp_path))
     assert store.catalogue.ids() == {case.id}

@@ -18,9 +18,7 @@ from service.jobs import Jobs
 from service.pool import Pool
 from service.retention import Keeper
 from service.settings import Settings
-from solver.scenes import SCENES
 from studies import Store, Study
-from studies.storage.dataset import broken_dataset
 from tests.service.test_runner import Scripted
 
 
@@ -44,8 +42,7 @@ class Place:
         content = {"name": name, "scene": "punch", "sweep": {"friction": list(frictions)}}
         study = Study.from_dict(content)
         for case in study.cases():
-            run = broken_dataset(SCENES["punch"], case, "reason")
-            self.store.catalogue.put([self.store.write_run(run)])
+            self.store.catalogue.put([self.store.write_run(case, "reason")])
         (self.store.save_study(study) / "dataset.nc").write_bytes(b"the runs combined")
         if known:
             self.jobs.accept(study.id, study.to_dict(), ids(study))

@@ -17,10 +17,9 @@ from solver.linear import solvers
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import provenance
 from studies.storage.combine import combine
-from studies.storage.dataset import run_dataset
 from studies.views.picking import one_run
 from tests.studies.conftest import compute_here, fake_study
-from tests.studies.fakes import FAKE, record
+from tests.studies.fakes import record
 
 ComputedStudy = tuple[Study, Store]
 
@@ -52,7 +51,7 @@ def test_a_study_is_of_symmetric_bodies_where_all_its_runs_are(
     cases = list(study.cases())
     for case, half in zip(cases, halves, strict=False):
         given = replace(record(case.parameters), symmetric=bool(half))
-        store.write_run(run_dataset(FAKE, case, given))
+        store.write_run(case, given)
     store.save_study(study)
     with open_netcdf(combine(study, store, cases).path) as together:
         assert together.attrs["symmetric"] == told
@@ -69,7 +68,7 @@ def test_what_ran_is_told_of_all_runs_though_others_combine_them(
     ):
         monkeypatch.setattr(solvers, "chosen", lambda name=name: name)
         monkeypatch.setattr(provenance, "_versions", lambda version=version: {"numpy": version})
-        store.write_run(run_dataset(FAKE, case, record(case.parameters)))
+        store.write_run(case, record(case.parameters))
     monkeypatch.undo()
     store.save_study(study)
     with open_netcdf(combine(study, store, cases[:1]).path) as one:

@@ -157,10 +157,7 @@ def test_rows_without_files_are_missing(store: Store, monkeypatch: pytest.Monkey
     """Workers that see another directory report runs that are not here."""
     study = fake_study()
     elsewhere = Store(store.directory.parent / "elsewhere")
-    rows = [
-        elsewhere.write_run(run_dataset(FAKE, case, record(case.parameters)))
-        for case in study.cases()
-    ]
+    rows = [elsewhere.write_run(case, record(case.parameters)) for case in study.cases()]
     monkeypatch.setattr(
         "studies.execution.run._Work.compute", lambda work, *_: work._keep("path", rows)
     )

@@ -20,7 +20,6 @@ from studies import Store, StoreFull, Study, StudyError, run_study
 from studies.definition.identity import solver_hash
 from studies.execution.task import PathTask, walk
 from studies.storage.combine import combine
-from studies.storage.dataset import run_dataset
 from studies.storage.room import Reservoir
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
@@ -165,7 +164,7 @@ def test_a_real_device_without_room_is_told(tmp_path: Path) -> None:
         store = Store(small / "out")
         case = next(fake_study(points=400).cases())
         with pytest.raises(StoreFull, match=r"no room is left in .*small/out"):
-            store.write_run(run_dataset(FAKE, case, record(case.parameters)))
+            store.write_run(case, record(case.parameters))
         (small / "filler").write_bytes(b"")
         with pytest.raises(OSError), (small / "filler").open("wb", buffering=0) as filler:
             while True:

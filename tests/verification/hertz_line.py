@@ -1,4 +1,4 @@
-"""Hertz line contact on matching grids: a cylinder, held by contact alone, on a half-plane."""
+"""Hertz contact on matching grids: a cylinder or a ball, held by contact alone, on a half-space."""
 
 from __future__ import annotations
 
@@ -23,10 +23,27 @@ def exact(size: float = SIZE) -> HertzLine:
     return HertzLine(force=np.pi * _MODULUS / (4 * size), radius=size, modulus=_MODULUS)
 
 
-def press(n: int, element: str = "quad8", thickness: float = 1.0, size: float = SIZE) -> Solution:
+def pressure(x: np.ndarray, kinematics: str, size: float = SIZE) -> np.ndarray:
+    """Return the closed form of the pressure at ``x`` from the middle: cylinder or ball."""
+    if kinematics == "plane_strain":
+        return exact(size).pressure(x)
+    peak = 2 * _MODULUS / (np.pi * size)  # K.L. Johnson (1985), eq. 4.24
+    return np.asarray(peak * np.sqrt(np.maximum(0.0, 1 - x**2)))
+
+
+def press(
+    n: float,
+    element: str = "quad8",
+    thickness: float = 1.0,
+    size: float = SIZE,
+    kinematics: str = "plane_strain",
+) -> Solution:
     """Press with ``n`` elements in the half-width; the growth of the others halves with theirs."""
     h, growth = 1.0 / n, 1 + 1.8 / n
-    fine = np.linspace(0.0, 1.5, round(1.5 * n) + 1)
+    fine = np.arange(round(1.5 * n) + 1) / n
+    mean = exact(size).force / 2 / size
+    if kinematics == "axisymmetric":
+        mean = 4 * _MODULUS / (3 * size) / (np.pi * size**2)  # K.L. Johnson (1985), eq. 4.22
     x = np.concatenate([fine, fine[-1] + graded(size - fine[-1], h, growth, size / 10)[1:]])
     y = graded(size, h, growth, size / 10)
 
@@ -38,12 +55,13 @@ def press(n: int, element: str = "quad8", thickness: float = 1.0, size: float = 
         "material": Material(youngs_modulus=E, poisson_ratio=NU),
         "element": element,
         "thickness": thickness,
+        "kinematics": kinematics,
     }
     cylinder = Body(
         name="cylinder",
         mesh=bent(grid(x, y, cells(element)), bulge),
         supports={"left": "x"},
-        pressure={"top": exact(size).force / 2 / size},
+        pressure={"top": mean},
         **given,
     )
     plane = Body(

@@ -78,6 +78,10 @@ _DECLARED = [
         "difference between what is stored of a run and what is computed anew / its scale",
     ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
+    declare(
+        "audit_error_contact",
+        "estimated error of contact pressure under load, its amount over the contact / force",
+    ),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),
 ]  # fmt: skip
 

@@ -11,6 +11,7 @@ from solver.contact.pressure import contact_pressure
 from solver.contact.system import LEAST
 from solver.fem.error import error_estimate
 from solver.results.audit.bodies import AuditedBody
+from solver.results.audit.contact_error import contact_error
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
@@ -111,6 +112,7 @@ def audit(
     }  # fmt: skip
     figures |= _strength(system, loaded)
     figures |= _discretisation(system, states, loaded.energy.scale)
+    figures["audit_error_contact"] = contact_error(system, loaded)
     strain = strain_of(system, states[1])
     figures["audit_plastic_strain"] = strain.value
     figures["audit_small_sliding"] = max((p.stray.sides for p in pairs if p.stray), default=0.0)
