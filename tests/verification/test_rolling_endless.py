@@ -296,6 +296,17 @@ def test_a_run_without_a_steady_pass_is_rolled_by_increments_and_says_so(monkeyp
     assert many.status is Status.NOT_CONVERGED, "that many would take too long"
 
 
+def test_what_hardens_has_no_limit_but_leaves_small_strain_theory():
+    record = roll(
+        element_size=9.0, load_ratio=6.0, friction=0.05, traction=-0.9,
+        hardening="mixed", hardening_ratio=0.005,
+    )  # fmt: skip
+    assert record.status is Status.OUTSIDE_THEORY
+    assert "plastic strain reaches" in record.message
+    assert "increments" not in record.message
+    assert 0.2 < record.scalars["max_plastic_strain"] < 0.4
+
+
 def test_a_pass_beyond_its_window_is_found_in_a_larger_one(monkeypatch):
     tried = []
     found = rolling_steady.steady_passes
