@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import LimitLoad, NotConverged, WindowTooSmall
+from solver.errors import LimitLoad, NoContact, NotConverged, Spins, WindowTooSmall
 from solver.steady.passing import PARTS, TOLERANCE, passing
+from solver.steady.touching import Touching
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,6 +76,10 @@ def search(
 
     own, largest = (material.hardening_ratio, np.inf) if material.hardens else (0.0, _LARGE)
     found = _tried(exactly, load, guess)
+    if isinstance(found, NoContact):  # an elastic track makes another contact than it will have
+        found = _approached(exactly, load.driven, _LIGHTER, None, found)
+    if isinstance(found, NoContact):
+        _not_spinning(exactly, load)
     # on a track that was rolled, hardening would know of the strain that was gathered without it
     if own < _HARDEST and not before.accumulated.any():
         if isinstance(found, NotConverged):
@@ -82,12 +87,12 @@ def search(
         if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
             above = load.scaled(_HEAVIER[0])
             begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
-            found = _approached(exactly, load, _HEAVIER[1:], begun, found)
+            found = _approached(exactly, load.scaled, _HEAVIER[1:], begun, found)
     else:
         if guess is not None and isinstance(found, NotConverged):  # the guess may be a bad one
             found = _tried(exactly, load)
         if isinstance(found, NotConverged):
-            found = _approached(exactly, load, _LIGHTER, None, found)
+            found = _approached(exactly, load.scaled, _LIGHTER, None, found)
     if isinstance(found, NotConverged):
         raise found
     if found.gathered > largest:
@@ -100,6 +105,24 @@ def _too_much(ratio: float) -> LimitLoad:
     even = f", even if the material hardens by {ratio:.2g} of Young's modulus" if ratio else ""
     much = f"a steady pass adds more than {_LARGE:.0%} of plastic strain{even}"
     return LimitLoad(f"{much}: this counts as the limit")
+
+
+def _not_spinning(exactly: Callable[[Load], Pass], load: Load) -> None:
+    """Raise `Spins` where a wheel is turned by more than full slip bears.
+
+    That may be less than friction times load. Shear on a slope carries a part of the load, and
+    pressure shortens the rim, along which shear does its work.
+    """
+    most = _tried(exactly, load.slipping) if load.moment else None
+    if most is None or isinstance(most, NotConverged):
+        return
+    assert isinstance(most.loading, Touching)
+    borne = most.loading.moment / load.moment
+    if borne < 1.0:
+        much = (
+            f"the wheel spins: where all of its contact slips, it bears {borne:.2%} of the moment"
+        )
+        raise Spins(much, borne, 1.0)
 
 
 def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
@@ -150,18 +173,19 @@ def _fading(
 
 def _approached(
     exactly: Callable[..., Pass],
-    load: Load,
+    eased: Callable[[float], Load],
     shares: tuple[float, ...],
     begun: Pass | NotConverged | None,
     failure: NotConverged,
 ) -> Pass | NotConverged:
     """Return the pass to which other shares of its load lead, or ``failure`` if one is not found.
 
-    ``begun`` is the pass from which they begin, None for a track at rest.
+    ``eased`` gives the load of a share; ``begun`` is the pass from which they begin, None for a
+    track at rest.
     """
     found = begun
     for share in (*shares, 1.0):
         if isinstance(found, NotConverged):
             return failure
-        found = _tried(exactly, load.scaled(share), None if found is None else found.strain)
+        found = _tried(exactly, eased(share), None if found is None else found.strain)
     return failure if found is None else found

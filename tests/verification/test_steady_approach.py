@@ -25,6 +25,8 @@ class Weight:
     def __init__(self, size=1.0):
         self.size = size
 
+    moment = 0.0
+
     def scaled(self, share):
         return Weight(share * self.size)
 
@@ -47,7 +49,7 @@ LOST = LimitLoad("flows without bound")
 
 
 def approached(solve, shares=_LIGHTER, begun=None):
-    return _approached(solve, Weight(), shares, begun, LOST)
+    return _approached(solve, Weight().scaled, shares, begun, LOST)
 
 
 def test_lighter_loads_lead_to_what_seemed_a_limit():
