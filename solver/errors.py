@@ -47,5 +47,13 @@ class WindowTooSmall(NotConverged):
     """A steady pass yields, or touches, as far as its mesh was made for; a larger one may do."""
 
 
+class NoContact(NotConverged):
+    """No contact forces meet the conditions of a contact; on another shape there may be some."""
+
+
 class LimitLoad(NotConverged):
     """The load cannot grow beyond ``reached``: a body flows plastically, or slides off."""
+
+
+class Spins(LimitLoad):
+    """A wheel is turned by more than its contact bears where all of it slips."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
+from solver.errors import LimitLoad, ModelError, NotConverged, Spins, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.results.audit.steady import OfPass, audit_pass
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-_REACHES = (1.0, 1.5, 2.5)
+_REACHES = (1.0, 1.5, 2.5, 4.0)
 """Sizes of the window that are tried, over the usual one."""
 _BY_INCREMENTS = 6.0
 """Track / half-width, where no steady pass is found: as long as that of the published tests."""
@@ -57,7 +57,8 @@ def without_ends(
 
     Where a pass yields or touches beyond the window of its mesh, all begins again with a larger
     one. Where no steady pass is found, the runs that are left are rolled by increments: a wheel
-    that sinks in without end may still go some way, but no prescribed pressure beyond the limit.
+    that sinks in without end may still go some way, but no prescribed pressure beyond the limit,
+    nor a wheel that spins.
     """
     waiting = list(runs)
     rolled = _Rolled(scene, runs[-1])
@@ -67,8 +68,8 @@ def without_ends(
             yield look
         if not isinstance(rolled.error, WindowTooSmall):
             break
-    bears_none = isinstance(rolled.error, LimitLoad) and runs[-1].load == "hertz"
-    if not bears_none and waiting and (others := _stepped(waiting)):
+    none = LimitLoad if runs[-1].load == "hertz" else Spins
+    if not isinstance(rolled.error, none) and waiting and (others := _stepped(waiting)):
         length, side = others[0].length, others[0].element_size
         note = f"{rolled.error}: rolled by increments instead, over {length:.4g} mm"
         note += f" with elements of {side:.3g} mm"

@@ -39,6 +39,17 @@ class Load(Protocol):
     def scaled(self, share: float) -> Load:
         """Return the same load with a share of its forces."""
 
+    def driven(self, share: float) -> Load:
+        """Return the same load, driven or braked by a share of its moment."""
+
+    @property
+    def moment(self) -> float:
+        """Given moment that drives or, if positive, brakes it / radius [N]; 0 where none is."""
+
+    @property
+    def slipping(self) -> Load:
+        """The same load, driven or braked by what full slip bears, if a moment does it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Given:
@@ -54,3 +65,17 @@ class Given:
     def scaled(self, share: float) -> Given:
         """See `Load`."""
         return Given(share * self.force, share * self.u)
+
+    def driven(self, share: float) -> Given:
+        """See `Load`; its shear is no moment."""
+        return self
+
+    @property
+    def moment(self) -> float:
+        """See `Load`."""
+        return 0.0
+
+    @property
+    def slipping(self) -> Given:
+        """See `Load`."""
+        return self

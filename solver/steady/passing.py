@@ -50,14 +50,14 @@ _STALLED = 0.98
 """Ratio of residuals above which a step that was not solved to the end leads nowhere."""
 _FAR_FROM = 0.01
 """Residual, over the first one, above which a pass is far from being found."""
-_STEPS = 40
+_STEPS = 60
 _SHORTEST = 1 / 32
 """Least part of a Newton step."""
 _AWAY = 3.0
 """Growth of the residual that a whole step may cause."""
 _FLOWS, _RUNS = 0.1, 1.0
 """Plastic strain gathered in a pass, above which one that leads nowhere flows without limit, and
-above which any does."""
+above which any does. A material that hardens has no limit: Newton's method has lost its way."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """After so many steps the residual must be smaller than this part of what it was."""
 
@@ -130,7 +130,7 @@ def passing(
     Raises
     ------
     LimitLoad
-        if plastic strain grows without bound
+        if plastic strain grows without bound in a material that does not harden
     WindowTooSmall
         if rows yield where the window begins, or the deepest one yields
     NotConverged
@@ -191,7 +191,7 @@ def passing(
         stalled = krylov == _MOST_KRYLOV and missed and there.size > _STALLED * here.size
         unsolved = here.size > _FAR_FROM * start
         if gathered > _RUNS or (stalled and unsolved and gathered > _FLOWS):
-            raise LimitLoad("plastic strain grows without bound in a steady pass")
+            raise _lost(material, gathered)
         if missed:
             krylov = min(2 * krylov, _MOST_KRYLOV)
         here = there
@@ -234,6 +234,16 @@ def _along(at: Callable[[Array], _At], here: _At, change: Array) -> _At:
     if not tried:
         raise failure
     return tried[0] if tried[0].size < _AWAY * here.size else min(tried, key=lambda a: a.size)
+
+
+def _lost(material: Material, gathered: float) -> NotConverged:
+    """Return that Newton's method was led to this plastic strain, and found no pass there."""
+    if not material.hardens:
+        return LimitLoad("plastic strain grows without bound in a steady pass")
+    return NotConverged(
+        f"no steady pass was found up to a plastic strain of {gathered:.0%}, "
+        "far beyond small strains; the material hardens, this is not its limit"
+    )
 
 
 def _deviation(strain: Array) -> float:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import LimitLoad, NotConverged, WindowTooSmall
+from solver.errors import LimitLoad, NoContact, NotConverged, Spins, WindowTooSmall
 from solver.steady.passing import PARTS, TOLERANCE, passing
+from solver.steady.touching import Touching
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,11 +34,14 @@ if TYPE_CHECKING:
 
 _HARDEST, _SOFTEST = 0.024, 1e-4
 """Slopes of the uniaxial curve / Young's modulus, from which hardening fades away, and to which."""
+_STIFFEST = 0.3
+"""The largest one from which it fades to that of a material, where a pass of `_HARDEST` is not
+found at once. Without hardening such a load is beyond the limit, or too near to it."""
 _SHARE, _SLOWEST = 1 / 3, 0.8
 """Ratio of one slope to the one before: at first, and where a pass is hard to find."""
 _LARGE = 0.3
-"""Plastic strain that a pass gathers, above which a load is at its limit, unless the material
-hardens: less hardening and smaller elements make it more."""
+"""Plastic strain that a pass gathers, above which a load is at its limit if the material does not
+harden: smaller elements make it more."""
 _LIGHTER, _HEAVIER = (0.8, 0.9, 0.95), (1.1, 1.06, 1.03)
 """Of a load, by which one approaches it."""
 _PARTS, _TOLERANCE = 8, 2e-3
@@ -59,8 +63,8 @@ def search(
     Raises
     ------
     LimitLoad, WindowTooSmall, NotConverged
-        as `passing` does; a material that hardens little, or not, is at its limit where it adds
-        more than 30 % of plastic strain
+        as `passing` does; a material that does not harden is at its limit where it adds more than
+        30 % of plastic strain
     """
 
     def exactly(load: Load, guess: Array | None = None) -> Pass:
@@ -70,33 +74,55 @@ def search(
         harder = replace(material, hardening="kinematic", hardening_ratio=ratio)
         return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
 
-    own = material.hardening_ratio if material.hardens else 0.0
+    own, largest = (material.hardening_ratio, np.inf) if material.hardens else (0.0, _LARGE)
     found = _tried(exactly, load, guess)
+    if isinstance(found, NoContact):  # an elastic track makes another contact than it will have
+        found = _approached(exactly, load.driven, _LIGHTER, None, found)
+    if isinstance(found, NoContact):
+        _not_spinning(exactly, load)
     # on a track that was rolled, hardening would know of the strain that was gathered without it
     if own < _HARDEST and not before.accumulated.any():
         if isinstance(found, NotConverged):
-            found = _tried(_fading, partial(eased, load), partial(exactly, load), own, _LARGE)
+            found = _tried(_fading, partial(eased, load), partial(exactly, load), own, largest)
         if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
             above = load.scaled(_HEAVIER[0])
             begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
-            found = _approached(exactly, load, _HEAVIER[1:], begun, found)
+            found = _approached(exactly, load.scaled, _HEAVIER[1:], begun, found)
     else:
         if guess is not None and isinstance(found, NotConverged):  # the guess may be a bad one
             found = _tried(exactly, load)
         if isinstance(found, NotConverged):
-            found = _approached(exactly, load, _LIGHTER, None, found)
+            found = _approached(exactly, load.scaled, _LIGHTER, None, found)
     if isinstance(found, NotConverged):
         raise found
-    if own < _HARDEST and found.gathered > _LARGE:
+    if found.gathered > largest:
         raise _too_much(own)
     return found
 
 
 def _too_much(ratio: float) -> LimitLoad:
-    """Return the limit of a load under which a material of this hardening gathers too much."""
+    """Return the limit of a load under which even a material of this hardening gathers too much."""
     even = f", even if the material hardens by {ratio:.2g} of Young's modulus" if ratio else ""
     much = f"a steady pass adds more than {_LARGE:.0%} of plastic strain{even}"
     return LimitLoad(f"{much}: this counts as the limit")
+
+
+def _not_spinning(exactly: Callable[[Load], Pass], load: Load) -> None:
+    """Raise `Spins` where a wheel is turned by more than full slip bears.
+
+    That may be less than friction times load. Shear on a slope carries a part of the load, and
+    pressure shortens the rim, along which shear does its work.
+    """
+    most = _tried(exactly, load.slipping) if load.moment else None
+    if most is None or isinstance(most, NotConverged):
+        return
+    assert isinstance(most.loading, Touching)
+    borne = most.loading.moment / load.moment
+    if borne < 1.0:
+        much = (
+            f"the wheel spins: where all of its contact slips, it bears {borne:.2%} of the moment"
+        )
+        raise Spins(much, borne, 1.0)
 
 
 def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
@@ -117,16 +143,23 @@ def _fading(
 ) -> Pass:
     """Return the pass to which those of fading hardening lead, in smaller steps where they must.
 
-    None of them may gather more than ``largest``.
+    None of them may gather more than ``largest``. Where the first one is not found, and the
+    material hardens, more hardening fades, with which less flows.
     """
     ratio, share = _HARDEST, _SHARE
+    stiffest = _STIFFEST if own else _HARDEST
     found: Pass | None = None
     while True:
         guess = found.strain if found else None
         last = ratio <= max(own, _SOFTEST)
         next_one = _tried(exactly, guess) if last else _tried(eased, ratio, guess)
         if isinstance(next_one, NotConverged):
-            if found is None or share > _SLOWEST:
+            if found is None:
+                ratio /= _SHARE
+                if ratio > stiffest:
+                    raise next_one
+                continue
+            if share > _SLOWEST:
                 raise next_one
             ratio, share = ratio / share, share**0.5
         elif last:
@@ -140,18 +173,19 @@ def _fading(
 
 def _approached(
     exactly: Callable[..., Pass],
-    load: Load,
+    eased: Callable[[float], Load],
     shares: tuple[float, ...],
     begun: Pass | NotConverged | None,
     failure: NotConverged,
 ) -> Pass | NotConverged:
     """Return the pass to which other shares of its load lead, or ``failure`` if one is not found.
 
-    ``begun`` is the pass from which they begin, None for a track at rest.
+    ``eased`` gives the load of a share; ``begun`` is the pass from which they begin, None for a
+    track at rest.
     """
     found = begun
     for share in (*shares, 1.0):
         if isinstance(found, NotConverged):
             return failure
-        found = _tried(exactly, load.scaled(share), None if found is None else found.strain)
+        found = _tried(exactly, eased(share), None if found is None else found.strain)
     return failure if found is None else found

@@ -31,6 +31,7 @@ class Touching(Loading):
     bound : (n,) of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
     height : displacement of the axle [mm]
+    moment : on the axle / radius, positive when braking [N]
     """
 
     x: Array
@@ -43,6 +44,7 @@ class Touching(Loading):
     bound: Array
     creepage: float
     height: float
+    moment: float
 
     @property
     def pressure(self) -> Array:

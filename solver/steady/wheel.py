@@ -26,7 +26,7 @@ import numpy as np
 from solver.contact.complementarity import change_of, solve_contact
 from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem
-from solver.errors import NotConverged, WindowTooSmall
+from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.steady.rim import flowed
 from solver.steady.touching import Touching
 
@@ -126,10 +126,28 @@ class RollingWheel:
 
     def scaled(self, share: float) -> RollingWheel:
         """See `Load`."""
-        other = copy(self)
+        other = self.driven(share)
         other._force *= share
+        return other
+
+    def driven(self, share: float) -> RollingWheel:
+        """See `Load`."""
+        other = copy(self)
         if other._drive is not None:
             other._drive *= share
+        return other
+
+    @property
+    def moment(self) -> float:
+        """See `Load`."""
+        return self._drive or 0.0
+
+    @property
+    def slipping(self) -> RollingWheel:
+        """See `Load`."""
+        other = copy(self)
+        if self.moment:
+            other._drive, other._creepage = None, float(np.sign(self.moment))
         return other
 
     def on(self, u: Array) -> Touching:
@@ -137,7 +155,7 @@ class RollingWheel:
 
         Raises
         ------
-        NotConverged
+        NoContact, NotConverged
             if no contact forces are found
         """
         track = self._track
@@ -169,6 +187,7 @@ class RollingWheel:
             bound=bound,
             creepage=float(found.rigid[1]) / self._length if turns else self._creepage,
             height=self._known.height,
+            moment=-float(geometry.creeping @ found.forces[len(geometry.at) :]),
         )
 
     def _touch(self, shape: Array) -> tuple[_Geometry, ContactProblem, ContactSolution]:
@@ -179,7 +198,7 @@ class RollingWheel:
             problem = self._problem(geometry, shape, known)
             found = solve_contact(problem, known.status[geometry.at])
             if found is None:
-                raise NotConverged("no contact forces were found in a steady pass")
+                raise NoContact("no contact forces were found in a steady pass")
             before, known = known, self._following(geometry, found)
             if np.abs(known.on_track - before.on_track).max() < _SETTLED * self._force:
                 if (known.status[[0, -1]] != OPEN).any():

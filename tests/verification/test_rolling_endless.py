@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -294,6 +295,47 @@ def test_a_run_without_a_steady_pass_is_rolled_by_increments_and_says_so(monkeyp
     assert record.scalars["travel"] == pytest.approx(6 * record.parameters.half_width)
     (many,) = records((5,), **fields)
     assert many.status is Status.NOT_CONVERGED, "that many would take too long"
+
+
+HEAVY = {"element_size": 7.5, "load_ratio": 10.0, "hardening": "isotropic", "hardening_ratio": 0.1}
+
+
+@pytest.mark.parametrize("traction", [-0.98, 0.99])
+def test_a_heavy_wheel_is_turned_by_almost_all_of_its_friction(traction):
+    """It needs a deep window; on an elastic track no contact bears the larger moment."""
+    record = roll(**HEAVY, traction=traction)
+    assert "increments" not in record.message
+    p = record.parameters
+    force = record.scalars["longitudinal_force"] / (p.friction * p.force)
+    assert force == pytest.approx(traction, abs=0.02)  # along x, on the arm of a pressed rim
+    assert 0.05 < record.scalars["max_plastic_strain"] < 0.2
+
+
+def test_a_wheel_that_is_turned_by_more_than_full_slip_bears_spins():
+    """It is a limit of the moment, whatever the material: full slip itself has its pass."""
+    (record,) = records((1,), **HEAVY, traction=-0.99)
+    assert record.status is Status.LIMIT_LOAD
+    told = re.match(
+        r"the wheel spins: where all of its contact slips, it bears (\S+)% of", record.message
+    )
+    assert told, record.message
+    spinning = RollingParameters(**COARSE | HEAVY, control="creepage", given_creepage=-0.1)
+    track = track_for(spinning, 4.0)
+    (found,) = rolling(track, spinning.linear_material(), load_on(track, spinning, spinning), [1])
+    full = 0.99 * spinning.friction * spinning.force
+    assert -found.loading.moment / full == pytest.approx(float(told[1]) / 100, abs=2e-3)
+    assert -found.loading.moment < 0.995 * full
+
+
+def test_what_hardens_has_no_limit_but_leaves_small_strain_theory():
+    record = roll(
+        element_size=9.0, load_ratio=6.0, friction=0.05, traction=-0.9,
+        hardening="mixed", hardening_ratio=0.005,
+    )  # fmt: skip
+    assert record.status is Status.OUTSIDE_THEORY
+    assert "plastic strain reaches" in record.message
+    assert "increments" not in record.message
+    assert 0.2 < record.scalars["max_plastic_strain"] < 0.4
 
 
 def test_a_pass_beyond_its_window_is_found_in_a_larger_one(monkeypatch):

@@ -25,6 +25,8 @@ class Weight:
     def __init__(self, size=1.0):
         self.size = size
 
+    moment = 0.0
+
     def scaled(self, share):
         return Weight(share * self.size)
 
@@ -47,7 +49,7 @@ LOST = LimitLoad("flows without bound")
 
 
 def approached(solve, shares=_LIGHTER, begun=None):
-    return _approached(solve, Weight(), shares, begun, LOST)
+    return _approached(solve, Weight().scaled, shares, begun, LOST)
 
 
 def test_lighter_loads_lead_to_what_seemed_a_limit():
@@ -115,6 +117,41 @@ def test_it_fades_more_slowly_where_a_pass_is_hard_to_find():
 def test_a_pass_that_is_not_found_however_slowly_it_fades_is_told():
     with pytest.raises(NotConverged, match="lost"):
         faded(hardest_to_find=1e-3)
+
+
+def test_where_a_material_hardens_more_hardening_fades_if_the_hardest_pass_is_not_found():
+    tried = []
+
+    def eased(ratio, guess):
+        tried.append(ratio)
+        if guess is None and ratio < 0.2:
+            raise NotConverged("lost")
+        return SimpleNamespace(strain=ratio, gathered=0.01)
+
+    def exactly(guess):
+        return SimpleNamespace(strain=guess)
+
+    found = _fading(eased, exactly, 0.005, np.inf)
+    np.testing.assert_allclose(tried, _HARDEST * np.array([1, 3, 9, 3, 1, 1 / 3]))
+    assert found.strain == tried[-1]
+    with pytest.raises(NotConverged, match="lost"):
+        _fading(eased, exactly, 0.0, np.inf)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-3])
+def test_only_what_does_not_harden_is_at_its_limit_where_it_gathers_much(monkeypatch, ratio):
+    found = SimpleNamespace(strain=1.0, gathered=0.5)
+    monkeypatch.setattr(steady_search, "passing", lambda *given, **settings: found)
+    steel = Material(
+        youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=500.0,
+        hardening="mixed" if ratio else "none", hardening_ratio=ratio,
+    )  # fmt: skip
+    virgin = SimpleNamespace(accumulated=np.zeros(1))
+    if ratio:
+        assert search(None, steel, Weight(), virgin) is found
+    else:
+        with pytest.raises(LimitLoad, match="more than 30%"):
+            search(None, steel, Weight(), virgin)
 
 
 def test_passes_of_fading_hardening_that_gather_too_much_are_at_their_limit():
