@@ -231,7 +231,7 @@ def find_candidates(
         friction[normal] = interface.friction
         cohesion[normal] = interface.cohesion * pairing.area[at]
         apart[normal] = np.nan_to_num(apart[normal])
-        limit[normal] = interface.shear_strength * pairing.area[at]
+        limit[normal] = interface.shear_limit(pairing, time)[at] * pairing.area[at]
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]

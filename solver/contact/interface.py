@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
+    from solver.fem.heat import HotSurface
     from solver.fem.part import Part
     from solver.fem.rigid import RigidPart
     from solver.fem.surface import Surface
@@ -29,8 +31,10 @@ if TYPE_CHECKING:
 class Interface:
     """A contact pair, as it was declared, on its two parts.
 
-    ``shear_strength`` is the largest shear it carries at any pressure, ``cohesion`` what it carries
-    without pressure [MPa]; ``reference`` is the pairing before loading, which small sliding keeps.
+    ``shear_strength`` is the largest shear it carries at any pressure while no body is hot,
+    ``cohesion`` what it carries without pressure [MPa]; ``hot`` is what heat takes of the yield
+    stress of slave and master; ``reference`` is the pairing before loading, which small sliding
+    keeps.
     """
 
     declared: ContactPair
@@ -40,6 +44,7 @@ class Interface:
     master_surface: Surface
     friction: float
     shear_strength: float
+    hot: tuple[HotSurface | None, HotSurface | None]
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
@@ -83,6 +88,20 @@ class Interface:
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 
+    def shear_limit(self, pairing: Pairing, time: float) -> NDArray[np.float64]:
+        """Return the largest shear (n,) at any pressure at a time [MPa].
+
+        The weaker body is that whose mean shear yield stress under the hat of a vertex is less.
+        """
+        if self.hot == (None, None):
+            return np.full(len(pairing.gap), self.shear_strength)
+        least = np.full(len(pairing.gap), np.inf)
+        for part, hot, rows in zip(self.parts, self.hot, pairing.normal, strict=True):
+            strength = part.body.material.shear_yield_stress
+            left = 1.0 if hot is None else _mean(rows, hot.left(time))
+            least = np.minimum(least, strength * left)
+        return self.declared.shear_limit * least
+
     def slip(
         self,
         pairing: Pairing,
@@ -110,6 +129,18 @@ class Interface:
             )
             return replace(self.reference, gap=self.reference.gap + change)
         return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
+
+
+def _mean(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the means (n,) under the hats of values at a surface's nodes; 1 without a partner.
+
+    ``rows`` (n, 2 n_nodes) are those of gaps: the same means, times the normal.
+    """
+    each = rows.reshape(len(rows), -1, 2)
+    normal = each.sum(axis=1)
+    size = (normal**2).sum(axis=1)
+    along = np.einsum("nkd,nd->nk", each, normal) @ values
+    return np.divide(along, size, out=np.ones(len(rows)), where=size > 0)
 
 
 def surfaces_of(
@@ -170,6 +201,10 @@ def interface_of(
                 "meets the master from outside; check the boundaries and where the bodies are",
             )  # fmt: skip
     strength = min(part.body.material.shear_yield_stress for part in both)
+    limited = not math.isinf(contact.shear_limit)
+    hot = [
+        part.hot(chain) if limited else None for part, (_, chain) in zip(both, sides, strict=True)
+    ]
     return Interface(
         declared=contact,
         slave=slave,
@@ -178,6 +213,7 @@ def interface_of(
         master_surface=master_surface,
         friction=effective_friction(contact.friction),
         shear_strength=contact.shear_limit * strength,
+        hot=(hot[0], hot[1]),
         parts=both,
         reach=reach,
         reference=reference if small else None,

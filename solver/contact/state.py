@@ -106,17 +106,19 @@ class Timing:
     Attributes
     ----------
     untimed : friction that is not known, because vertices touched at unknown times: the sum over
-        increments since the pair was last open
+        increments since the pair was last open, no more than the friction of what sticks
     friction : most friction that its contact could bear since then
     passed : normal force times way of its contact along a surface in an increment / its width, at
         most
     normal : most normal force
+    stuck : friction that the vertices can bear that stick: one that slips bears what it can
     """
 
     untimed: NDArray[np.float64] = field(default_factory=_none)
     friction: NDArray[np.float64] = field(default_factory=_none)
     passed: NDArray[np.float64] = field(default_factory=_none)
     normal: NDArray[np.float64] = field(default_factory=_none)
+    stuck: NDArray[np.float64] = field(default_factory=_none)
 
     @property
     def unknown(self) -> float:
@@ -139,10 +141,11 @@ class Timing:
         """Return the timing after one more increment."""
         closed = now.normal > 0
         return Timing(
-            untimed=np.where(closed, self.untimed + now.untimed, 0.0),
+            untimed=np.where(closed, np.minimum(self.untimed, now.stuck) + now.untimed, 0.0),
             friction=np.where(closed, np.maximum(self.friction, now.friction), 0.0),
             passed=np.maximum(self.passed, now.passed),
             normal=np.maximum(self.normal, now.normal),
+            stuck=now.stuck,
         )
 
 

@@ -10,7 +10,7 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
-from solver.fem.heat import Heat
+from solver.fem.heat import Heat, HotSurface
 from solver.fem.loads import (
     Superposed,
     eigenstrains,
@@ -160,6 +160,10 @@ class Discretisation(Nodes, Part):
     def law(self, time: float) -> Law:
         """Return the law of its points at a time: heat may change it."""
         return self.heat.law(self.body.law, time) if self.heat else self.body.law
+
+    def hot(self, surface: Surface) -> HotSurface | None:
+        """Return what heat takes of the yield stress at a surface; None where it takes nothing."""
+        return HotSurface.of(self, surface.nodes)
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
         """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from solver.errors import ModelError
 from solver.fem.loads import Superposed
 from solver.materials.heated import Heated
 from solver.model.loads import Temperature
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from solver.fem.nodes import Nodes
     from solver.materials import Law
 
@@ -42,10 +46,35 @@ class Heat:
 
     def law(self, cold: Law, time: float) -> Law:
         """Return the law at a time; the cold one as long as nothing has changed."""
-        stiff, strong = 1 - self.modulus.at(time), 1 - self.strength.at(time)
-        for name, share in (("modulus_drop", stiff), ("yield_drop", strong)):
-            if not share.min() >= _LEAST:
-                allowed = f"must be at least {_LEAST:g} at every temperature (time {time:.6g})"
-                raise ModelError(f"1 - {name} * rise", round(float(share.min()), 6), allowed)
+        stiff = _left(self.modulus, "modulus_drop", time)
+        strong = _left(self.strength, "yield_drop", time)
         unchanged = (stiff == 1).all() and (strong == 1).all()
         return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)
+
+
+@dataclass(frozen=True, slots=True)
+class HotSurface:
+    """Losses (n_nodes,) of the yield stress at the nodes of a surface, as shares of it."""
+
+    strength: Superposed
+
+    @classmethod
+    def of(cls, part: Nodes, nodes: NDArray[np.int64]) -> HotSurface | None:
+        """Return what the temperatures of a body do at some of its nodes; None if nothing."""
+        loads = [load for load in part.body.every_load
+                 if isinstance(load, Temperature) and load.yield_drop]  # fmt: skip
+        each = ((load, load.yield_drop * load.at(part.X[:, nodes])) for load in loads)
+        return cls(Superposed.of(len(nodes), each)) if loads else None
+
+    def left(self, time: float) -> NDArray[np.float64]:
+        """Return the share (n_nodes,) of the yield stress that is left at a time."""
+        return _left(self.strength, "yield_drop", time)
+
+
+def _left(lost: Superposed, name: str, time: float) -> NDArray[np.float64]:
+    """Return the shares that are left at a time, or raise `ModelError` where too little is."""
+    share = 1 - lost.at(time)
+    if not share.min() >= _LEAST:
+        allowed = f"must be at least {_LEAST:g} at every temperature (time {time:.6g})"
+        raise ModelError(f"1 - {name} * rise", round(float(share.min()), 6), allowed)
+    return np.asarray(share)

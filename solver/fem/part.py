@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
 
+    from solver.fem.heat import HotSurface
     from solver.fem.loads import Superposed
     from solver.fem.operators import PartOperators
     from solver.fem.surface import Surface
@@ -142,6 +143,11 @@ class Part(ABC):
         """Return the law of its points at a time: heat may change it."""
         del time
         return self.body.law
+
+    def hot(self, surface: Surface) -> HotSurface | None:
+        """Return what heat takes of the yield stress at a surface; None where it takes nothing."""
+        del surface
+        return None
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
         """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""

@@ -34,19 +34,21 @@ class Flow:
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
     ``place`` (x, y) [mm] say what it strained most, ``proves`` whether its material can have no
-    other reason for it than a limit load: it hardens no more, and its stress meets no corner; or
-    the kinematic theorem says so (`collapses`).
+    other reason for it than a limit load: it hardens no more, and its stress meets no corner.
+    ``excludes`` says that the kinematic theorem leaves no equilibrium at this load (`collapses`),
+    from whatever state it is tried.
     """
 
     stiffness: float = 1.0
     body: str = ""
     place: tuple[float, float] = (0.0, 0.0)
     proves: bool = False
+    excludes: bool = False
 
     @property
     def limit(self) -> bool:
         """Whether the step was a plastic mechanism that no hardening resists."""
-        return self.stiffness < _FLOWING and self.proves
+        return self.stiffness < _FLOWING and (self.proves or self.excludes)
 
     def __str__(self) -> str:
         x, y = self.place

@@ -198,7 +198,7 @@ class Increment:
         inner = on_parts(self.system, candidates, candidates.forces)
         forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
         proven = collapses(parts, self.time, moved, forces, responses)
-        return replace(flow, proves=flow.proves or proven)
+        return replace(flow, excludes=proven)
 
     # -- 1, 2: where we are ------------------------------------------------------------------
 

@@ -34,6 +34,11 @@ class Slide:
     ratio: float
 
     @property
+    def excludes(self) -> bool:
+        """Whether no equilibrium exists from another state: not so, with other normal forces."""
+        return False
+
+    @property
     def limit(self) -> bool:
         """Whether no equilibrium exists: where there is a slide, none does (upper bound)."""
         return True

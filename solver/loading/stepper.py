@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     Watch = Callable[[Converged], Any]
 
 
+_NEAR = 8
+"""Way to a load without equilibrium / last part that failed, up to which it is that limit load."""
 _TURN = 0.1
 """Largest rotation of a rigid body in an increment [rad]."""
 _UNTIMED = 0.02
@@ -147,12 +149,16 @@ class Stepper:
         An increment in which a rigid body turns too far is divided: a friction force that turns
         with its surface would be missed. One that fails is halved. One that does not follow contact
         well is halved too, and kept as it is where its halves fail; those after it grow again.
+
+        The last part may fail so near to a limit load that nothing proves it there: then an earlier
+        one tells it, which failed not far ahead where no equilibrium can be.
         """
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
         whole = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
         size = _Size(whole, self.control.max_cuts)
         known, coarse = point.now.timing, None
+        beyond: tuple[float, IncrementFailed] | None = None
         while (now := point.now.state.time) != target:
             close = abs(target - now) <= abs(size.step) * (1 + ROUNDING)
             time = target if close else now + size.step
@@ -161,11 +167,17 @@ class Stepper:
                     point, time, contact=contact or time != target, patient=size.shortest
                 )
             except IncrementFailed as failure:
+                if failure.why.excludes and failure.why.limit:
+                    beyond = time, failure
                 if coarse is None:
                     tally = replace(point.tally, cuts=point.tally.cuts + 1)
                     point = replace(point, tally=self._timed(tally), past=())
                     if not size.failed(time - now):
-                        raise PathEnded(self._ended(failure, point, time), point) from failure
+                        attempted, why = time, failure
+                        near = beyond and abs(beyond[0] - now) <= _NEAR * abs(time - now)
+                        if beyond and near and not failure.why.limit:
+                            attempted, why = beyond
+                        raise PathEnded(self._ended(why, point, attempted), point) from why
                     continue
                 converged = coarse
             else:
@@ -175,6 +187,8 @@ class Stepper:
                     coarse = converged
                     continue
             size.converged(converged.state.time - now)
+            if beyond and abs(target - converged.state.time) <= abs(target - beyond[0]):
+                beyond = None
             past = (*point.past[1 - MEMORY :], point.now.state)
             point, coarse = self._after(point, self._worked(point.now, converged), past), None
             if converged.strayed:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.problem import STICK
 from solver.contact.state import Timing
 
 if TYPE_CHECKING:
@@ -29,7 +30,9 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     """Return the timing of an increment from ``start``.
 
     ``stiffness`` is that of the contact points, elastic [N/mm]: no vertex has more friction than
-    its slip strains out of the bodies around it.
+    its slip strains out of the bodies around it. The slip that counts is that which it would have
+    without friction: one that sticks from the beginning of the increment, before it touches, has
+    none, and has all of its shear from that.
     """
     first, n = 0, candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
@@ -37,15 +40,19 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     if len(candidates.motion) > n:
         bound = candidates.bound(N)
         slips = zip(candidates.slips, candidates.vertices, strict=True)
-        strained = stiffness[n:] * np.abs(np.concatenate([slip[at] for slip, at in slips]))
+        slipped = np.abs(np.concatenate([slip[at] for slip, at in slips]))
+        strained = np.abs(candidates.forces[n:]) + stiffness[n:] * slipped
     unknown = np.where(candidates.untimed, np.minimum(bound, strained), 0.0)
-    found = np.zeros((4, len(system.interfaces)))
+    stuck = np.where((N > 0) & (candidates.status == STICK), bound, 0.0)
+    found = np.zeros((5, len(system.interfaces)))
     for k, (interface, at) in enumerate(zip(system.interfaces, candidates.vertices, strict=True)):
         here = slice(first, first + len(at))
         first += len(at)
         passed = _passed(interface, start.contacts[k], at, N[here], candidates.slips[k])
-        found[:, k] = unknown[here].sum(), bound[here].sum(), passed, N[here].sum()
-    return Timing(untimed=found[0], friction=found[1], passed=found[2], normal=found[3])
+        sums = (each[here].sum() for each in (unknown, bound, N, stuck))
+        found[:, k] = *sums, passed
+    untimed, friction, normal, sticking, way = found
+    return Timing(untimed=untimed, friction=friction, passed=way, normal=normal, stuck=sticking)
 
 
 def _passed(

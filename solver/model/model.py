@@ -11,7 +11,6 @@ import numpy as np
 from solver.errors import ModelError
 from solver.materials.doubts import doubts
 from solver.model.body import Body
-from solver.model.loads import Temperature
 from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
 
@@ -44,9 +43,10 @@ class ContactPair:
     cohesion : shear that contact carries beyond friction [MPa]: the shear is at most ``friction *
         pressure + cohesion``; where the pressure is below the cohesion it stands in its place
     shear_limit : largest contact shear / initial shear yield stress of the weaker body, at any
-        pressure; inf (default) sets no limit, and is all that is allowed where heat lowers the
-        yield stress. Where friction could carry more than the material, the surface layer flows
-        instead of slipping, and its strain grows as the mesh is refined
+        pressure; inf (default) sets no limit. Where heat lowers the yield stress (`Temperature`),
+        it is that of the surfaces at their temperature at the end of the increment. Where friction
+        could carry more than the material, the surface layer flows instead of slipping, and its
+        strain grows as the mesh is refined
     sliding : which point of the master a point of the slave meets, and along which normal.
         ``small``: always the one it faces before loading, as if nothing moved; consistent with
         small strains, and exactly linear between changes of status. ``finite``: the one it faces
@@ -131,19 +131,7 @@ class Model:
                     "shear_limit", contact.shear_limit,
                     "must be inf between elastic bodies: there is no yield stress to refer to",
                 )  # fmt: skip
-            hot = [name for _, (name, _) in sides if self._softens(name)]
-            if hot and not math.isinf(contact.shear_limit):
-                raise ModelError(
-                    "shear_limit", contact.shear_limit,
-                    f"must be inf where heat takes yield stress of {hot[0]!r} (yield_drop): it is "
-                    "a share of the cold one",
-                )  # fmt: skip
         self._check_pairs()
-
-    def _softens(self, name: str) -> bool:
-        """Whether heat lowers the yield stress of a body."""
-        loads = self.body(name).every_load
-        return any(isinstance(load, Temperature) and bool(load.yield_drop) for load in loads)
 
     def _check_pairs(self) -> None:
         """Refuse two thicknesses, a surface paired with itself, and two surfaces paired twice."""

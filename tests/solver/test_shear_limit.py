@@ -7,9 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Material, Model, ModelError, NotConverged, Temperature, solve
+from solver import (
+    Amplitude,
+    Body,
+    ContactPair,
+    Displacement,
+    Material,
+    Model,
+    ModelError,
+    NotConverged,
+    Pressure,
+    Stage,
+    Temperature,
+    solve,
+)
 from solver.contact.problem import STICK
-from solver.mesh import grid
+from solver.fem.heat import HotSurface
+from solver.mesh import grid, mapped
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch import model as punch_model
 from solver.scenes.rolling import ROLLING
@@ -50,22 +64,6 @@ def pushed_block(push, *, block=WEAK, base=STRONG, shear_limit=SHARE, thickness=
     return Model(bodies=bodies, contacts=(pair,))
 
 
-@pytest.mark.parametrize("hot", ["block", "base"])
-def test_a_share_of_the_cold_strength_is_no_limit_in_heat(hot):
-    """Heat may make either body the weaker one."""
-    model = pushed_block(0.5 * FULL)
-    heat = Temperature(rise=300.0, expansion=0.0, yield_drop=1e-3)
-
-    def heated(load, contacts):
-        bodies = (replace(b, loads=(load,) if b.name == hot else ()) for b in model.bodies)
-        return Model(bodies=tuple(bodies), contacts=contacts)
-
-    with pytest.raises(ModelError, match=f"shear_limit = .*: must be inf where heat .* of '{hot}'"):
-        heated(heat, model.contacts)
-    heated(heat, tuple(replace(pair, shear_limit=np.inf) for pair in model.contacts))
-    heated(replace(heat, yield_drop=0.0, modulus_drop=1e-3), model.contacts)
-
-
 FULL = STRENGTH * LENGTH / HEIGHT
 """The push at which the limit is reached everywhere."""
 
@@ -81,6 +79,116 @@ def test_shear_reaches_the_limit_and_no_more(thickness):
     assert ((contact.status > STICK) & (shear > (1 - 1e-6) * STRENGTH)).sum() > 10
     assert contact.tangential.sum() == pytest.approx(-0.98 * FULL * HEIGHT * thickness, rel=1e-7)
     assert solution.audit().passed
+
+
+def heated(model, hot, rise):
+    """Return a model whose body ``hot`` loses 1e-3 of its yield stress with each kelvin."""
+    heat = Temperature(rise=rise, expansion=0.0, yield_drop=1e-3)
+    bodies = (replace(b, loads=(heat,) if b.name == hot else ()) for b in model.bodies)
+    return Model(bodies=tuple(bodies), contacts=model.contacts)
+
+
+@pytest.mark.parametrize("hot", ["block", "base"])
+def test_the_limit_falls_with_the_yield_stress_in_heat(hot):
+    """Either body may be the hot one; 300 K take 0.3 of its strength, and of the limit."""
+    bodies = {"block": WEAK, "base": STRONG} if hot == "block" else {"block": STRONG, "base": WEAK}
+    full = 0.7 * FULL
+    found = solve(heated(pushed_block(0.98 * full, **bodies), hot, 300.0))
+    (interface,), state = found.system.interfaces, found.loaded.state
+    contact = state.contacts[0]
+    shear = np.abs(contact.tangential) / interface.pairing(state.u).area
+    assert shear.max() == pytest.approx(0.7 * STRENGTH, rel=1e-6)
+    assert contact.tangential.sum() == pytest.approx(-0.98 * full * HEIGHT, rel=1e-7)
+    assert found.audit().passed
+    with pytest.raises(NotConverged):
+        solve(heated(pushed_block(1.02 * full, **bodies), hot, 300.0))
+
+
+@pytest.mark.parametrize("hot", ["block", "base"])
+def test_the_limit_is_that_of_each_place(hot):
+    """The temperature rises along the contact: the mean of the limit is that of its middle."""
+    full, base = 0.7 * FULL, WEAK if hot == "base" else STRONG
+    model = heated(pushed_block(0.995 * full, base=base), hot, lambda x: 300.0 + 50.0 * x[0] / 5.0)
+    found = solve(model)
+    (interface,), state = found.system.interfaces, found.loaded.state
+    contact, pairing = state.contacts[0], interface.pairing(state.u)
+    slides = contact.status > STICK
+    x = interface.slave_surface.X[0, interface.slave_surface.vertices]
+    inner = slides & (np.abs(x) < 4.9)
+    shear = np.abs(contact.tangential) / pairing.area
+    limit = SHARE * YIELD_STRESS / np.sqrt(3) * (0.7 - 0.05 * x / 5.0)
+    assert inner.sum() > 5
+    assert shear[inner] == pytest.approx(limit[inner], rel=1e-6)
+    assert found.audit().passed
+
+
+def test_contact_that_is_heated_gives_way():
+    """Pressed and pushed while cold, then heated: shear follows the limit down, and up no more."""
+    first, then = Amplitude([0, 1], [0, 1]), Amplitude([1, 2, 3], [0, 1, 0])
+    cold = pushed_block(0.0)
+    push = (Pressure(boundary="top", value=PRESSURE, amplitude=first),
+            Pressure(boundary="left", value=0.6 * FULL, amplitude=first))  # fmt: skip
+    heat = Temperature(rise=300.0, expansion=0.0, yield_drop=1e-3, amplitude=then)
+    loads = {"block": push, "base": (heat,)}
+    bodies = tuple(replace(b, loads=loads[b.name], pressure={}) for b in cold.bodies)
+    bodies = (bodies[0], replace(bodies[1], material=WEAK))
+    stages = tuple(Stage(name=n, target=t, steps=4) for n, t in
+                   (("pushed", 1.0), ("hot", 2.0), ("cold", 3.0)))  # fmt: skip
+    found = solve(Model(bodies=bodies, contacts=cold.contacts), stages=stages)
+    most = {}
+    for name in ("pushed", "hot", "cold"):
+        _, _, shear = found.contact(stage=name)
+        most[name] = np.abs(shear).max()
+        assert found.audit(name).passed, found.audit(name).violations
+    assert most["pushed"] == pytest.approx(STRENGTH, rel=1e-6)
+    assert most["hot"] == pytest.approx(0.7 * STRENGTH, rel=1e-6)
+    assert most["cold"] < (1 - 1e-3) * STRENGTH
+
+
+@pytest.mark.parametrize("hot", ["wheel", "plane"])
+def test_a_hot_wheel_that_is_dragged_keeps_the_limit(hot):
+    """Surfaces are paired anew, and the heat is steep: the audit finds the same limit."""
+    heat = Temperature(rise=lambda x: 200.0 * np.exp(-(x[0] ** 2) / 0.3), expansion=0.0,
+                       yield_drop=2e-3)  # fmt: skip
+
+    def ring(p):
+        return np.stack([p[0] * np.cos(p[1]), 10.0 + p[0] * np.sin(p[1])])
+
+    loads = {name: (heat,) if name == hot else () for name in ("wheel", "plane")}
+    material = {name: WEAK if name == hot else STRONG for name in loads}
+    moved = Displacement(boundary="left", x=0.02, y=-0.01)
+    angles = np.linspace(-np.pi / 2 - 0.3, -np.pi / 2 + 0.3, 81)
+    x, y = np.linspace(-2.0, 2.0, 61), np.linspace(-4.0, 0.0, 21)
+    wheel = Body(
+        name="wheel",
+        mesh=mapped(grid(np.linspace(6.0, 10.0, 9), angles), ring),
+        material=material["wheel"],
+        loads=(*loads["wheel"], moved),
+    )
+    plane = Body(
+        name="plane",
+        mesh=grid(x, y),
+        material=material["plane"],
+        loads=loads["plane"],
+        supports={"bottom": "xy"},
+    )
+    pair = ContactPair(
+        slave=("plane", "top"), master=("wheel", "right"), friction=0.4, shear_limit=0.5
+    )
+    found = solve(Model(bodies=(wheel, plane), contacts=(pair,)),
+                  stages=(Stage(name="pressed", target=1.0, steps=8),))  # fmt: skip
+    assert found.audit("pressed").passed, found.audit("pressed").violations
+    contact = found.stages["pressed"].state.contacts[0]
+    limited = (contact.status > STICK) & (np.abs(contact.tangential) < 0.39 * contact.normal)
+    assert limited.sum() > 2
+
+
+def test_the_audit_asks_for_the_limit_of_the_hot_surface(monkeypatch):
+    monkeypatch.setattr(
+        HotSurface, "left", lambda self, time: np.ones(self.strength.fields.shape[0])
+    )
+    found = solve(heated(pushed_block(0.9 * FULL), "block", 200.0))
+    assert any(text.startswith("audit_friction_excess") for text in found.audit().violations)
 
 
 def test_a_block_slides_where_the_limit_says():

@@ -194,12 +194,9 @@ class AuditedPair:
     @property
     def _bound(self) -> Array:
         mu = effective_friction(self._pair.friction)
-        strength = min(
-            self._system.model.body(name).material.shear_yield_stress for name in self.bodies
-        )
         limit = np.full(len(self.normal), np.inf)
         if np.isfinite(self._pair.shear_limit):
-            limit = self._pair.shear_limit * strength * self.touching.area
+            limit = self._pair.shear_limit * self.touching.strength * self.touching.area
         normal = np.maximum(self.normal, 0.0)
         # cohesion acts in full where the pressure is larger than it
         cohesion = np.minimum(self._pair.cohesion * self.touching.area, normal)

@@ -17,9 +17,12 @@ from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
 from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.model.loads import Temperature
 from solver.results.audit.plain import load_factor
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from solver.contact.state import State
@@ -78,6 +81,8 @@ class Touching:
     true_gap : (n,) the same on the deformed bodies, from which small sliding may differ [mm]
     slip : (n,) mean slip of the increment [mm]
     way : (n,) mean motion of the slave along the master since the bodies were at rest [mm]
+    strength : (n,) mean shear yield stress of the weaker body under the hat, at the temperature of
+        the state; inf where the pair has no limit of shear [MPa]
     edge : (n,) mean length of the edges at a vertex [mm]
     point_gap : (n_points,) gap of the deformed bodies at points of the slave, inf where no master
         faces it [mm]
@@ -90,6 +95,7 @@ class Touching:
     true_gap: Array
     slip: Array
     way: Array
+    strength: Array
     edge: Array
     point_gap: Array
     point_length: Array
@@ -169,6 +175,33 @@ class Surfaces:
         along = np.abs(np.stack([first[:, 0], last[:, -1]])).argmin(axis=1)
         return np.asarray(ends[[0, 1], along] & ~ends[[0, 1], 1 - along])
 
+    def _weaker(
+        self,
+        time: float,
+        mean: Callable[[Array, Array], Array],
+        on_slave: Callable[[Array], Array],
+        partner: _Partner,
+    ) -> Array:
+        """Return the mean shear yield stress (n,) of the weaker body under the hats [MPa].
+
+        ``mean`` is that under the hats of values at points, ``on_slave`` gives these.
+        """
+        weaker = np.full(len(self.slave.edges) + 1, np.inf)
+        if np.isinf(self.pair.shear_limit):
+            return weaker
+        for (name, _), chain, at_points in (
+            (self.pair.slave, self.slave, on_slave), (self.pair.master, self.master, partner.of),
+        ):  # fmt: skip
+            body = self._system.model.body(name)
+            left = np.ones((1, len(chain.nodes)))
+            for load in body.every_load:
+                if isinstance(load, Temperature) and load.yield_drop:
+                    rise = load.at(self._system.full(name).X[:, chain.nodes])
+                    left -= load_factor(load.amplitude, time) * load.yield_drop * rise
+            strength = body.material.shear_yield_stress
+            weaker = np.fmin(weaker, strength * mean(at_points(left)[0], partner.faces))
+        return weaker
+
     def touching(self, state: State, start: State, normal: Array, tangential: Array) -> Touching:
         """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
         slave, master = self.slave, self.master
@@ -220,6 +253,7 @@ class Surfaces:
             true_gap=mean(true_gap, true.faces) + offset,
             slip=mean((moved * t).sum(axis=0), partner.faces),
             way=mean((since * t).sum(axis=0), partner.faces),
+            strength=self._weaker(state.time, mean, on_slave, partner),
             edge=slave.spacing,
             point_gap=np.where(true.faces > 0, true_gap + offset, np.inf),
             point_length=length,
