@@ -22,6 +22,8 @@ from studies import Store, Study, StudyEvent, open_netcdf
 from studies.storage.dataset import attributes_of
 from tests.studies.conftest import compute_here, fake_study
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 StudyFile = Callable[..., Path]
 PNG = b"\x89PNG\r\n"
 

@@ -17,6 +17,8 @@ from studies.errors import StudyError
 from studies.views.comparison.problem import run_parameters
 from studies.views.plots.captions import setting
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 LEVELS = ("draft", "standard", "fine")
 BY_ACCURACY = [
     ("punch", {}, {"smallest_element", "growth", "load_step"}),

@@ -17,6 +17,8 @@ from studies.execution.estimate import estimate
 from studies.views.tables import runs_table
 from tests.studies.fakes import FAKE
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 LARGE: dict[str, Any] = {
     "name": "large",
     "scene": "fake",

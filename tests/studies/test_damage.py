@@ -29,6 +29,8 @@ from studies.storage.dataset import run_dataset
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ComputedStudy = tuple[Study, Store]
 
 

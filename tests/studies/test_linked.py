@@ -23,6 +23,8 @@ from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import record
 from tests.studies.plots.test_maps import texts_of
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[2]
 
 CASE: dict[str, dict[str, Any]] = {

@@ -17,6 +17,8 @@ from studies.definition.vocabulary import LABEL_ATTRIBUTES
 from studies.scenes.scene import read_scene
 from studies.views.tables import runs_table
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[2]
 FILES = [
     read_scene(ROOT / file)

@@ -14,6 +14,8 @@ from studies import Store, StoreBusy, Study, run_study
 from studies.storage.appearing import appearing
 from tests.studies.conftest import compute_here, fake_study
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[2]
 ComputedStudy = tuple[Study, Store]
 

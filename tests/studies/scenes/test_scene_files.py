@@ -30,6 +30,8 @@ from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
 from tests.studies.scenes.conftest import BLOCKS, blocks, built
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[3]
 FILES = sorted((ROOT / "data/scenes").glob("*.toml"))
 
@@ -195,7 +197,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Study, Sto
         "[sweep]\nmu = [0.0, 0.5]\nwide = {start = 2.0, stop = 4.0, num = 2}\n"
     )
     study, store = Study.from_toml(folder / "study.toml"), Store(folder / "out")
-    assert run_study(study, store, workers=2).ok
+    assert run_study(study, store, workers=1).ok
     with open_study(folder / "out") as dataset:
         yield study, store, dataset
 
