@@ -5,11 +5,13 @@ from __future__ import annotations
 import gc
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from tests.marks import allowed, of_folder
 
 if TYPE_CHECKING:
     from studies import Access
@@ -21,6 +23,21 @@ os.environ["OMP_NUM_THREADS"] = "1"
 # Hundreds of processes import the project: 0.15 s each where none keeps what it has compiled.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of folders in which all do the same, before tests are chosen by marks."""
+    for item in items:
+        for mark in of_folder(item.path):
+            item.add_marker(mark)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Refuse what is dear to a test, and to the fixtures made for it, without the mark for it."""
+    with allowed({mark.name for mark in item.iter_markers()}):
+        return (yield)
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -152,6 +152,7 @@ def computed() -> dict[str, Path]:
     return {}
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path, computed: dict[str, Path]) -> None:
     for folder in ("studies", "scenes"):
@@ -232,6 +233,7 @@ def test_the_results_of_a_page_are_known_by_the_command() -> None:
     assert results(blocks(page)) == {"run a.toml --out b": "b"}
 
 
+@pytest.mark.pages
 def test_the_first_command_that_fails_ends_a_page(tmp_path: Path) -> None:
     (program,) = programs(
         blocks("```console\n$ residua scenes\n$ residua scenes no\n```\n"), tmp_path

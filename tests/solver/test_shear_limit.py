@@ -70,6 +70,7 @@ FULL = STRENGTH * LENGTH / HEIGHT
 """The push at which the limit is reached everywhere."""
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("thickness", [1.0, 3.0])
 def test_shear_reaches_the_limit_and_no_more(thickness):
     solution = solve(pushed_block(0.98 * FULL, thickness=thickness))
@@ -83,6 +84,7 @@ def test_shear_reaches_the_limit_and_no_more(thickness):
     assert solution.audit().passed
 
 
+@pytest.mark.solves
 def test_a_block_slides_where_the_limit_says():
     """Pressure could hold ten times this push."""
     with pytest.raises(NotConverged):
@@ -91,6 +93,7 @@ def test_a_block_slides_where_the_limit_says():
     assert (free.loaded.state.contacts[0].status <= STICK).sum() > 10
 
 
+@pytest.mark.solves
 def test_the_weaker_body_sets_the_limit():
     """Which of the two it is does not matter, nor that the other never yields."""
     for block, base in ((WEAK, STEEL), (STRONG, WEAK)):
@@ -145,6 +148,7 @@ def locked_wheel(shear_limit, element_size):
     return record.scalars["surface_plastic_strain"]
 
 
+@pytest.mark.solves
 def test_a_limit_keeps_the_surface_under_a_locked_wheel_from_shearing():
     """Friction asks for 1.4 k: without a limit one row of elements shears, the finer the more."""
     coarse, fine = (locked_wheel(0.0, size) for size in (4.0, 2.0))

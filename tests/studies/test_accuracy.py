@@ -87,6 +87,7 @@ def test_what_is_left_out_is_completed_beside_the_other_values() -> None:
     assert defaults(scene, {"accuracy": "draft", "element_size": 3.0})["element_size"] == 1.0
 
 
+@pytest.mark.processes
 def test_a_sweep_of_accuracy_stores_the_numbers_of_each_run(tmp_path: Path) -> None:
     study = Study.from_dict(
         {

@@ -80,6 +80,7 @@ def test_a_complete_study_is_told_again_and_nothing_is_made(
     assert told.splitlines()[-3:] == [f"kept {directory / name}" for name in RESULTS]
 
 
+@pytest.mark.processes
 def test_a_complete_study_imports_nothing_that_computes_or_draws(
     complete: tuple[Study, Store], tmp_path: Path
 ) -> None:
@@ -94,6 +95,7 @@ def test_a_complete_study_imports_nothing_that_computes_or_draws(
     assert not HEAVY & set(told.stderr.split())
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["scenes", "punch"]])
 def test_scenes_are_told_without_libraries_that_compute_or_draw(arguments: list[str]) -> None:
     code = (

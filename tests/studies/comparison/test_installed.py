@@ -14,6 +14,8 @@ import pytest
 from tests.architecture.sources import PACKAGES, PROJECT, ROOT, tracked
 from tests.studies.rolled import data_set, written
 
+pytestmark = pytest.mark.processes
+
 BUILD = """
 import sys
 from setuptools import Distribution, find_namespace_packages
