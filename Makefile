@@ -20,7 +20,7 @@ check: setup ## check style and types, and run the tests that compute nothing (9
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m "not solves and not processes and not pages"
 
 test: setup ## run the whole test suite on all cores
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --durations=15
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --durations=15
 
 serve: setup ## start the HTTP service
 	$(BIN)/residua serve

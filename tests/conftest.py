@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.marks import allowed, of_folder
+from tests.marks import LONG, allowed, of_folder
 
 if TYPE_CHECKING:
     from studies import Access
@@ -27,7 +27,8 @@ sys.dont_write_bytecode = False
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of folders in which all do the same, before tests are chosen by marks."""
+    """Put long files first; mark the tests of folders, before tests are chosen by marks."""
+    items.sort(key=lambda item: item.path not in LONG)
     for item in items:
         for mark in of_folder(item.path):
             item.add_marker(mark)

@@ -1,4 +1,4 @@
-"""What tests may cost: ``make check`` runs those that need none of the marks.
+"""What tests cost, and may cost: ``make check`` runs those that need none of the marks.
 
 ``solves`` is for tests that compute a state of a model, ``processes`` for those that start another
 process, ``pages`` for those that run what a page or an example shows, which may do both.
@@ -23,6 +23,25 @@ FOLDERS = {
 }
 """Marks of all tests of a folder."""
 
+
+LONG = {
+    HERE / name
+    for name in (
+        "test_docs.py",
+        "test_examples.py",
+        "service/test_durability.py",
+        "service/test_scenes.py",
+        "service/test_together.py",
+        "verification/test_punch.py",
+        "verification/test_rolling.py",
+        "verification/test_rolling_elastic.py",
+        "verification/test_rolling_endless.py",
+        "verification/test_rolling_table.py",
+        "verification/test_shakedown.py",
+        "verification/test_track_ends.py",
+    )
+}
+"""Files of more than 30 s of CPU: begun first, or one core would wait for them at the end."""
 
 DEAR = {
     "solves": ("solver.loading.increment.Increment.solve", "solver.steady.search.passing"),
