@@ -5,7 +5,7 @@ STAMP := .venv/installed
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test serve lint bench stress stress-service clean
+.PHONY: help setup run check test serve lint bench stress stress-service clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -15,8 +15,12 @@ setup: $(STAMP) ## make the environment .venv, or bring it up to date
 run: setup ## compute the punch study into out/
 	$(BIN)/residua run data/studies/punch.toml --out out
 
+check: setup ## check style and types, and run the tests that compute nothing (90 s)
+	@$(MAKE) lint
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m "not solves and not processes and not pages"
+
 test: setup ## run the whole test suite on all cores
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --durations=15
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --durations=15
 
 serve: setup ## start the HTTP service
 	$(BIN)/residua serve

@@ -5,13 +5,40 @@ from __future__ import annotations
 import gc
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from tests.marks import LONG, allowed, of_folder
+
+if TYPE_CHECKING:
+    from studies import Access
 
 # Workers of the test run share the cores: threads of BLAS would wait for each other. Set before
 # any test loads the library, and inherited by the processes that tests start.
 os.environ["OMP_NUM_THREADS"] = "1"
+
+# Hundreds of processes import the project: 0.15 s each where none keeps what it has compiled.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put long files first; mark the tests of folders, before tests are chosen by marks."""
+    items.sort(key=lambda item: item.path not in LONG)
+    for item in items:
+        for mark in of_folder(item.path):
+            item.add_marker(mark)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Refuse what is dear to a test, and to the fixtures made for it, without the mark for it."""
+    with allowed({mark.name for mark in item.iter_markers()}):
+        return (yield)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -32,4 +59,33 @@ def no_settings_from_outside() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for name in [name for name in os.environ if name.startswith("RESIDUA_")]:
             patch.delenv(name)
+        yield
+
+
+@pytest.fixture(scope="session")
+def lasting_worker() -> Iterator[Access]:
+    """One worker for all studies whose claim is not how workers start and end."""
+    from studies import own_workers
+
+    with own_workers(1) as access:
+        yield access
+
+
+@pytest.fixture(scope="module")
+def one_worker(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Have studies that start one worker take the lasting one: to start it takes 3 s of CPU."""
+    from studies.execution import run
+
+    own_workers = run.own_workers
+
+    @contextmanager
+    def shared(workers: int, memory: str | None = None) -> Iterator[Access]:
+        if (workers, memory) == (1, None):
+            yield request.getfixturevalue("lasting_worker")
+        else:
+            with own_workers(workers, memory) as access:
+                yield access
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "own_workers", shared)
         yield

@@ -1,13 +1,13 @@
 """What the pages show works, as a reader would try it.
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies and scene files of `data`, the studies on the coarsest meshes; so do those of every page
-that has any. ``python`` blocks are
-programs, each in a file of its own, as workers import it; in ``console`` blocks each line
-``$ residua …`` runs and must succeed. A block after ``<!-- no-test -->`` is left out, which only
-those may be that need a server or compute for minutes. A block after
-``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which is. Links lead
-to files and headings that exist, and so do the files a page names.
+studies and scene files of `data`, the studies on the coarsest meshes and with the values that the
+pages look at; so do those of every page that has any. What an earlier page has computed by the
+same command is there already. ``python`` blocks are programs, each in a file of its own, as workers
+import it; in ``console`` blocks each line ``$ residua …`` runs and must succeed. A block
+after ``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
+minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that
+script, which is. Links lead to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
@@ -50,6 +50,13 @@ SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 NAMED = re.compile(r"`((?:solver|studies|service|residua|tests|data|docs|examples)/[a-z0-9_./-]*)`")
+RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
+FEWER = {
+    "ball.toml": ("load_ratio", [1.5, 6.0]),
+    "elastic-punch.toml": ("friction", [0.0, 0.4]),
+    "shaft-hub.toml": ("friction", [0.0, 0.2]),
+}
+"""Axes of studies, and those of their values that the pages look at, with one more."""
 TWO_SCREENS = 110
 """Lines of Markdown that the first page may have."""
 
@@ -126,14 +133,41 @@ def coarse(study: str) -> str:
     return f'{head}[parameters]\naccuracy = "draft"\n{rest}'
 
 
+def shortened(study: str, axis: str, values: list[float]) -> str:
+    """Return a study file with fewer values of an axis."""
+    text, times = re.subn(rf"^{axis} = \[.*\]$", f"{axis} = {values}", study, flags=re.MULTILINE)
+    assert times == 1
+    return text
+
+
+def results(page: list[Block]) -> dict[str, str]:
+    """Return the commands of a page that compute a study, and the directories they write."""
+    commands = [command for block in page if block.runs for command in block.commands]
+    return {command: found["out"] for command in commands if (found := RUN.fullmatch(command))}
+
+
+@pytest.fixture(scope="module")
+def computed() -> dict[str, Path]:
+    """Commands that compute a study, and the directories that they have written."""
+    return {}
+
+
+@pytest.mark.pages
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
+def test_blocks_of_a_page_run(page: Path, tmp_path: Path, computed: dict[str, Path]) -> None:
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
     for study in (tmp_path / "data" / "studies").iterdir():
         study.write_text(coarse(study.read_text()))
+    for name, axis in FEWER.items():
+        study = tmp_path / "data" / "studies" / name
+        study.write_text(shortened(study.read_text(), *axis))
+    found = blocks((ROOT / page).read_text())
+    for command, out in results(found).items():
+        if command in computed:
+            shutil.copytree(computed[command], tmp_path / out)
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    for line, program in programs(blocks((ROOT / page).read_text()), tmp_path):
+    for line, program in programs(found, tmp_path):
         done = subprocess.run(
             [sys.executable, *program],
             cwd=tmp_path,
@@ -145,6 +179,7 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
             check=False,
         )
         assert done.returncode == 0, f"{page}:{line}\n{done.stdout}\n{done.stderr}"
+    computed |= {command: tmp_path / out for command, out in results(found).items()}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
@@ -190,6 +225,15 @@ def test_every_kind_of_block_is_found(tmp_path: Path) -> None:
     assert list(made) == [(last.line, [SNIPPET])]
 
 
+def test_the_results_of_a_page_are_known_by_the_command() -> None:
+    page = (
+        "```console\n$ residua run a.toml --out b\n$ residua run a.toml --out b --dry-run\n```\n"
+        "<!-- no-test -->\n```console\n$ residua run long.toml --out long\n```\n"
+    )
+    assert results(blocks(page)) == {"run a.toml --out b": "b"}
+
+
+@pytest.mark.pages
 def test_the_first_command_that_fails_ends_a_page(tmp_path: Path) -> None:
     (program,) = programs(
         blocks("```console\n$ residua scenes\n$ residua scenes no\n```\n"), tmp_path

@@ -31,12 +31,14 @@ def run(arguments: list[str], folder: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(script: Path, tmp_path: Path) -> None:
     run(["-W", "error", str(script)], tmp_path)
     assert "assert" in script.read_text(), "an example checks what it shows"
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_cells_of_a_notebook_run_after_make_run(notebook: Path, tmp_path: Path) -> None:
     """They run on a coarse and small form of the study that `make run` computes."""

@@ -59,6 +59,7 @@ def declared_by_scenes() -> set[str]:
     return set(told.stdout.split())
 
 
+@pytest.mark.processes
 def test_every_output_is_declared_once_where_its_module_is_read() -> None:
     sources = [(ROOT / m).read_text() for m in modules("solver") if str(m) != HOME]
     names = Counter(name for source in sources for name in declared(source))

@@ -13,6 +13,8 @@ import pytest
 
 from tests.architecture.sources import PACKAGES, PROJECT, ROOT, tracked
 
+pytestmark = pytest.mark.processes
+
 BUILD = """
 import sys
 from setuptools import Distribution, find_namespace_packages

@@ -22,10 +22,13 @@ from studies import Store, Study, StudyEvent, open_netcdf
 from studies.storage.dataset import attributes_of
 from tests.studies.conftest import compute_here, fake_study
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 StudyFile = Callable[..., Path]
 PNG = b"\x89PNG\r\n"
 
 
+@pytest.mark.processes
 def test_run_prints_a_table_and_writes_data_and_picture(
     study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -47,6 +50,7 @@ def test_run_prints_a_table_and_writes_data_and_picture(
     assert len(printed.err.splitlines()) == 4
 
 
+@pytest.mark.processes
 def test_run_with_failed_runs_tells_which_and_why_and_returns_1(
     study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -61,6 +65,7 @@ def test_run_with_failed_runs_tells_which_and_why_and_returns_1(
     assert "0 computed" in capsys.readouterr().out
 
 
+@pytest.mark.processes
 def test_warnings_are_counted_and_told_once_with_their_runs(
     study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -248,6 +253,7 @@ def test_show_takes_a_run_a_study_or_a_directory(
     assert main(["show", str(store.directory / "nowhere")]) == 2
 
 
+@pytest.mark.processes
 def test_the_note_and_the_tags_of_a_study_are_printed_with_it(
     study_file: StudyFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,6 +13,8 @@ import pytest
 from residua.neighbours import NEIGHBOURS, stranger
 from tests.architecture.sources import PACKAGES, ROOT
 
+pytestmark = pytest.mark.processes
+
 
 def started(directory: Path, *path: Path) -> subprocess.CompletedProcess[str]:
     """Run the command where Python looks for packages in the directory first, then on a path."""

@@ -20,6 +20,17 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         server.close()
 
 
+@pytest.fixture(scope="session")
+def lively(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One running service with a worker of its own for all tests that leave the service running.
+
+    They may take down what it starts, which it starts again.
+    """
+    server = Server(tmp_path_factory.mktemp("lively")).start()
+    yield server
+    server.close()
+
+
 @pytest.fixture
 def mortal(tmp_path: Path) -> Iterator[Server]:
     """A service of the test's own with its own workers, to be killed; not started yet."""

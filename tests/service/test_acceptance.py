@@ -13,6 +13,8 @@ import pytest
 from studies import Store, Study, open_netcdf, open_study, run_study
 from tests.service.servers import COARSE_PUNCH, Server
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 STUDY = {
     "name": "acceptance",
     "scene": "punch",

@@ -25,24 +25,22 @@ def seconds_for(server: Server, study: dict[str, Any]) -> float:
     return time.monotonic() - started
 
 
-def test_a_small_study_does_not_wait_for_the_end_of_a_large_one(mortal: Server) -> None:
-    mortal.start()
-    large = mortal.post(large_study("large"))
-    wait_until(lambda: mortal.study(large)["progress"] > 0)
+def test_a_small_study_does_not_wait_for_the_end_of_a_large_one(lively: Server) -> None:
+    large = lively.post(large_study("large"))
+    wait_until(lambda: lively.study(large)["progress"] > 0)
     small = fake_study("small")
     small["sweep"] = {"load_ratio": [0.75]}
-    assert seconds_for(mortal, small) < 15.0
-    assert mortal.study(large)["status"] == "running"
-    assert mortal.study(large)["progress"] < 90.0
-    mortal.client.delete(f"/studies/{large}")
+    assert seconds_for(lively, small) < 15.0
+    assert lively.study(large)["status"] == "running"
+    assert lively.study(large)["progress"] < 90.0
+    lively.client.delete(f"/studies/{large}")
 
 
-def test_what_two_studies_share_is_computed_once(mortal: Server) -> None:
-    mortal.start()
-    names = [mortal.post(large_study(name, paths=6)) for name in ("one", "two")]
+def test_what_two_studies_share_is_computed_once(lively: Server) -> None:
+    names = [lively.post(large_study(name, paths=6, seconds=0.4)) for name in ("one", "two")]
     for study_id in names:
-        assert mortal.finished(study_id)["counts"] == {"ok": 6}
-    assert len(mortal.computed()) == 6
+        assert lively.finished(study_id)["counts"] == {"ok": 6}
+    assert len([line for line in lively.computed() if '"seconds": 0.4' in line]) == 6
 
 
 def test_the_greater_priority_goes_first(mortal: Server) -> None:
@@ -64,36 +62,36 @@ def test_the_greater_priority_goes_first(mortal: Server) -> None:
     assert refused.json()["errors"][0]["field"] == "priority"
 
 
-def test_the_death_of_the_workers_process_is_made_good(mortal: Server) -> None:
-    mortal.start()
-    study_id = mortal.post(large_study("orphaned", paths=12, seconds=0.3))
-    wait_until(lambda: len(mortal.computed()) >= 2)
-    assert mortal.process is not None
-    for child in psutil.Process(mortal.process.pid).children():
+def test_the_death_of_the_workers_process_is_made_good(lively: Server) -> None:
+    before = len(lively.computed())
+    study_id = lively.post(large_study("orphaned", paths=12, seconds=0.3))
+    wait_until(lambda: len(lively.computed()) >= before + 2)
+    assert lively.process is not None
+    for child in psutil.Process(lively.process.pid).children():
         if any("service.pool" in word for word in child.cmdline()):
             child.kill()
-    assert mortal.finished(study_id)["counts"] == {"ok": 12}
+    assert lively.finished(study_id)["counts"] == {"ok": 12}
 
 
-def test_a_lost_queue_is_made_anew_from_the_studies(mortal: Server) -> None:
-    mortal.start()
-    done, failed = mortal.post(fake_study("done")), mortal.post(fake_study("f", behaviour="limit"))
-    ends = {study_id: mortal.finished(study_id) for study_id in (done, failed)}
-    running = mortal.post(large_study("running", paths=30, seconds=0.2))
-    wait_until(lambda: mortal.study(running)["progress"] > 0)
-    queue = mortal.data / "jobs.sqlite"
+def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
+    before = len(lively.computed())
+    done, failed = lively.post(fake_study("done")), lively.post(fake_study("f", behaviour="limit"))
+    ends = {study_id: lively.finished(study_id) for study_id in (done, failed)}
+    running = lively.post(large_study("running", paths=30, seconds=0.2))
+    wait_until(lambda: lively.study(running)["progress"] > 0)
+    queue = lively.data / "jobs.sqlite"
     queue.unlink()
     queue.write_text("no queue" * 1000)
-    seen = [mortal.client.get("/health")]
-    wait_until(lambda: seen.append(mortal.client.get("/health")) or seen[-1].status_code == 200)
+    seen = [lively.client.get("/health")]
+    wait_until(lambda: seen.append(lively.client.get("/health")) or seen[-1].status_code == 200)
     if seen[0].status_code != 200:
         assert seen[0].json()["queue_readable"] is False
     for study_id, end in ends.items():
-        found = mortal.study(study_id)
+        found = lively.study(study_id)
         for part in ("status", "message", "counts", "runs", "sweep"):
             assert found[part] == end[part]
-    assert mortal.finished(running)["counts"] == {"ok": 30}
-    assert len(mortal.computed()) <= 4 + 4 + 30 + 2
+    assert lively.finished(running)["counts"] == {"ok": 30}
+    assert len(lively.computed()) <= before + 4 + 4 + 30 + 2
 
 
 def test_studies_that_nobody_computes_say_so(mortal: Server, tmp_path: Path) -> None:

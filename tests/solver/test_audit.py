@@ -26,6 +26,8 @@ from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
 from tests.verification.bodies import block
 
+pytestmark = pytest.mark.solves
+
 
 @pytest.fixture(scope="module")
 def solution():

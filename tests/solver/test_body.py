@@ -235,6 +235,7 @@ def test_bad_friction_is_refused(friction):
         ContactPair(slave=("a", "top"), master=("b", "top"), friction=friction)
 
 
+@pytest.mark.solves
 def test_unknown_linear_solver_is_refused():
     model = Model(bodies=(square(supports={"left": "xy"}, pressure={"top": 1.0}),))
     with pytest.raises(ModelError, match="linear_solver = 'lapack': must be one of"):

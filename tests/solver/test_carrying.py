@@ -13,6 +13,8 @@ from solver.loading.walker import Walker
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_parameters import RollingParameters
 
+pytestmark = pytest.mark.solves
+
 COARSE = {"track": 24.0, "element_size": 3.0, "growth": 1.4, "press_steps": 3, "unload_steps": 2}
 
 

@@ -11,6 +11,8 @@ from solver.loading.increment import Increment
 from solver.mesh import grid
 from tests.verification.flat_punches import press
 
+pytestmark = pytest.mark.solves
+
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 PRESSURE = 100.0
 LENGTH, HEIGHT = 10.0, 2.0

@@ -11,6 +11,8 @@ from skfem import MeshQuad1
 from solver import Body, ContactPair, Material, Model, Solution, solve
 from solver.mesh import grid
 
+pytestmark = pytest.mark.solves
+
 ELASTIC = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 x = np.linspace(0.0, 10.0, 11)
 

@@ -14,6 +14,8 @@ from solver.materials.doubts import doubts
 from solver.mesh import grid
 from solver.scenes import SCENES
 
+pytestmark = pytest.mark.solves
+
 STEEL = Material(youngs_modulus=1.95e5, poisson_ratio=0.3, yield_stress=350.0)
 IN_GPA = (
     "lower.youngs_modulus = 195: 195000 MPa was probably meant, 195 GPa; yield at a strain of 1.79 "

@@ -68,6 +68,7 @@ def test_those_of_a_track_without_ends_are_told_too(changes: dict[str, Any]) -> 
     assert told.unknowns == len(track.part.free)
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize(
     ("name", "changes", "values"),
     [

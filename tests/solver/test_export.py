@@ -14,6 +14,8 @@ import pytest
 from solver import Body, ContactPair, Material, Model, ModelError, Solution, solve
 from solver.mesh import grid
 
+pytestmark = pytest.mark.solves
+
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
 x = np.linspace(0.0, 2.0, 4)
 

@@ -11,6 +11,8 @@ from solver.results.record import Record
 from solver.scenes import SCENES
 from solver.tensors import COMPONENTS
 
+pytestmark = pytest.mark.solves
+
 SIGNS = {"max": 1.0, "min": -1.0}
 
 

@@ -29,6 +29,8 @@ from solver.model.rigid import arc
 from solver.scenes.rolling import ROLLING
 from tests.verification.bodies import block
 
+pytestmark = pytest.mark.solves
+
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 WALL = {"left": "x", "bottom": "xy"}
 

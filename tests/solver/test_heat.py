@@ -143,6 +143,7 @@ def bar(rise: Any, heat: dict[str, float], material: Any = None, **own: Any) -> 
     return solve(Model(bodies=(body,)), **own)
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("steps", [1, 20])
 def test_a_heated_bar_yields_at_what_is_left_of_its_strength(steps: int) -> None:
     rise, heat = 400.0, {"modulus_drop": 5e-4, "yield_drop": 1e-3}
@@ -157,6 +158,7 @@ def test_a_heated_bar_yields_at_what_is_left_of_its_strength(steps: int) -> None
         assert found.audit().passed, found.audit().violations
 
 
+@pytest.mark.solves
 def test_an_elastic_body_softens_and_comes_back() -> None:
     """Its energy follows its stiffness: the balance of energy is exact."""
     soft = Material(youngs_modulus=E, poisson_ratio=0.3)
@@ -175,6 +177,7 @@ def test_an_elastic_body_softens_and_comes_back() -> None:
     assert audit.figures["audit_energy"] < 1e-9
 
 
+@pytest.mark.solves
 def test_a_temperature_that_leaves_no_stiffness_is_refused() -> None:
     with pytest.raises(ModelError, match=r"1 - modulus_drop \* rise = 0\.04: .* least 0\.05"):
         bar(960.0, {"modulus_drop": 1e-3})

@@ -30,6 +30,8 @@ from solver.loading.slide import spent
 from solver.mesh import grid, mapped
 from solver.model.rigid import arc
 
+pytestmark = pytest.mark.solves
+
 ELASTIC = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 AREA = np.pi * (25.0**2 - 10.0**2)
 FIRST, THEN = Amplitude([0, 1], [0, 1]), Amplitude([1, 2], [0, 1])

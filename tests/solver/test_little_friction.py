@@ -33,6 +33,7 @@ def residual(record):
     return record.fields["residual_profile"][1][0]
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("friction", [1e-3, 1e-4, 1e-5, 1e-7, 1e-9, 1e-13])
 def test_a_free_wheel_rolls_however_small_friction_is(friction):
     """In as many increments as without; residual stress differs by some p0 times friction."""
@@ -45,6 +46,7 @@ def test_a_free_wheel_rolls_however_small_friction_is(friction):
     assert difference < (3 * friction + 1e-6) * COARSE.peak_pressure
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("friction", [1e-5, 1e-9])
 @pytest.mark.parametrize("traction", [-0.9, 0.5, 1.0])
 def test_a_driven_wheel_has_its_share_of_little_friction(friction, traction):
@@ -54,6 +56,7 @@ def test_a_driven_wheel_has_its_share_of_little_friction(friction, traction):
     assert run.scalars["longitudinal_force"] == pytest.approx(force, rel=0.02)
 
 
+@pytest.mark.solves
 def test_the_creepage_of_a_free_wheel_tends_to_a_limit():
     """What turns it tends to nothing, but nothing else does."""
     creepage = [rolled(friction).scalars["creepage"] for friction in (1e-5, 1e-7, 1e-9)]

@@ -15,6 +15,8 @@ from solver.mesh import grid
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
 
+pytestmark = pytest.mark.solves
+
 E, NU, RE = 2.0e5, 0.3, 400.0
 ELASTIC = Material(youngs_modulus=E, poisson_ratio=NU)
 STEEL = Material(youngs_modulus=E, poisson_ratio=NU, yield_stress=RE, hardening="isotropic",

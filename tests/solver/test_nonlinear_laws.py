@@ -405,6 +405,7 @@ def test_layers_of_a_material_without_lateral_contraction_follow_the_curve():
     assert stress[-1] == pytest.approx(450.0, rel=1e-9)
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize(
     ("pull", "iterations", "ends"), [(300.0, 2, NotConverged), (420.0, 40, LimitLoad)]
 )
@@ -425,6 +426,7 @@ IDEAL = TrescaMaterial(
 )  # fmt: skip
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
 def test_a_bar_of_tresca_ends_at_its_limit_load(kinematics):
     """Stress is on an edge; the kinematic theorem proves the limit, which is the yield stress."""
@@ -436,6 +438,7 @@ def test_a_bar_of_tresca_ends_at_its_limit_load(kinematics):
     assert caught.value.reached < 1.0 < caught.value.attempted < 1.01
 
 
+@pytest.mark.solves
 def test_a_tube_of_tresca_ends_at_its_limit_load():
     """Under a pressure of RE ln(outer / inner radius)."""
     tube = Body(name="tube", mesh=grid(np.linspace(10.0, 20.0, 9), np.array([0.0, 1.0, 2.0])),
@@ -447,6 +450,7 @@ def test_a_tube_of_tresca_ends_at_its_limit_load():
     assert 0.99 < caught.value.reached < caught.value.attempted < 1.01
 
 
+@pytest.mark.solves
 def test_an_increment_given_up_below_the_limit_proves_none():
     """At three quarters of the limit load, after two iterations."""
     tube = Body(name="tube", mesh=grid(np.linspace(10.0, 20.0, 9), np.array([0.0, 1.0, 2.0])),

@@ -84,6 +84,7 @@ def test_a_rectangle_that_does_not_fit_is_refused(x, y, why):
         without(plate(), "groove", x, y)
 
 
+@pytest.mark.solves
 def test_a_notched_bar_carries_the_stress_of_what_is_left():
     """Two notches, one on either side: far inside the neck the force is that of the ends."""
     mesh = without(plate(), "one", (1.5, 2.5), (2.0, 3.0))

@@ -32,6 +32,7 @@ def strip(element="quad8", **fields):
     return Body(**(known | fields))
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("element", ["quad4", "quad8", "quad9"])
 def test_uniform_pressure_strains_a_periodic_strip_in_one_direction(element):
     solution = solve(Model(bodies=(strip(element),)))
@@ -45,6 +46,7 @@ def test_uniform_pressure_strains_a_periodic_strip_in_one_direction(element):
     assert stress[0] == pytest.approx(-100.0 * 0.3 / 0.7, rel=1e-9)
 
 
+@pytest.mark.solves
 def test_both_sides_of_the_seam_move_alike():
     part = Discretisation(strip())
     u = solve(Model(bodies=(strip(pressure={"top": 1.0}),))).displacement("strip", "loaded")
@@ -98,6 +100,7 @@ def test_a_contact_surface_across_the_period_is_refused():
         extract(Discretisation(strip(mesh=patch)), "patch")
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("solver", ["auto", "superlu"])
 def test_a_surface_that_supports_hold_bears_contact(solver):
     """A rigid die: all unknowns of its contact surface are held."""

@@ -30,6 +30,7 @@ def test_few_boxes_do_for_the_way_of_a_load():
     assert max(across for _, _, across, _ in boxes) <= 24.0
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("traction", [0.0, 0.5])
 def test_a_window_changes_the_result_by_rounding_alone(traction, monkeypatch):
     if pardiso.library() is None:

@@ -14,6 +14,8 @@ from solver.mesh import graded, grid
 from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc, line
 from solver.results.history import curve
 
+pytestmark = pytest.mark.solves
+
 E, NU = 2.0e5, 0.3
 MODULUS = E / (1 - NU**2)
 ELASTIC = Material(youngs_modulus=E, poisson_ratio=NU)

@@ -33,6 +33,7 @@ def test_a_wheel_has_the_poisson_ratio_of_the_half_space_unless_it_is_given() ->
     assert other.contact_modulus == pytest.approx(1 / (one + two), rel=1e-12)
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("track", ["endless", 10.0])
 def test_a_wheel_of_another_poisson_ratio_has_the_pressure_of_hertz_and_creeps(track: Any) -> None:
     soft = rolled(track=track, wheel_poisson_ratio=0.0)
@@ -43,6 +44,7 @@ def test_a_wheel_of_another_poisson_ratio_has_the_pressure_of_hertz_and_creeps(t
     assert abs(rolled(track=track).scalars["creepage"]) < 0.02 * strain
 
 
+@pytest.mark.solves
 def test_a_small_half_space_is_another_problem() -> None:
     small, large = (rolled(track=10.0, half_space_size=size, load_ratio=2.7).scalars
                     for size in (10.0, 400.0))  # fmt: skip
@@ -79,6 +81,7 @@ def test_the_usual_wheel_is_recorded_where_it_was_and_a_small_one_more_densely()
     assert np.diff(small.s).max() < RollingParameters(radius=20.0, load_ratio=1.0).half_width / 30
 
 
+@pytest.mark.solves
 def test_friction_may_be_above_one_but_not_without_bound() -> None:
     rough = rolled(friction=1.5, traction=0.2, load_ratio=1.5)
     assert rough.scalars["longitudinal_force"] != 0.0

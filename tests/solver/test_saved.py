@@ -14,6 +14,7 @@ from solver.results import saved
 from tests.solver.test_export import pressed
 
 
+@pytest.mark.solves
 def test_a_loaded_solution_answers_as_the_saved_one(tmp_path: Path) -> None:
     before = pressed("quad8")
     before.save(tmp_path / "pressed.solution")
@@ -49,6 +50,7 @@ def test_other_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         Solution.load(path)
 
 
+@pytest.mark.solves
 def test_a_model_that_cannot_be_stored_says_why_and_writes_nothing(tmp_path: Path) -> None:
     x = np.linspace(0.0, 1.0, 2)
     steel = Material(youngs_modulus=2e5, poisson_ratio=0.3)

@@ -102,6 +102,7 @@ def test_steady_passes_refuse_what_they_do_not_know(name: str) -> None:
     assert refusal.value.field in own
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("name", LAWS)
 def test_the_punch_is_pressed_and_released_with_each_law(name: str) -> None:
     scene = SCENES["punch"]
@@ -111,6 +112,7 @@ def test_the_punch_is_pressed_and_released_with_each_law(name: str) -> None:
     assert record.scalars["audit_law"] < 1e-8
 
 
+@pytest.mark.solves
 def test_without_friction_tresca_lets_the_half_plane_yield_in_plane_stress_alone() -> None:
     # published: none with von Mises; with Tresca a little in plane stress, none in plane strain
     scene = SCENES["punch"]
@@ -128,6 +130,7 @@ def test_without_friction_tresca_lets_the_half_plane_yield_in_plane_stress_alone
     assert strains["tresca", "plane_stress"] > 0.0
 
 
+@pytest.mark.solves
 def test_no_tangent_in_a_corner_of_the_yield_surface_is_no_limit_load() -> None:
     # a punch without hardening bears this load; on fine meshes whole elements stand in corners
     scene = SCENES["punch"]

@@ -68,6 +68,7 @@ FULL = STRENGTH * LENGTH / HEIGHT
 """The push at which the limit is reached everywhere."""
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("thickness", [1.0, 3.0])
 def test_shear_reaches_the_limit_and_no_more(thickness):
     solution = solve(pushed_block(0.98 * FULL, thickness=thickness))
@@ -191,6 +192,7 @@ def test_the_audit_asks_for_the_limit_of_the_hot_surface(monkeypatch):
     assert any(text.startswith("audit_friction_excess") for text in found.audit().violations)
 
 
+@pytest.mark.solves
 def test_a_block_slides_where_the_limit_says():
     """Pressure could hold ten times this push."""
     with pytest.raises(NotConverged):
@@ -199,6 +201,7 @@ def test_a_block_slides_where_the_limit_says():
     assert (free.loaded.state.contacts[0].status <= STICK).sum() > 10
 
 
+@pytest.mark.solves
 def test_the_weaker_body_sets_the_limit():
     """Which of the two it is does not matter, nor that the other never yields."""
     for block, base in ((WEAK, STEEL), (STRONG, WEAK)):
@@ -253,6 +256,7 @@ def locked_wheel(shear_limit, element_size):
     return record.scalars["surface_plastic_strain"]
 
 
+@pytest.mark.solves
 def test_a_limit_keeps_the_surface_under_a_locked_wheel_from_shearing():
     """Friction asks for 1.4 k: without a limit one row of elements shears, the finer the more."""
     coarse, fine = (locked_wheel(0.0, size) for size in (4.0, 2.0))

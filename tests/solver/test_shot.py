@@ -11,6 +11,8 @@ from solver.loading.control import PathControl
 from solver.mesh import graded, grid
 from solver.model.rigid import Moved, RigidBody, arc
 
+pytestmark = pytest.mark.solves
+
 STEEL = Material(youngs_modulus=2.1e5, poisson_ratio=0.3, yield_stress=600.0,
                  hardening="isotropic", hardening_ratio=0.01)  # fmt: skip
 ALUMINIUM = Material(youngs_modulus=7e4, poisson_ratio=0.33)

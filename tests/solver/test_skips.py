@@ -11,6 +11,8 @@ import pytest
 from tests.architecture.sources import ROOT
 from tests.benchmarks.skips import SKIPS, STEADY, Skip, apart
 
+pytestmark = pytest.mark.solves
+
 
 @pytest.mark.parametrize("skip", SKIPS, ids=lambda skip: skip.what.replace(" ", "_"))
 def test_what_is_left_out_changes_no_number(skip: Skip) -> None:
@@ -27,6 +29,7 @@ def test_a_steady_pass_strains_as_one_by_increments() -> None:
     assert apart(short, whole) <= STEADY.apart
 
 
+@pytest.mark.processes
 def test_a_run_by_increments_does_not_wait_for_the_compiler_of_steady_passes() -> None:
     """Importing it takes as long as a small run."""
     program = (

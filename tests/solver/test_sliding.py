@@ -89,6 +89,7 @@ def slid(way: float, sliding: str = "auto") -> Solution:
     return solve(Model(bodies=(block(),), rigid=(plate(STRAIGHT, way),), contacts=(pair,)))
 
 
+@pytest.mark.solves
 def test_surfaces_that_slide_by_more_than_an_element_are_outside_small_sliding() -> None:
     """Elements of 0.5 mm; the plate is from -2 to 2, and ends press most."""
     audit = slid(0.8, "small").audit()
@@ -102,6 +103,7 @@ def test_surfaces_that_slide_by_more_than_an_element_are_outside_small_sliding()
         assert within.outside == within.warnings == ()
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("way", [0.01, 0.8, 9.0])
 def test_straight_surfaces_are_paired_anew_once_they_move_far(way: float) -> None:
     """Half an element is far. What is pressed under the block moves with it."""
@@ -133,6 +135,7 @@ def test_straight_surfaces_are_paired_anew_once_they_move_far(way: float) -> Non
         assert np.linalg.norm(found.stress(body, "loaded") - stress) < 0.01 * np.linalg.norm(stress)
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("slave", ["ball", "space"])
 def test_curved_surfaces_are_warned_of_where_small_sliding_changes_the_pressure(
     slave: str,

@@ -10,6 +10,8 @@ import pytest
 from solver import Body, ContactPair, Material, Model, ModelError, PathControl, Solution, solve
 from solver.mesh import grid
 
+pytestmark = pytest.mark.solves
+
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
 PRESSURE = 100.0
 

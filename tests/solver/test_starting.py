@@ -12,6 +12,8 @@ from solver.mesh import grid, mapped
 from solver.scenes.punch import PUNCH
 from tests.verification.bodies import block, steel
 
+pytestmark = pytest.mark.solves
+
 E_MODULUS, SIDE = 2.0e5, 4.0
 CONTROL = PathControl(load_step=0.5, unload_steps=2)
 

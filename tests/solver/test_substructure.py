@@ -10,6 +10,8 @@ import pytest
 from solver import ContactPair, Model, PathControl, System, solve
 from solver.scenes.punch import PunchParameters, model
 
+pytestmark = pytest.mark.solves
+
 COARSE = PunchParameters(
     smallest_element=0.02, growth=2.0, elastic_punch=True, friction=0.3, load_ratio=0.6
 )

@@ -25,6 +25,8 @@ from solver.mesh import grid
 from solver.results.audit.theory import LARGE_STRAIN, largest_strain
 from solver.scenes import Scene
 
+pytestmark = pytest.mark.solves
+
 SOFT = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=200.0,
                 hardening="isotropic", hardening_ratio=0.01)  # fmt: skip
 

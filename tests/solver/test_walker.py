@@ -36,6 +36,8 @@ from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
 from tests.solver.laws import CURVES, LAYERED, STEEL, StoredCentre, chaboche, steel
 
+pytestmark = pytest.mark.solves
+
 COARSE = PunchParameters(smallest_element=0.05, growth=1.8, friction=0.3)
 CONTROL = PathControl(load_step=0.1, unload_steps=2)
 

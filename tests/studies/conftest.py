@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,15 +49,16 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Store]:
     return study, store
 
 
+def write_study(folder: Path, text: str = "", **fixed: Any) -> Path:
+    """Write a study file of the fake scene, or a text, into a folder."""
+    path = folder / "study.toml"
+    lines = [f"{name} = {value!r}" for name, value in fixed.items()]
+    head = 'name = "fake"\nscene = "fake"\n[parameters]\n' + "\n".join(lines)
+    path.write_text(text or f"{head}\n[sweep]\nload_ratio = [0.3, 0.9]\nfriction = [0, 0.4]\n")
+    return path
+
+
 @pytest.fixture
 def study_file(tmp_path: Path) -> Callable[..., Path]:
     """Write a study file of the fake scene."""
-
-    def write(text: str = "", **fixed: Any) -> Path:
-        path = tmp_path / "study.toml"
-        lines = [f"{name} = {value!r}" for name, value in fixed.items()]
-        head = 'name = "fake"\nscene = "fake"\n[parameters]\n' + "\n".join(lines)
-        path.write_text(text or f"{head}\n[sweep]\nload_ratio = [0.3, 0.9]\nfriction = [0, 0.4]\n")
-        return path
-
-    return write
+    return partial(write_study, tmp_path)

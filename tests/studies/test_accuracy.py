@@ -16,6 +16,8 @@ from studies.definition.parameters import completed, defaults, parameters_of, sc
 from studies.errors import StudyError
 from studies.views.plots.captions import setting
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 LEVELS = ("draft", "standard", "fine")
 BY_ACCURACY = [
     ("punch", {}, {"smallest_element", "growth", "load_step"}),
@@ -83,6 +85,7 @@ def test_what_is_left_out_is_completed_beside_the_other_values() -> None:
     assert defaults(scene, {"accuracy": "draft", "element_size": 3.0})["element_size"] == 1.0
 
 
+@pytest.mark.processes
 def test_a_sweep_of_accuracy_stores_the_numbers_of_each_run(tmp_path: Path) -> None:
     study = Study.from_dict(
         {

@@ -17,6 +17,8 @@ from studies.execution.estimate import estimate
 from studies.views.tables import runs_table
 from tests.studies.fakes import FAKE
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 LARGE: dict[str, Any] = {
     "name": "large",
     "scene": "fake",
@@ -31,6 +33,7 @@ def statuses(outcome: Any) -> list[str]:
         return [str(status) for status in dataset["status"].values.ravel()]
 
 
+@pytest.mark.processes
 def test_a_run_outside_theory_is_not_ok_and_has_its_numbers(store: Store) -> None:
     outcome = run_study(LARGE, store, workers=1)
     assert not outcome.ok
@@ -42,12 +45,14 @@ def test_a_run_outside_theory_is_not_ok_and_has_its_numbers(store: Store) -> Non
         assert np.isfinite(dataset["peak_contact_pressure"]).all()
 
 
+@pytest.mark.processes
 def test_it_is_not_computed_again_as_it_would_be_the_same(store: Store) -> None:
     run_study(LARGE, store, workers=1)
     assert run_study(LARGE, store, workers=1).computed == []
     assert estimate(Study.from_dict(LARGE), store).to_compute == 0
 
 
+@pytest.mark.processes
 def test_a_study_that_allows_large_strain_takes_it_as_ok_and_computes_nothing(
     store: Store,
 ) -> None:
@@ -68,12 +73,14 @@ def test_a_study_that_allows_large_strain_takes_it_as_ok_and_computes_nothing(
     assert {row["status"] for row in store.catalogue.runs()[0]} == {"ok", "outside_theory"}
 
 
+@pytest.mark.processes
 def test_events_tell_the_status_as_the_study_takes_it(store: Store) -> None:
     events: list[StudyEvent] = []
     run_study(ALLOWED, store, workers=1, on_event=events.append)
     assert [event.status for event in events if event.kind == "run"] == ["ok", "ok"]
 
 
+@pytest.mark.processes
 def test_the_command_lists_them_and_returns_1_unless_they_are_allowed(
     study_file: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -61,6 +61,7 @@ READERS: dict[str, Callable[[Catalogue], Any]] = {
 }
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS.keys())
 def test_the_first_reader_after_a_killed_writer_sees_what_was_committed(
     wounded: Catalogue, read: Callable[[Catalogue], Any]
@@ -69,6 +70,7 @@ def test_the_first_reader_after_a_killed_writer_sees_what_was_committed(
     assert wounded.ids() == {"0"}
 
 
+@pytest.mark.processes
 def test_many_first_readers_after_a_killed_writer_all_see_what_was_committed(
     wounded: Catalogue,
 ) -> None:
@@ -77,6 +79,7 @@ def test_many_first_readers_after_a_killed_writer_all_see_what_was_committed(
     assert found == [([row("0")], 1)] * 64
 
 
+@pytest.mark.processes
 def test_a_writer_goes_on_after_a_killed_one(wounded: Catalogue) -> None:
     wounded.put([row("1")])
     assert wounded.ids() == {"0", "1"}

@@ -29,6 +29,8 @@ from studies.storage.dataset import run_dataset
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ComputedStudy = tuple[Study, Store]
 
 
@@ -292,6 +294,7 @@ def test_a_run_that_is_deleted_is_gone_with_its_row(damaged: ComputedStudy) -> N
     assert store.catalogue.runs()[1] == 3
 
 
+@pytest.mark.processes
 def test_a_repeat_that_stops_leaves_failed_runs_and_the_data_set_as_they_were(
     store: Store,
 ) -> None:
@@ -342,6 +345,7 @@ def test_a_repeat_replaces_old_files_once_though_a_worker_dies_in_between(store:
     assert store.modified(ids) == after
 
 
+@pytest.mark.processes
 def test_a_repeat_that_is_stopped_keeps_a_data_set_that_holds_more(
     damaged: ComputedStudy,
 ) -> None:

@@ -19,6 +19,8 @@ from studies.scenes.scene import read_scene
 from studies.storage import ugrid
 from studies.views.reading import open_netcdf
 
+pytestmark = [pytest.mark.processes, pytest.mark.solves, pytest.mark.usefixtures("one_worker")]
+
 PIN = read_scene(Path(__file__).parents[2] / "data/scenes/pin.toml")
 CONTENT: dict[str, Any] = {
     "name": "pins", "parameters": {"clearance": 0.02}, "sweep": {"load_ratio": [0.2, 0.5]},

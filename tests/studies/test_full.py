@@ -24,6 +24,8 @@ from studies.storage.room import Reservoir
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 Limit = Callable[[int], None]
 LIMITED = """

@@ -24,6 +24,7 @@ def product(a: float, word: str) -> dict[str, Any]:
 AXES = {"a": [3.0, -1.0, 2.0], "word": ["one", "bad", "four"]}
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_function_is_swept_over_its_axes(workers: int) -> None:
     found = sweep(product, AXES, workers=workers)

@@ -21,6 +21,8 @@ from studies.execution.grid import Finished, Grid, Message
 from studies.execution.watch import Waiting
 from tests.studies.chores import chatter, freeze, nap, need
 
+pytestmark = pytest.mark.processes
+
 
 @pytest.fixture(scope="module")
 def two() -> Iterator[Access]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,7 +14,7 @@ import pytest
 from residua.cli import main
 from studies import Store, Study, run_study
 from studies.storage import made
-from tests.studies.conftest import compute_here
+from tests.studies.conftest import compute_here, write_study
 from tests.studies.test_damage import true_numbers
 
 ROOT = Path(__file__).parents[2]
@@ -27,13 +28,20 @@ Make = Callable[[], list[str]]
 """Runs the command; returns the names of the files that it has written, not kept."""
 
 
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a study whose command ran to its end, without worker processes."""
+    folder = tmp_path_factory.mktemp("told")
+    compute_here(Study.from_toml(write_study(folder)), Store(folder / "out"))
+    assert main(arguments(folder)) == 0
+    return folder
+
+
 @pytest.fixture
-def complete(study_file: Callable[..., Path], tmp_path: Path) -> tuple[Study, Store]:
-    """A study whose command ran to its end, without worker processes."""
-    study, store = Study.from_toml(study_file()), Store(tmp_path / "out")
-    compute_here(study, store)
-    assert main(arguments(tmp_path)) == 0
-    return study, store
+def complete(told: Path, tmp_path: Path) -> tuple[Study, Store]:
+    """A copy of that study, to be changed."""
+    shutil.copytree(told, tmp_path, dirs_exist_ok=True)
+    return Study.from_toml(tmp_path / "study.toml"), Store(tmp_path / "out")
 
 
 def arguments(folder: Path) -> list[str]:
@@ -80,6 +88,7 @@ def test_a_complete_study_is_told_again_and_nothing_is_made(
     assert told.splitlines()[-3:] == [f"kept {directory / name}" for name in RESULTS]
 
 
+@pytest.mark.processes
 def test_a_complete_study_imports_nothing_that_computes_or_draws(
     complete: tuple[Study, Store], tmp_path: Path
 ) -> None:
@@ -94,6 +103,7 @@ def test_a_complete_study_imports_nothing_that_computes_or_draws(
     assert not HEAVY & set(told.stderr.split())
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["scenes", "punch"]])
 def test_scenes_are_told_without_libraries_that_compute_or_draw(arguments: list[str]) -> None:
     code = (

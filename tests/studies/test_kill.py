@@ -16,6 +16,8 @@ import pytest
 from studies import Limits, Store, Study, StudyEvent, open_netcdf, run_study
 from tests.studies.conftest import fake_study
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 RUNS = 8
 

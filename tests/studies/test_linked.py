@@ -23,6 +23,8 @@ from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import record
 from tests.studies.plots.test_maps import texts_of
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[2]
 
 CASE: dict[str, dict[str, Any]] = {
@@ -302,6 +304,7 @@ def test_what_a_run_lacks_is_no_line_of_a_figure(linked: tuple[Study, Store]) ->
     assert "pass 1" in names[1]
 
 
+@pytest.mark.processes
 def test_run_show_and_plot_speak_of_labels(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,6 +17,8 @@ from studies.execution.task import PathTask, walk
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, INCREMENTS, FakeParameters
 
+pytestmark = [pytest.mark.processes, pytest.mark.usefixtures("one_worker")]
+
 TROUBLES = ["none", "limit", "raise", "die"]
 
 

@@ -17,6 +17,8 @@ from studies.definition.vocabulary import LABEL_ATTRIBUTES
 from studies.scenes.scene import read_scene
 from studies.views.tables import runs_table
 
+pytestmark = [pytest.mark.solves, pytest.mark.usefixtures("one_worker")]
+
 ROOT = Path(__file__).parents[2]
 FILES = [
     read_scene(ROOT / file)
@@ -68,6 +70,7 @@ def records() -> list[Record]:
     return found
 
 
+@pytest.mark.processes
 def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
     both: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -115,6 +118,7 @@ def test_no_variable_is_described_that_no_scene_gives(records: list[Record]) -> 
     assert QUANTITIES.keys() <= given
 
 
+@pytest.mark.processes
 def test_the_table_of_the_punch_fits_the_terminal(both: xr.Dataset) -> None:
     sweep = xr.concat([both.assign_coords(friction=[f]) for f in (0.3, 0.4)], "friction")
     wide = xr.concat(

@@ -31,6 +31,8 @@ from studies import (
 from studies.execution.cluster import connect
 from tests.studies.conftest import fake_study
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 
 

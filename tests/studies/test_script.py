@@ -11,6 +11,8 @@ import pytest
 
 from tests.architecture.sources import ROOT
 
+pytestmark = pytest.mark.processes
+
 STUDY = """
 from studies import Store, run_study
 from tests.studies import fakes

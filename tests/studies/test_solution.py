@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from studies import to_xarray
 from tests.solver.test_export import pressed
+
+pytestmark = pytest.mark.solves
 
 
 def test_a_data_set_has_the_stages_and_all_bodies() -> None:

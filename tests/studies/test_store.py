@@ -14,6 +14,8 @@ from studies import Store, StoreBusy, Study, run_study
 from studies.storage.appearing import appearing
 from tests.studies.conftest import compute_here, fake_study
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[2]
 ComputedStudy = tuple[Study, Store]
 
@@ -48,6 +50,7 @@ def test_the_writer_clears_what_killed_writers_left(store: Store) -> None:
         assert list(runs.iterdir()) == []
 
 
+@pytest.mark.processes
 def test_a_second_writer_is_refused_and_the_lock_dies_with_its_process(store: Store) -> None:
     code = (
         "import sys; from studies import Store\n"
@@ -152,6 +155,7 @@ def test_a_damaged_catalogue_is_made_anew(store: Store) -> None:
         assert store.catalogue.runs() == rows
 
 
+@pytest.mark.processes
 def test_a_run_cut_short_is_no_run_and_is_computed_again(store: Store) -> None:
     study = fake_study()
     first, *others = (case.id for case in study.cases())

@@ -360,6 +360,7 @@ def test_the_ready_study_of_the_punch_is_45_runs_in_15_paths() -> None:
     assert len(list(study.paths())) == 15
 
 
+@pytest.mark.processes
 def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray_nor_scipy() -> None:
     heavy = "('dask', 'distributed', 'matplotlib', 'xarray', 'scipy', 'skfem', 'numba')"
     code = (

@@ -30,6 +30,8 @@ from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
 from tests.studies.scenes.conftest import BLOCKS, blocks, built
 
+pytestmark = pytest.mark.usefixtures("one_worker")
+
 ROOT = Path(__file__).parents[3]
 FILES = sorted((ROOT / "data/scenes").glob("*.toml"))
 
@@ -41,6 +43,7 @@ def run(scene: FileScene, **values: Any) -> Record:
     return record
 
 
+@pytest.mark.solves
 def test_a_block_under_pressure_has_the_stress_of_the_pressure(scene: FileScene) -> None:
     record = run(scene, mu=0.0)
     assert record.status is Status.OK, record.message
@@ -58,6 +61,7 @@ def test_a_block_under_pressure_has_the_stress_of_the_pressure(scene: FileScene)
     assert stress.shape == (1, 1, 4, 11)
 
 
+@pytest.mark.solves
 def test_a_file_declares_singular_points_and_what_is_allowed() -> None:
     """Expressions and all; a study of the scene allows what its file does."""
     tables = blocks()
@@ -118,6 +122,7 @@ def test_the_schema_tells_range_unit_and_meaning(scene: FileScene) -> None:
     assert known["mu"]["description"] == "friction"
 
 
+@pytest.mark.processes
 def test_a_scene_and_its_parameters_reach_other_processes(scene: FileScene) -> None:
     parameters = scene.parameters(mu=0.3)
     same, its = pickle.loads(pickle.dumps((scene, parameters)))
@@ -195,11 +200,12 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Study, Sto
         "[sweep]\nmu = [0.0, 0.5]\nwide = {start = 2.0, stop = 4.0, num = 2}\n"
     )
     study, store = Study.from_toml(folder / "study.toml"), Store(folder / "out")
-    assert run_study(study, store, workers=2).ok
+    assert run_study(study, store, workers=1).ok
     with open_study(folder / "out") as dataset:
         yield study, store, dataset
 
 
+@pytest.mark.processes
 def test_a_study_sweeps_a_file(swept: tuple[Study, Store, xr.Dataset]) -> None:
     study, _, dataset = swept
     assert dict(dataset.sizes) | {"mu": 2, "wide": 2, "fraction": 11} == dict(dataset.sizes)
@@ -215,6 +221,7 @@ def test_a_study_sweeps_a_file(swept: tuple[Study, Store, xr.Dataset]) -> None:
     assert study.scene == study.problem.id and study.problem.name == "blocks"
 
 
+@pytest.mark.processes
 def test_a_data_set_knows_its_scene_without_the_file(
     swept: tuple[Study, Store, xr.Dataset],
 ) -> None:
@@ -226,6 +233,7 @@ def test_a_data_set_knows_its_scene_without_the_file(
     assert scene_schema(known)["properties"]["wide"]["unit"] == "mm"
 
 
+@pytest.mark.processes
 def test_what_a_file_asks_for_is_in_the_table_and_in_pictures(
     swept: tuple[Study, Store, xr.Dataset],
 ) -> None:
@@ -250,6 +258,7 @@ def test_what_a_file_asks_for_is_in_the_table_and_in_pictures(
         picture(dataset, "line_stress", zoom=1.0)
 
 
+@pytest.mark.processes
 def test_a_store_keeps_the_scene_and_gives_it_by_its_id(
     swept: tuple[Study, Store, xr.Dataset],
 ) -> None:
@@ -261,6 +270,7 @@ def test_a_store_keeps_the_scene_and_gives_it_by_its_id(
         Study.known(study.to_dict())
 
 
+@pytest.mark.processes
 def test_a_scene_that_was_changed_in_the_store_is_refused(
     swept: tuple[Study, Store, xr.Dataset], tmp_path: Path
 ) -> None:
@@ -281,6 +291,7 @@ def test_a_scene_that_was_changed_in_the_store_is_refused(
     assert store.scene("../" + study.scene) is None
 
 
+@pytest.mark.processes
 def test_python_takes_a_scene_of_its_own(tmp_path: Path) -> None:
     scene = built(blocks())
     outcome = run_study({"name": "one", "sweep": {"mu": [0.1]}}, Store(tmp_path), scene=scene)
@@ -338,6 +349,7 @@ def test_installed_packages_bring_scenes(monkeypatch: pytest.MonkeyPatch) -> Non
         scene_named("wrong")
 
 
+@pytest.mark.solves
 def test_shared_loading_needs_a_factor_that_stands_alone() -> None:
     tables = blocks()
     del tables["stages"]
@@ -380,6 +392,7 @@ def test_the_work_of_a_run_is_told_from_its_meshes(path: Path) -> None:
     assert effort.increments == scene.program(parameters).count
 
 
+@pytest.mark.processes
 def test_numbers_in_another_unit_reach_the_user(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -398,6 +411,7 @@ def test_numbers_in_another_unit_reach_the_user(
     assert told in found["message"]
 
 
+@pytest.mark.solves
 def test_a_pair_that_never_touches_is_told(scene: FileScene) -> None:
     tables = blocks()
     tables["bodies"]["upper"]["supports"] = {"left": "x"}
@@ -411,6 +425,7 @@ def test_a_pair_that_never_touches_is_told(scene: FileScene) -> None:
     assert "touch" not in run(scene).message
 
 
+@pytest.mark.solves
 def test_a_map_that_a_swept_value_takes_off_the_bodies_ends_the_run() -> None:
     tables = blocks()
     along = {"start": "$at", "stop": "$at + 1", "num": 5}
@@ -422,6 +437,7 @@ def test_a_map_that_a_swept_value_takes_off_the_bodies_ends_the_run() -> None:
         run(scene, at=50.0)
 
 
+@pytest.mark.solves
 def test_press_then_slide_by_two_displacements_of_one_boundary() -> None:
     """They add up, and what is stored is compared with their sum."""
     content = blocks()
@@ -444,6 +460,7 @@ def test_press_then_slide_by_two_displacements_of_one_boundary() -> None:
     assert record.scalars["top_y"] == pytest.approx(-0.003, rel=1e-9)
 
 
+@pytest.mark.solves
 def test_gaps_that_are_rounding_once_the_load_is_off_are_as_stored(scene: FileScene) -> None:
     """No load is left between two cycles: gaps and slips are rounding, and so is their scale."""
     tables = blocks()
@@ -457,6 +474,7 @@ def test_gaps_that_are_rounding_once_the_load_is_off_are_as_stored(scene: FileSc
     assert record.status is Status.OK, record.message
 
 
+@pytest.mark.solves
 def test_a_run_that_stops_is_not_told_that_its_bodies_never_touch() -> None:
     """It stops at its limit load, pressed, before the first stage has ended."""
     tables = blocks()
@@ -468,6 +486,7 @@ def test_a_run_that_stops_is_not_told_that_its_bodies_never_touch() -> None:
     assert "touch" not in record.message
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("share", [0.5, 1.5])
 def test_a_block_pushed_along_by_more_than_friction_bears_is_told_so(share: float) -> None:
     tables = blocks()
@@ -483,6 +502,7 @@ def test_a_block_pushed_along_by_more_than_friction_bears_is_told_so(share: floa
         assert record.message.endswith("push it along by less than friction bears")
 
 
+@pytest.mark.solves
 def test_pressure_at_the_end_of_coarse_arcs_is_as_stored() -> None:
     """Three elements on a quarter: what of the last faces the partner is known to some 1e-6."""
     steel = {"youngs_modulus": 7e4, "poisson_ratio": 0.3}

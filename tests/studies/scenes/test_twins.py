@@ -13,6 +13,8 @@ from solver.mesh.ball import cap_area
 from solver.scenes.ball import BallParameters
 from studies.scenes.scene import read_scene
 
+pytestmark = pytest.mark.solves
+
 HERE = Path(__file__).parent
 
 
