@@ -89,6 +89,7 @@ def heated(model, hot, rise):
     return Model(bodies=tuple(bodies), contacts=model.contacts)
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("hot", ["block", "base"])
 def test_the_limit_falls_with_the_yield_stress_in_heat(hot):
     """Either body may be the hot one; 300 K take 0.3 of its strength, and of the limit."""
@@ -105,6 +106,7 @@ def test_the_limit_falls_with_the_yield_stress_in_heat(hot):
         solve(heated(pushed_block(1.02 * full, **bodies), hot, 300.0))
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("hot", ["block", "base"])
 def test_the_limit_is_that_of_each_place(hot):
     """The temperature rises along the contact: the mean of the limit is that of its middle."""
@@ -123,6 +125,7 @@ def test_the_limit_is_that_of_each_place(hot):
     assert found.audit().passed
 
 
+@pytest.mark.solves
 def test_contact_that_is_heated_gives_way():
     """Pressed and pushed while cold, then heated: shear follows the limit down, and up no more."""
     first, then = Amplitude([0, 1], [0, 1]), Amplitude([1, 2, 3], [0, 1, 0])
@@ -146,6 +149,7 @@ def test_contact_that_is_heated_gives_way():
     assert most["cold"] < (1 - 1e-3) * STRENGTH
 
 
+@pytest.mark.solves
 @pytest.mark.parametrize("hot", ["wheel", "plane"])
 def test_a_hot_wheel_that_is_dragged_keeps_the_limit(hot):
     """Surfaces are paired anew, and the heat is steep: the audit finds the same limit."""
@@ -184,6 +188,7 @@ def test_a_hot_wheel_that_is_dragged_keeps_the_limit(hot):
     assert limited.sum() > 2
 
 
+@pytest.mark.solves
 def test_the_audit_asks_for_the_limit_of_the_hot_surface(monkeypatch):
     monkeypatch.setattr(
         HotSurface, "left", lambda self, time: np.ones(self.strength.fields.shape[0])
