@@ -114,7 +114,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(Gate, settings=settings, keys=keys)
     app.add_middleware(head_is_get)
     app.add_middleware(SecurityHeaders)
-    app.add_middleware(logs.Observed, observe=metrics.observe)
+    app.add_middleware(logs.RequestLog, observe=metrics.observe)
     errors.install(app)
     for router in routes.ROUTERS:
         needs_key = settings.keys_asked and "health" not in router.tags

@@ -16,7 +16,7 @@ COLUMNS = (
 UNREADABLE = "its row in the queue cannot be read: post the study again"
 
 
-class State(StrEnum):
+class StudyState(StrEnum):
     """Where a study stands."""
 
     ACCEPTED = "accepted"
@@ -28,7 +28,7 @@ class State(StrEnum):
     @property
     def final(self) -> bool:
         """Whether the work has ended; only a retry starts it again."""
-        return self not in (State.ACCEPTED, State.RUNNING)
+        return self not in (StudyState.ACCEPTED, StudyState.RUNNING)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class Job:
     name: str
     scene: str
     size: int
-    state: State
+    state: StudyState
     message: str
     progress: float
     since: int
@@ -67,7 +67,7 @@ def job_of(row: sqlite3.Row) -> Job | None:
     found = dict(row)
     try:
         found |= {key: int(found[key]) for key in ("size", "since", "priority")}
-        found |= {"state": State(found["state"]), "progress": float(found["progress"])}
+        found |= {"state": StudyState(found["state"]), "progress": float(found["progress"])}
         if not all(isinstance(found[key], str) for key in ("name", "scene", "message")):
             raise TypeError
     except (ValueError, TypeError):
@@ -76,7 +76,7 @@ def job_of(row: sqlite3.Row) -> Job | None:
     return Job(**found)
 
 
-def wanted(state: State | None = None, tag: str | None = None) -> tuple[str, list[str]]:
+def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str, list[str]]:
     """Return the condition, in SQL, for jobs in a state and of studies with a tag."""
     tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
     asked = {"state = ?": state, tagged: tag}
@@ -85,10 +85,10 @@ def wanted(state: State | None = None, tag: str | None = None) -> tuple[str, lis
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 
-def verdict(counts: Mapping[str, int]) -> tuple[State, str]:
+def verdict(counts: Mapping[str, int]) -> tuple[StudyState, str]:
     """Return the final state of a study whose runs ended as counted, and the reason."""
     others = {status: count for status, count in counts.items() if count and status != "ok"}
     if not others:
-        return State.SUCCESSFUL, ""
+        return StudyState.SUCCESSFUL, ""
     listed = ", ".join(f"{count} {status}" for status, count in others.items())
-    return State.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"
+    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"

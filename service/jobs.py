@@ -19,7 +19,7 @@ from typing import Any
 
 from service import schema
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.job import COLUMNS, UNREADABLE, Job, State, job_of, wanted
+from service.job import COLUMNS, UNREADABLE, Job, StudyState, job_of, wanted
 from studies.errors import StoreFull
 
 NEXT_TURN = "(SELECT COALESCE(MAX(turn), 0) + 1 FROM job)"
@@ -66,7 +66,7 @@ class Jobs:
                 self._study(connection, job_id)
                 return self._read(connection, job_id), False
             count = "SELECT COUNT(*) FROM job WHERE state = ?"
-            (waiting,) = connection.execute(count, (State.ACCEPTED,)).fetchone()
+            (waiting,) = connection.execute(count, (StudyState.ACCEPTED,)).fetchone()
             if self.longest is not None and waiting >= self.longest:
                 raise Busy(f"{waiting} studies wait already, and no more may: post it later")
             connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # a row unreadable
@@ -79,7 +79,7 @@ class Jobs:
                 "INSERT INTO job SELECT ?, ?, ?, ?, COUNT(*), ?, '', 0, 0, '', ?, ?, NULL, NULL,"
                 f" {NEXT_TURN} FROM run WHERE job = ?",
                 (
-                    job_id, study["name"], study["scene"], json.dumps(study), State.ACCEPTED,
+                    job_id, study["name"], study["scene"], json.dumps(study), StudyState.ACCEPTED,
                     priority, now(), job_id,
                 ),
             )  # fmt: skip
@@ -140,7 +140,7 @@ class Jobs:
                 "SELECT id FROM job WHERE state IN (?, ?) AND size <= ?"
                 " AND id NOT IN (SELECT value FROM json_each(?))"
                 " ORDER BY priority DESC, turn",
-                (State.RUNNING, State.ACCEPTED, largest, others),
+                (StudyState.RUNNING, StudyState.ACCEPTED, largest, others),
             ).fetchall()
             for row in waiting:
                 if connection.execute(SHARED, (row["id"], others)).fetchone():
@@ -148,12 +148,12 @@ class Jobs:
                 connection.execute(
                     "UPDATE job SET state = ?, message = '', started = ?, finished = NULL"
                     " WHERE id = ? AND state = ?",
-                    (State.RUNNING, now(), row["id"], State.ACCEPTED),
+                    (StudyState.RUNNING, now(), row["id"], StudyState.ACCEPTED),
                 )
                 try:
                     return self._read(connection, row["id"])
                 except NotFound:
-                    end = (State.FAILED, UNREADABLE, row["id"])
+                    end = (StudyState.FAILED, UNREADABLE, row["id"])
                     connection.execute("UPDATE job SET state = ?, message = ? WHERE id = ?", end)
             return None
 
@@ -163,19 +163,24 @@ class Jobs:
             connection.executemany(
                 "UPDATE job SET stood = IIF(state = ?, '', state), state = ?, message = '',"
                 " progress = 0, started = ?, finished = NULL WHERE id = ?",
-                [(State.ACCEPTED, State.RUNNING, now(), job_id) for job_id in busy],
+                [(StudyState.ACCEPTED, StudyState.RUNNING, now(), job_id) for job_id in busy],
             )
 
     def waiting(self) -> dict[str, str]:
         """Return what the running jobs wait for, by id; nothing for those that go on."""
         with self.transaction("BEGIN") as connection:
             rows = connection.execute(
-                "SELECT id, message FROM job WHERE state = ? AND message != ''", (State.RUNNING,)
+                "SELECT id, message FROM job WHERE state = ? AND message != ''",
+                (StudyState.RUNNING,),
             )
             return {row["id"]: row["message"] for row in rows}
 
     def finish(
-        self, job_id: str, state: State, message: str, standing: State = State.RUNNING
+        self,
+        job_id: str,
+        state: StudyState,
+        message: str,
+        standing: StudyState = StudyState.RUNNING,
     ) -> None:
         """Write the end of a job that stands where told; one dismissed meanwhile stays so."""
         with self.transaction() as connection:
@@ -191,7 +196,7 @@ class Jobs:
         with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
-                (message, progress, job_id, State.RUNNING),
+                (message, progress, job_id, StudyState.RUNNING),
             )
 
     def dismiss(self, job_id: str) -> Job:
@@ -208,14 +213,14 @@ class Jobs:
         """
         with self.transaction() as connection:
             job = self._read(connection, job_id)
-            if job.state in (State.SUCCESSFUL, State.FAILED):
+            if job.state in (StudyState.SUCCESSFUL, StudyState.FAILED):
                 raise Conflict(f"the study is {job.state} already: there is no work to stop")
-            if job.state is not State.DISMISSED:
+            if job.state is not StudyState.DISMISSED:
                 connection.execute(
                     "UPDATE job SET state = IIF(stood = 'successful', stood, ?), message = '',"
                     " progress = IIF(stood = 'successful', 100, progress), finished = ?"
                     " WHERE id = ?",
-                    (State.DISMISSED, now(), job_id),
+                    (StudyState.DISMISSED, now(), job_id),
                 )
             return self._read(connection, job_id)
 
@@ -236,7 +241,7 @@ class Jobs:
             connection.execute(
                 "UPDATE job SET stood = state, state = ?, message = '', progress = 0, since = ?,"
                 f" started = NULL, finished = NULL, turn = {NEXT_TURN} WHERE id = ?",
-                (State.ACCEPTED, time.time_ns(), job_id),
+                (StudyState.ACCEPTED, time.time_ns(), job_id),
             )
             return self._read(connection, job_id)
 

@@ -77,7 +77,7 @@ def configure(form: str, **ids: str) -> None:
     sys.excepthook = lambda *error: logging.critical("the process ended", exc_info=error)
 
 
-class Observed:
+class RequestLog:
     """Outermost middleware: gives each request an id, measures it, and logs it.
 
     Neither headers nor the query are logged: they may hold what is secret. ``observe`` is called

@@ -13,7 +13,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from service.errors import QueueLost
-from service.job import State
+from service.job import StudyState
 from service.jobs import Jobs
 from service.runner import Runner
 from service.search import OUTCOMES
@@ -50,7 +50,7 @@ class Metrics(Collector):
     def collect(self) -> Iterable[Metric]:
         """Yield the figures that others keep; those that cannot be read are left out."""
         for name, meaning, kinds, count in (
-            ("residua_studies", "Studies by status", State, self.jobs.states),
+            ("residua_studies", "Studies by status", StudyState, self.jobs.states),
             (
                 "residua_runs",
                 "Runs by status",

@@ -9,7 +9,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from service.errors import NotFound, QueueLost
-from service.job import State, verdict
+from service.job import StudyState, verdict
 from service.jobs import Jobs
 from studies import Store, Study
 from studies.definition.identity import is_id
@@ -72,4 +72,4 @@ def _find(file: Path, jobs: Jobs, store: Store) -> None:
         return
     jobs.accept(study.id, study.to_dict(), study.run_ids())
     if counts := store.outcomes(study.id):
-        jobs.finish(study.id, *verdict(counts), standing=State.ACCEPTED)
+        jobs.finish(study.id, *verdict(counts), standing=StudyState.ACCEPTED)

@@ -16,7 +16,7 @@ from typing import Any
 
 from service import processes
 from service.errors import Conflict, NotFound, QueueLost
-from service.job import Job, State, verdict
+from service.job import Job, StudyState, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
 from service.processes import Starter
@@ -180,7 +180,7 @@ class Runner:
             waited = time.monotonic() - patient_since
             impatient = waited >= (self.settings.patience_seconds or math.inf)
             if attempt.hopeless or impatient or barren == self.settings.attempts:
-                await asyncio.to_thread(self.jobs.finish, job.id, State.FAILED, message)
+                await asyncio.to_thread(self.jobs.finish, job.id, StudyState.FAILED, message)
                 return
             await self._write(self.jobs.note, job.id, progress, message)
             await self._pause(self.settings.poll_seconds * (10 if attempt.patient else 2**barren))
@@ -243,7 +243,7 @@ class Runner:
         if self._stopping.is_set():
             return True
         try:
-            return (await asyncio.to_thread(self.jobs.get, job.id)).state is not State.RUNNING
+            return (await asyncio.to_thread(self.jobs.get, job.id)).state is not StudyState.RUNNING
         except (QueueLost, StoreFull, OSError):  # the work goes on, and is found again later
             return False
         except NotFound:

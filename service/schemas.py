@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.job import State
+from service.job import StudyState
 from studies.definition.sweep import Axes
 
 ContentId = Annotated[
@@ -27,7 +27,7 @@ class Window(BaseModel):
 class StudyFilter(Window):
     """Which studies are asked for."""
 
-    status: State | None = None
+    status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
 
 
@@ -75,7 +75,7 @@ class StudySummary(BaseModel):
     id: str
     name: str
     scene: str
-    status: State
+    status: StudyState
     message: str = Field(
         description="why it failed; while it runs, what it waits for or why it was started again"
     )

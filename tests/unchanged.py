@@ -26,6 +26,9 @@ LIMIT = 1e-9
 COSTS = ("cpu_seconds", "wall_seconds", "seconds")
 """Variables that differ from run to run."""
 
+ROUNDING = 1e-6
+"""Figures of the audit below it are rounding."""
+
 Numbers = dict[str, Any]
 
 _CURVE = ((0.0, 400.0), (0.01, 450.0), (0.1, 520.0))
@@ -128,6 +131,11 @@ def changes(before: Numbers, after: Numbers) -> Iterator[tuple[str, float]]:
                 yield f"{key} has NaN elsewhere", np.inf
                 continue
             largest = np.nanmax(np.abs(old), initial=0.0)
+            if (
+                key.startswith("audit_")
+                and max(largest, np.nanmax(np.abs(new), initial=0)) < ROUNDING
+            ):
+                continue
             change = np.nanmax(np.abs(new - old), initial=0.0) if largest < np.inf else 0.0
             if change > 0:
                 yield key, float(change / largest) if largest else np.inf

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.problem import OPEN, bound_lines, least
-from solver.contact.rows import Rows, joined
+from solver.contact.rows import ContactRows, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,7 +55,7 @@ class Candidates:
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
     untimed: NDArray[np.bool_]
-    rows: tuple[Rows | None, ...]
+    rows: tuple[ContactRows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
     slips: tuple[NDArray[np.float64], ...]
@@ -215,7 +215,7 @@ def find_candidates(
     motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
     limit, cohesion = np.zeros((2, n))
     untimed = np.zeros(n, dtype=bool)
-    pieces: list[list[Rows]] = [[] for _ in system.parts]
+    pieces: list[list[ContactRows]] = [[] for _ in system.parts]
     slips: list[NDArray[np.float64]] = []
     first = 0
     for interface, pairing, at, before in zip(
@@ -237,7 +237,7 @@ def find_candidates(
             block[normal] = pairing.normal[side][at]
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
-            pieces[number].append(Rows(*part.pull_back(surface, u[number], block, n)))
+            pieces[number].append(ContactRows(*part.pull_back(surface, u[number], block, n)))
         slip = np.zeros(len(pairing.gap))
         if frictional:
             slip = interface.slip(pairing, u, start.u)

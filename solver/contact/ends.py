@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _COVERED = 1 - 1e-6
 
 
-def strayed(system: System, u: tuple[NDArray[np.float64], ...], candidates: Candidates) -> str:
+def beyond_end(system: System, u: tuple[NDArray[np.float64], ...], candidates: Candidates) -> str:
     """Return the message that contact has reached the end of a surface; empty if it has not."""
     first = 0
     for interface, vertices, covered in zip(

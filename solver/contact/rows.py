@@ -12,18 +12,18 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class ContactRows:
     """Derivatives of all gaps (and slips) with respect to the unknowns ``dofs`` of one part."""
 
     dofs: NDArray[np.int64]
     block: NDArray[np.float64]
 
 
-def joined(pieces: list[Rows]) -> Rows | None:
+def joined(pieces: list[ContactRows]) -> ContactRows | None:
     """Return the rows of all surfaces of a part; unknowns that surfaces share occur once."""
     if not pieces:
         return None
     dofs, place = np.unique(np.concatenate([p.dofs for p in pieces]), return_inverse=True)
     block = np.zeros((len(pieces[0].block), len(dofs)))
     np.add.at(block, (slice(None), place), np.hstack([p.block for p in pieces]))  # type: ignore[arg-type]
-    return Rows(dofs, block)
+    return ContactRows(dofs, block)

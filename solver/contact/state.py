@@ -172,7 +172,7 @@ class Converged:
     contact_work : work of friction, and against contact, in the increment [N mm]
     pivoted, blended : iterations whose contact problem needed pivoting, or whose tangent was
         blended with the elastic stiffness
-    strayed : message that contact has reached the end of a surface; empty if it has not
+    beyond_end : message that contact has reached the end of a surface; empty if it has not
     apart : whether the bodies were taken apart in the increment
     energy : work since the lap began
     timing : how well contact was followed since then
@@ -190,7 +190,7 @@ class Converged:
     dissipation: float
     pivoted: int
     blended: int
-    strayed: str = ""
+    beyond_end: str = ""
     apart: bool = False
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)

@@ -1,9 +1,8 @@
 """An elastic body reduced to its contact surfaces and its rigid motion, exactly.
 
-The stiffness of the kept unknowns k, with the inner ones i eliminated, is the Schur complement
-``S = Kkk - Kki Kii^-1 Kik``, and its load ``fk - Kki Kii^-1 fi``. `expand` gives the inner
-displacements back. Supports of kept nodes stay supports; rigid motions stay rigid motions
-(``S R = 0``), so a body held by contact alone is treated like any other.
+Its stiffness is the Schur complement S on the unknowns of these surfaces. Supports of kept nodes
+stay supports; rigid motions stay rigid motions (``S R = 0``), so a body held by contact alone is
+treated like any other.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from solver.fem.loads import Superposed
 from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
-from solver.linear import solvers as linear
+from solver.linear.schur import SchurComplement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,46 +29,28 @@ if TYPE_CHECKING:
     from solver.materials import PlasticState, Response
 
 _KEPT_IN_MEMORY = 8
-_BLOCK = 64
-_CACHE: OrderedDict[str, _Condensed] = OrderedDict()
+_CACHE: OrderedDict[str, _CondensedBody] = OrderedDict()
 
 
-class _Condensed:
+class _CondensedBody:
     """The condensation of one body to a set of nodes."""
 
     def __init__(self, part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> None:
         self.nodes = nodes
-        kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
-        self.kept = kept
-        self.inner = np.setdiff1d(part.free, kept)
+        self.kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
         K = part.elastic_matrix()
-        self._couple = K[self.inner][:, kept]
-        upper = sparse.csr_array(sparse.triu(K[self.inner][:, self.inner], format="csr"))
-        self._solver = linear.analyse(upper, linear_solver) if len(self.inner) else None
-        if self._solver is not None:
-            self._solver.factorise(upper.data)
-        forces = part.condensable.fields
-        self._load = forces[self.inner]
-        self.forces = forces[kept] - self._couple.T @ self._inside(self._load)
-        self.stiffness = K[kept][:, kept].toarray()
-        for first in range(0, len(kept), _BLOCK):
-            some = slice(first, first + _BLOCK)
-            follow = self._inside(self._couple[:, some].toarray())
-            self.stiffness[:, some] -= self._couple.T @ follow
-        self.stiffness = _without_motions(self.stiffness, part.rigid[kept])
+        inside = np.setdiff1d(part.free, self.kept)
+        self._schur = SchurComplement(K, self.kept, inside, linear_solver)
+        self._loads = part.condensable.fields
+        self.forces = self._schur.condense(self._loads)
+        at = self._schur.boundary
+        stiffness = K[self.kept][:, self.kept].toarray()
+        stiffness[np.ix_(at, at)] -= self._schur.taken
+        self.stiffness = _without_motions(stiffness, part.rigid[self.kept])
 
-    def _inside(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return inner displacements for inner forces, the kept unknowns held."""
-        return force if self._solver is None or not force.size else self._solver.solve(force)
-
-    def expand(
-        self, u: NDArray[np.float64], factors: NDArray[np.float64], size: int
-    ) -> NDArray[np.float64]:
-        """Return all displacements (size,) from those kept, at the factors of the loads."""
-        full = np.zeros(size)
-        full[self.kept] = u
-        full[self.inner] = self._inside(self._load @ factors - self._couple @ u)
-        return full
+    def expand(self, u: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return all displacements (n,) from those kept, at the factors of the loads."""
+        return self._schur.expand(u, self._loads @ factors)
 
 
 def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -168,7 +149,7 @@ class Substructure(Part):
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the displacements of the whole body [mm]; those of a wheel in its hub's frame."""
         factors = self.loads.factors(time)
-        return self._condensed.expand(u[self.elastic], factors, self.whole.n)[self.whole.copied]
+        return self._condensed.expand(u[self.elastic], factors)[self.whole.copied]
 
 
 def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> str:
@@ -188,12 +169,12 @@ def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> 
     return digest.hexdigest()
 
 
-def _condense(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> _Condensed:
+def _condense(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> _CondensedBody:
     key = _key(part, nodes, linear_solver)
     if key in _CACHE:
         _CACHE.move_to_end(key)
     else:
-        _CACHE[key] = _Condensed(part, nodes, linear_solver)
+        _CACHE[key] = _CondensedBody(part, nodes, linear_solver)
         while len(_CACHE) > _KEPT_IN_MEMORY:
             _CACHE.popitem(last=False)
     return _CACHE[key]

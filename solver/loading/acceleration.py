@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.candidates import Candidates
-    from solver.loading.step import Step
+    from solver.loading.step import NewtonStep
 
     Vectors = tuple[NDArray[np.float64], ...]
 
@@ -50,7 +50,7 @@ class Series:
     _steps: list[NDArray[np.float64]] = field(default_factory=list)
 
     def sum(
-        self, u: Vectors, candidates: Candidates, step: Step, share: float
+        self, u: Vectors, candidates: Candidates, step: NewtonStep, share: float
     ) -> tuple[Vectors, NDArray[np.float64]] | None:
         """Return accelerated displacements and contact forces after a step.
 

@@ -29,7 +29,7 @@ _MOVES = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flow:
+class SoftestStep:
     """The step that met the least resistance.
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
@@ -67,11 +67,11 @@ def _forms(
 
 
 def softer(
-    than: Flow,
+    than: SoftestStep,
     parts: Sequence[Part],
     step: Sequence[NDArray[np.float64]],
     responses: Sequence[Response],
-) -> Flow:
+) -> SoftestStep:
     """Return the flow of a step (displacements of each part) if it is softer, else ``than``."""
     forms = _forms(parts, step, responses)
     tangent, elastic = forms.sum(axis=0)
@@ -79,11 +79,11 @@ def softer(
         return than
     most = int((forms[:, 1] - forms[:, 0]).argmax())
     law, at = parts[most].body.law, parts[most].most_strained(step[most])
-    return Flow(
+    return SoftestStep(
         stiffness=max(float(tangent / elastic), 0.0),  # less is rounding
         body=parts[most].body.name,
         place=parts[most].place(at),
-        proves=not (law.hardens or law.cornered) and _exhausted(law, responses[most].state, at),
+        proves=not (law.hardens or law.has_corners) and _exhausted(law, responses[most].state, at),
     )
 
 
@@ -130,7 +130,7 @@ def collapses(
     return excess > 0
 
 
-def adrift(
+def is_mechanism(
     parts: Sequence[Part],
     time: float,
     step: Sequence[NDArray[np.float64]],

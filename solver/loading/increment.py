@@ -24,17 +24,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
-from solver.contact.ends import strayed
+from solver.contact.ends import beyond_end
 from solver.contact.state import Converged, State, Timing
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
-from solver.loading.flow import Flow, adrift, collapses, softer
+from solver.loading.flow import SoftestStep, collapses, is_mechanism, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.slide import Slide, slide
-from solver.loading.step import Step, apart, largest, newton_step, norm, on_parts, rounding
+from solver.loading.step import NewtonStep, apart, largest, newton_step, norm, on_parts, rounding
 from solver.loading.timing import timing
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class Increment:
         self._least, _ = system.least(time)
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
-        self._softened = any(part.body.law.cornered for part in system.parts)  # no tangent there
+        self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
         self._stiff: dict[bytes, NDArray[np.float64]] = {}
 
     def solve(self) -> Converged:
@@ -117,7 +117,7 @@ class Increment:
         origin = self.system.moved(self.guess or self.start, self.time)
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
-        best, since_best, softest, moving = np.inf, 0, Flow(), False
+        best, since_best, softest, moving = np.inf, 0, SoftestStep(), False
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
@@ -181,11 +181,11 @@ class Increment:
 
     def _judged(
         self,
-        flow: Flow,
+        flow: SoftestStep,
         u: Vectors,
         responses: Sequence[Response],
         contacts: tuple[ContactState, ...],
-    ) -> Flow:
+    ) -> SoftestStep:
         """Return a flow with what the motion since the start of the increment proves of it.
 
         Nothing where a motion is prescribed: the work of what prescribes it is not known.
@@ -251,7 +251,7 @@ class Increment:
         responses: Sequence[Response],
         candidates: Candidates,
         blends: Sequence[float],
-    ) -> Step:
+    ) -> NewtonStep:
         """Return the step of the least blended tangent that has one (a lone blend is no choice)."""
         for blend in blends:
             try:
@@ -264,7 +264,7 @@ class Increment:
                 step = newton_step(self.system, residuals, operators, candidates, self.contact)
             except Singular:
                 continue
-            if step and not blend and adrift(self.system.parts, self.time, step.u, responses):
+            if step and not blend and is_mechanism(self.system.parts, self.time, step.u, responses):
                 self._softened = True
             elif step is not None:
                 self._pivoted += step.pivoted
@@ -277,7 +277,7 @@ class Increment:
     # -- 5: line search ------------------------------------------------------------------------
 
     def _search(
-        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: Step
+        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: NewtonStep
     ) -> tuple[float, Vectors, tuple[Response, ...]]:
         trial: tuple[Vectors, tuple[Response, ...]]
         # where vertices change status, contact forces before the step may make its slope negative;
@@ -331,7 +331,7 @@ class Increment:
             iterations=iterations,
             pivoted=self._pivoted,
             blended=self._blended,
-            strayed=strayed(self.system, u, candidates),
+            beyond_end=beyond_end(self.system, u, candidates),
             timing=self._timing(candidates),
             apart=not self.contact,
         )

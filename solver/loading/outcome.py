@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import NotConverged, SolverError
-from solver.loading.flow import Flow
+from solver.loading.flow import SoftestStep
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,9 +24,9 @@ class Yielded(SolverError):
 class IncrementFailed(SolverError):
     """The increment did not converge; ``why`` is the softest of its late steps, or a slide."""
 
-    def __init__(self, message: str, why: Flow | Slide | None = None) -> None:
+    def __init__(self, message: str, why: SoftestStep | Slide | None = None) -> None:
         super().__init__(message)
-        self.why = why or Flow()
+        self.why = why or SoftestStep()
 
 
 @dataclass(frozen=True, slots=True)

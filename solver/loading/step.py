@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class NewtonStep:
     """Displacements of each part, contact forces and status, and whether pivoting found these."""
 
     u: Vectors
@@ -54,7 +54,7 @@ def newton_step(
     operators: Sequence[Operator],
     candidates: Candidates,
     contact: bool,
-) -> Step | None:
+) -> NewtonStep | None:
     """Return the step under given tangents, or None where no contact forces balance the load.
 
     Parameters
@@ -93,7 +93,7 @@ def newton_step(
     )
     if not all(np.isfinite(du).all() for du in u):
         return None
-    return Step(u, solution.forces, solution.status, solution.pivoted)
+    return NewtonStep(u, solution.forces, solution.status, solution.pivoted)
 
 
 def largest(vectors: Vectors, origin: Vectors | None = None) -> float:

@@ -15,11 +15,11 @@ from solver.contact.state import Converged, Energy, State
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
-from solver.loading.carrying import MEMORY, Carrier
 from solver.loading.energy import worked
 from solver.loading.history import lost
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
+from solver.loading.prediction import MEMORY, Predictor
 from solver.loading.program import ROUNDING
 from solver.loading.slide import spent
 
@@ -71,7 +71,7 @@ class Stepper:
         self.place: Callable[[float], str] = "load factor {:.6g}".format
         self._report = report or (lambda: None)
         self._watch = watch
-        self._carrier = Carrier(system)
+        self._predictor = Predictor(system)
         self._clock = clock.process_time()
 
     def rest(self, state: State, tally: Tally | None = None) -> Point:
@@ -156,7 +156,7 @@ class Stepper:
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
         whole = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
-        size = _Size(whole, self.control.max_cuts)
+        size = _StepSize(whole, self.control.max_cuts)
         known, coarse = point.now.timing, None
         beyond: tuple[float, IncrementFailed] | None = None
         while (now := point.now.state.time) != target:
@@ -191,9 +191,9 @@ class Stepper:
                 beyond = None
             past = (*point.past[1 - MEMORY :], point.now.state)
             point, coarse = self._after(point, self._worked(point.now, converged), past), None
-            if converged.strayed:
+            if converged.beyond_end:
                 reached = converged.state.time
-                message = f"{self.place(reached)}: {converged.strayed}"
+                message = f"{self.place(reached)}: {converged.beyond_end}"
                 raise PathEnded(NotConverged(message, now, reached), point)
             self._report()
         return point
@@ -247,7 +247,7 @@ class Stepper:
         except (Yielded, IncrementFailed):
             return None
         # the walk in steps finds at which load
-        if converged.strayed or followed(self.system, point.now.state, converged.state):
+        if converged.beyond_end or followed(self.system, point.now.state, converged.state):
             return None
         converged = self._worked(point.now, converged)
         self._report()
@@ -262,7 +262,7 @@ class Stepper:
         if not self.system.moves:
             return extrapolate(past, now, time)
         with one_thread():
-            return self._carrier.carried(past, now, time)
+            return self._predictor.predicted(past, now, time)
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
         """Return the increment ``now`` with the work since the lap began, and what it has lost."""
@@ -296,7 +296,7 @@ class Stepper:
         return replace(tally, seconds=seconds)
 
 
-class _Size:
+class _StepSize:
     """The step of increments to a target: halved where they fail, divided and growing again.
 
     Attributes

@@ -16,7 +16,7 @@ from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.loading.bearing import unbearable
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
-from solver.loading.settling import HALVINGS
+from solver.loading.refinement import HALVINGS
 from solver.loading.stepper import Stepper, turned
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from solver.loading.control import Control
     from solver.loading.outcome import Point
     from solver.loading.program import Program, Target
-    from solver.loading.settling import Settling
+    from solver.loading.refinement import StepRefinement
     from solver.loading.stepper import Report, Watch
 
     Points = Mapping[str, Converged]
@@ -58,7 +58,7 @@ class Walker:
     Parameters
     ----------
     trace : (states at the ends of a lap's stages, by name) -> what is kept of the lap
-    settling : how increments are halved; when absent, those of the program are used
+    refinement : how increments are halved; when absent, those of the program are used
     watch : (converged increment) -> what is kept of it in `Outcome.history`
     report : called after every increment
     """
@@ -69,13 +69,13 @@ class Walker:
         control: Control,
         *,
         trace: Callable[[Points], Any] | None = None,
-        settling: Settling | None = None,
+        refinement: StepRefinement | None = None,
         report: Report | None = None,
         watch: Watch | None = None,
     ) -> None:
         self._system = system
         self._trace = trace
-        self._settling = settling
+        self._refinement = refinement
         self._stepper = Stepper(system, control, report, watch)
 
     def walk(self, programs: Sequence[Program]) -> Iterator[Outcome]:
@@ -86,7 +86,7 @@ class Walker:
         """
         last, settled = programs[0], Settled()
         self._stepper.place = last.place
-        if self._settling is None:
+        if self._refinement is None:
             known = {0: self._start(last)}
         else:
             settled, first = self._settle(last)
@@ -199,11 +199,11 @@ class Walker:
 
         Where smaller increments fail, the result of the larger ones is kept.
         """
-        assert self._settling is not None
-        tolerance = self._settling.tolerance
+        assert self._refinement is not None
+        tolerance = self._refinement.tolerance
         if not any(stage.refined for stage in program.laps[0].stages):
             allowed = "needs a stage of the first lap whose increments may be divided (refined)"
-            raise ModelError("settling", tolerance, allowed)
+            raise ModelError("refinement", tolerance, allowed)
         settled, taken, coarse, tally = Settled(), None, None, Tally()
         for halved in range(HALVINGS + 1 if tolerance else 1):
             times = 2**halved
@@ -215,7 +215,7 @@ class Walker:
                 break
             taken, settled = walk, replace(settled, times=times)
             if walk.error is None:
-                left = self._settling.measure(walk.traces[0])
+                left = self._refinement.measure(walk.traces[0])
                 if coarse is not None:
                     settled = replace(settled, error=float(np.abs(left - coarse).max()))
                 if settled.error <= tolerance:

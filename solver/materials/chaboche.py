@@ -206,7 +206,7 @@ class Chaboche(Law):
         """C and gamma of the back stresses (2, n_back, 1)."""
         return np.reshape(self.back_stresses, (-1, 2)).T[:, :, None]
 
-    def _step(self, s: Array, state: ChabocheState, G: float) -> _Step:
+    def _step(self, s: Array, state: ChabocheState, G: float) -> _FlowStep:
         """Return the plastic flow of points from their trial deviator (n_components, n)."""
         C, gamma = self._constants
 
@@ -233,10 +233,10 @@ class Chaboche(Law):
         _, xi, turn = relative(growth)
         size = np.sqrt((xi**2).sum(axis=0))
         u = xi / size
-        return _Step(growth, growth * u / SQRT23, u, size, turn, -excess(growth)[1])
+        return _FlowStep(growth, growth * u / SQRT23, u, size, turn, -excess(growth)[1])
 
 
-class _Step(NamedTuple):
+class _FlowStep(NamedTuple):
     """An increment of flow at points.
 
     ``growth`` dp (n,); ``flow`` plastic strain (n_components, n); ``direction`` and ``size`` of

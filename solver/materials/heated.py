@@ -82,11 +82,13 @@ class Heated(Wrapped):
         """Return the flow direction (n_components, n_points), Mandel."""
         return self.law.flow_direction(stress / self.strong, state.stretched(self._stretch))
 
-    def stray(self, stress: Array, flow: Array, growth: Array, after: PlasticState) -> Array:
+    def flow_rule_error(
+        self, stress: Array, flow: Array, growth: Array, after: PlasticState
+    ) -> Array:
         """Return the error (n_points,) of a plastic flow with respect to this law."""
         k = self._stretch
         own = stress / self.strong, flow * k, growth * k, after.stretched(k)
-        return self.law.stray(*own) / k
+        return self.law.flow_rule_error(*own) / k
 
     def energy_density(self, stress: Array) -> Array:
         """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""

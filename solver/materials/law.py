@@ -8,8 +8,8 @@ the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
 A new law must define `elasticity`, `flow_stress` and `respond`. All else has a default for
 associated flow on a von Mises surface and isotropic hardening that comes to an end. Override
 `back_stress` and `strength` with kinematic hardening, `hardens` where stress grows without end,
-`ultimate_shear_stress` without hardening, `surface` for another yield condition, `stray` and
-`cornered` where that has edges, `symmetric` where the tangent is not. What is marked as an
+`ultimate_shear_stress` without hardening, `surface` for another yield condition, `flow_rule_error`
+and `has_corners` where that has edges, `symmetric` where the tangent is not. What is marked as an
 attribute here may be a property or a field of a dataclass there.
 """
 
@@ -126,7 +126,7 @@ class Law(ABC):
         return False
 
     @attribute
-    def cornered(self) -> bool:
+    def has_corners(self) -> bool:
         """Whether stress may stay in a corner, or on an edge, of its yield surface.
 
         Little tangent or none is left there, though the body may bear more: softness proves no
@@ -195,10 +195,14 @@ class Law(ABC):
         worst = np.maximum(worst, np.where(dp > 0, np.abs(beyond), np.maximum(beyond, 0.0)))
         flow = after.plastic_strain - before.plastic_strain
         turned = _ROUNDING * 2 * G * np.abs(strain).max(axis=0) / self.flow_stress(after)
-        stray = np.maximum(self.stray(stress, flow, dp, after) - dp * turned, 0.0)
-        return np.asarray(np.maximum(worst, 2 * G * np.maximum(stray, -dp)))
+        flow_rule_error = np.maximum(
+            self.flow_rule_error(stress, flow, dp, after) - dp * turned, 0.0
+        )
+        return np.asarray(np.maximum(worst, 2 * G * np.maximum(flow_rule_error, -dp)))
 
-    def stray(self, stress: Array, flow: Array, growth: Array, after: PlasticState) -> Array:
+    def flow_rule_error(
+        self, stress: Array, flow: Array, growth: Array, after: PlasticState
+    ) -> Array:
         """Return the error (n_points,) of a plastic flow with respect to this law.
 
         Override it where a yield surface has edges, on which more than one direction is right.

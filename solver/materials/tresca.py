@@ -38,7 +38,7 @@ class TrescaMaterial(Law):
         return Tresca()
 
     @property
-    def cornered(self) -> bool:
+    def has_corners(self) -> bool:
         """Yes: its surface has edges."""
         return True
 
@@ -56,7 +56,7 @@ class TrescaMaterial(Law):
         """Return the stress of the curve (n_points,) [MPa]."""
         return self.curve.flow_stress(state.accumulated)
 
-    def stray(
+    def flow_rule_error(
         self,
         stress: NDArray[np.float64],
         flow: NDArray[np.float64],
@@ -64,7 +64,7 @@ class TrescaMaterial(Law):
         after: PlasticState,
     ) -> NDArray[np.float64]:
         """Return the error of a flow, which at an edge may lie between two normals."""
-        return self.surface.stray(stress, flow, growth, 2 * self.elasticity.shear_modulus)
+        return self.surface.flow_rule_error(stress, flow, growth, 2 * self.elasticity.shear_modulus)
 
     def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
         """Return stress, tangent and new state by the return in principal stresses."""

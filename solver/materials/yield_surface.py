@@ -87,7 +87,7 @@ class Tresca:
         values, _ = principal(deviator(strain))
         return np.asarray(np.abs(values).max(axis=0))
 
-    def stray(
+    def flow_rule_error(
         self,
         stress: NDArray[np.float64],
         flow: NDArray[np.float64],

@@ -37,7 +37,7 @@ class Pushed(Load):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Curve:
+class RigidSurface:
     """A surface of a rigid body: a chain of points, the body on the left of one who walks along it.
 
     Attributes
@@ -66,9 +66,9 @@ class Curve:
             raise ModelError(f"surfaces.{name}", "a point twice", "must be points apart [mm]")
 
 
-def line(start: tuple[float, float], end: tuple[float, float], edges: int = 1) -> Curve:
+def line(start: tuple[float, float], end: tuple[float, float], edges: int = 1) -> RigidSurface:
     """Return a straight surface of equal edges."""
-    return Curve(points=np.linspace(start, end, edges + 1).T)
+    return RigidSurface(points=np.linspace(start, end, edges + 1).T)
 
 
 def arc(
@@ -77,7 +77,7 @@ def arc(
     angles: tuple[float, float],
     edges: int,
     goes_on: tuple[bool, bool] = (True, True),
-) -> Curve:
+) -> RigidSurface:
     """Return an arc of a circle from one angle to another [rad], a part of a larger surface.
 
     Counter-clockwise the body is inside the circle. There are more than ``edges`` where these would
@@ -86,7 +86,7 @@ def arc(
     least = int(np.ceil(abs(angles[1] - angles[0]) / _TURN))
     angle = np.linspace(*angles, 2 * max(edges, least) + 1)
     points = np.array(centre)[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
-    return Curve(points=points, quadratic=True, goes_on=goes_on)
+    return RigidSurface(points=points, quadratic=True, goes_on=goes_on)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +104,7 @@ class RigidBody:
     """
 
     name: str
-    surfaces: Mapping[str, Curve]
+    surfaces: Mapping[str, RigidSurface]
     centre: tuple[float, float] = (0.0, 0.0)
     x: Moved | Pushed = field(default_factory=Moved)
     y: Moved | Pushed = field(default_factory=Moved)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.results.look import Values
-    from solver.results.places import Fields, Places
+    from solver.results.places import Places, SystemFields
 
     Array = NDArray[np.float64]
     Span = tuple[float, float]
@@ -74,7 +74,7 @@ class Asked:
         )
 
     def values(
-        self, fields: Fields, lines: Mapping[str, Places], contacts: Sequence[str]
+        self, fields: SystemFields, lines: Mapping[str, Places], contacts: Sequence[str]
     ) -> Values:
         """Return the number of a run, NaN where the field is not known.
 
@@ -87,7 +87,7 @@ class Asked:
         return dict(zip(self.quantities, found, strict=True))
 
     def _found(
-        self, fields: Fields, lines: Mapping[str, Places], contacts: Sequence[str]
+        self, fields: SystemFields, lines: Mapping[str, Places], contacts: Sequence[str]
     ) -> tuple[float, ...]:
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
             return (fields.on_pair(contacts.index(self.contact), self.stage).length,)
@@ -105,7 +105,7 @@ class Asked:
         return (_positive_length(values, s),)
 
     def _sought(
-        self, fields: Fields, lines: Mapping[str, Places], contacts: Sequence[str]
+        self, fields: SystemFields, lines: Mapping[str, Places], contacts: Sequence[str]
     ) -> tuple[Array, Array]:
         """Return the values it is taken of (n,), NaN outside of the box, and where they are."""
         kind, _, part = self.of.partition(".")

@@ -110,7 +110,7 @@ class Places(NamedTuple):
     X: Array
 
 
-class Fields:
+class SystemFields:
     """Fields of a system at its states, each computed once.
 
     Parameters
@@ -153,7 +153,7 @@ class Fields:
         return on_slave(self.system, self.stages[stage], pair)
 
 
-def along_lines(fields: Fields, lines: Mapping[str, Places]) -> Values:
+def along_lines(fields: SystemFields, lines: Mapping[str, Places]) -> Values:
     """Return stress and plastic strain along lines, all of as many points."""
     X = np.stack([line.X for line in lines.values()])
     distance = np.linalg.norm(np.diff(X, axis=2), axis=1)
@@ -170,7 +170,7 @@ def along_lines(fields: Fields, lines: Mapping[str, Places]) -> Values:
     }
 
 
-def at_points(fields: Fields, points: Mapping[str, Places]) -> Values:
+def at_points(fields: SystemFields, points: Mapping[str, Places]) -> Values:
     """Return stress, plastic strain and displacement at points."""
     found = {name: each[..., 0] for name, each in _states(fields, points).items()}
     moved = dict(zip(POINT_MOVED, np.moveaxis(found["displacement"], -1, 0), strict=True))
@@ -186,7 +186,7 @@ def at_points(fields: Fields, points: Mapping[str, Places]) -> Values:
     }
 
 
-def _states(fields: Fields, places: Mapping[str, Places]) -> dict[str, Array]:
+def _states(fields: SystemFields, places: Mapping[str, Places]) -> dict[str, Array]:
     """Return each field over places, stages, its own components and points."""
     every = [[fields.at(place, stage) for stage in fields.stages] for place in places.values()]
     return {
@@ -195,7 +195,7 @@ def _states(fields: Fields, places: Mapping[str, Places]) -> dict[str, Array]:
     }
 
 
-def on_pairs(fields: Fields, names: Sequence[str], samples: int) -> Values:
+def on_pairs(fields: SystemFields, names: Sequence[str], samples: int) -> Values:
     """Return what acts on the slaves of contact pairs, the gap and the slip."""
     fraction = np.linspace(0.0, 1.0, samples)
     every = [[fields.on_pair(k, stage) for stage in fields.stages] for k in range(len(names))]

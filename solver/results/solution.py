@@ -24,7 +24,7 @@ from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
 from solver.results.history import Observed, observe
 from solver.results.mesh_fields import MeshFields, mesh_fields
-from solver.results.places import Fields, Places
+from solver.results.places import Places, SystemFields
 from solver.results.samples import Nodal
 from solver.results.slave import Slave, on_slave
 from solver.tensors import to_tensor
@@ -123,7 +123,7 @@ class Solution:
         if body not in self.system.names:
             raise ModelError("body", body, f"must be one of {', '.join(self.system.names)}")
         self._at(stage)
-        return Fields(self.system, self.stages).at(Places(body, X), stage)
+        return SystemFields(self.system, self.stages).at(Places(body, X), stage)
 
     def surface(self, pair: int = 0, stage: str = "loaded") -> Slave:
         """Return what acts on the slave of a pair: pressure, shear, gap and slip at its vertices.
@@ -246,7 +246,7 @@ def solve(
     for doubt in model.doubts:
         _LOG.warning("%s", doubt)
     system = System(model, linear_solver)
-    follow = _Following(program, progress)
+    follow = _IncrementCount(program, progress)
     walker = Walker(system, control, watch=partial(observe, system), report=follow)
     (outcome,) = walker.walk([program])
     if outcome.error is not None:
@@ -259,7 +259,7 @@ def solve(
     )
 
 
-class _Following:
+class _IncrementCount:
     """Counts increments, and tells how many of the program's are done; those that are cut more."""
 
     def __init__(self, program: Program, progress: Callable[[float], None] | None) -> None:

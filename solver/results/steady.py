@@ -14,7 +14,7 @@ from solver.contact.state import State
 from solver.fem.fields import recovery
 from solver.fem.wheel import Hub
 from solver.materials.state import PlasticState, Response
-from solver.steady import Touching
+from solver.steady import RollingContact
 from solver.steady.fields import of_layers, under_load
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from solver.fem.discretisation import Discretisation
     from solver.steady import Pass, Track
-    from solver.steady.fields import Fields
+    from solver.steady.fields import TrackFields
 
     Array = NDArray[np.float64]
 
@@ -45,10 +45,10 @@ class Standing:
 
     state: State
     response: Response
-    touching: Touching | None
+    touching: RollingContact | None
 
 
-class HalfPlane:
+class TrackBody:
     """The body of a track as one sees it who stands beside it.
 
     Parameters
@@ -121,14 +121,14 @@ class HalfPlane:
 
     def under_load(self, found: Pass) -> Standing:
         """Return the state while the load of a pass is there."""
-        touching = found.loading if isinstance(found.loading, Touching) else None
+        touching = found.loading if isinstance(found.loading, RollingContact) else None
         return self._seen(_LOADED, under_load(self.track, found), touching)
 
     def left_by(self, found: Pass) -> Standing:
         """Return the state that a pass leaves."""
         return self._seen(_RELEASED, of_layers(self.track, found.after), None)
 
-    def _seen(self, time: float, fields: Fields, touching: Touching | None) -> Standing:
+    def _seen(self, time: float, fields: TrackFields, touching: RollingContact | None) -> Standing:
         u, strain, inside, (above, at_surface) = fields
         strain = np.concatenate([strain, above], axis=1)
         plastic = PlasticState(

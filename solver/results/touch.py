@@ -62,7 +62,7 @@ class ContactPoints:
     sticking: NDArray[np.bool_]
 
 
-class Contact:
+class SceneContact:
     """The first interface of a system.
 
     In every scene s grows against the tangent of the slave, along ``axis``. ``symmetric`` means
@@ -181,7 +181,7 @@ class Nothing:
 def touch_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Touch:
     """Return what acts between the bodies of a system, or on one of them."""
     if system.interfaces:
-        return Contact(system, symmetric=symmetric, axis=axis)
+        return SceneContact(system, symmetric=symmetric, axis=axis)
     for body in system.model.bodies:
         if body.travelling is not None:
             return Prescribed(body.travelling, system.full(body.name).period)
@@ -190,4 +190,4 @@ def touch_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Touch:
 
 def contact_points(touch: Touch, converged: Any) -> ContactPoints | None:
     """Return what acts at the points of a contact; None where pressure does not come of contact."""
-    return touch.points(converged) if isinstance(touch, Contact) else None
+    return touch.points(converged) if isinstance(touch, SceneContact) else None

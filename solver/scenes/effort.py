@@ -17,7 +17,7 @@ class Effort:
     unknowns : displacement unknowns that no support holds, as `System.n_unknowns` counts them
     increments : of all its runs together, shared ones once, when none is cut; where passes end as
         soon as the state is decided, the fewest
-    most_increments : the same where `Scene.settling` halves them as often as it may, or where the
+    most_increments : the same where `Scene.refinement` halves them as often as it may, or where the
         state is never decided
     """
 

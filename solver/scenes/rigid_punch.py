@@ -25,7 +25,7 @@ from solver.loading.program import Program, load_and_release
 from solver.mesh import grid
 from solver.model.body import Body
 from solver.model.model import ContactPair, Model
-from solver.model.rigid import Curve, Pushed, RigidBody
+from solver.model.rigid import Pushed, RigidBody, RigidSurface
 from solver.results.contact import contact
 from solver.results.fields import isochromatics
 from solver.results.figures import cost
@@ -107,7 +107,7 @@ def model(parameters: RigidPunchParameters) -> Model:
         supports={"left": "x", "bottom": "y"},
     )
     # the punch is the slave, as it ends at a corner; its points are those of the half-plane
-    base = Curve(points=np.stack([under, np.zeros_like(under)]))
+    base = RigidSurface(points=np.stack([under, np.zeros_like(under)]))
     punch = RigidBody(name="punch", surfaces={"base": base}, y=Pushed(value=-parameters.half_width))
     pair = ContactPair(
         slave=("punch", "base"),

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.loading.settling import Settling
+from solver.loading.refinement import StepRefinement
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, surfaces
@@ -136,10 +136,10 @@ def program(parameters: RollingParameters) -> Program:
     return parameters.schedule.program
 
 
-def settling(parameters: RollingParameters) -> Settling | None:
+def refinement(parameters: RollingParameters) -> StepRefinement | None:
     """Return how the advance is halved until residual stress settles; None keeps it as given."""
     tolerance = parameters.advance_tolerance * parameters.yield_stress
-    return Settling(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
+    return StepRefinement(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
 
 
 def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
@@ -215,7 +215,7 @@ def cycles(look: Look) -> Values:
 
 def warnings(look: Look) -> tuple[str, ...]:
     """Return a warning where the error by the advance is above its tolerance, or unknown."""
-    settled, tolerance = look.outcome.settled, settling(look.parameters)
+    settled, tolerance = look.outcome.settled, refinement(look.parameters)
     if look.parameters.endless or tolerance is None or settled.error <= tolerance.tolerance:
         return ()
     advance = look.parameters.schedule.increment
@@ -243,7 +243,7 @@ ROLLING = Scene(
     outputs=(*_STRESS, contact, extremes, wheel, cycles),
     costs=(cost, progress),
     trace=Trace.of,
-    settling=settling,
+    refinement=refinement,
     effort=effort,
     warnings=warnings,
     advice={

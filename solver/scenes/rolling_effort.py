@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from solver.loading.settling import HALVINGS
+from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import track_lines
 from solver.scenes.effort import Effort, lattice
 from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes

@@ -17,12 +17,12 @@ from solver.results.audit.steady import OfPass, audit_pass
 from solver.results.look import Look
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.steady import HalfPlane, SteadyContact
+from solver.results.steady import SteadyContact, TrackBody
 from solver.results.touch import Prescribed
 from solver.scenes.passes import Trace, shakedown_of
 from solver.scenes.rolling_steady import steady_passes, track_for
 from solver.scenes.scene import by_increments
-from solver.steady import Touching, standing_pressure
+from solver.steady import RollingContact, standing_pressure
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ class _Side:
     """What one sees of a load that goes one way along x: 1 or -1."""
 
     def __init__(self, track: Track, view: View, way: int) -> None:
-        self.half_plane = HalfPlane(track, way)
+        self.half_plane = TrackBody(track, way)
         self.samples = Samples(self.half_plane, view)
 
     @cached_property
@@ -209,7 +209,7 @@ class _Side:
             strain=strain[None],
             flow=flow,
             surface=left.displacement(elasticity)[:, None],
-            creepage=touching.creepage if isinstance(touching, Touching) else np.nan,
+            creepage=touching.creepage if isinstance(touching, RollingContact) else np.nan,
             peak=float(left.accumulated.max()),
         )
 

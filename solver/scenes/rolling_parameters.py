@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.loading.settling import HALVINGS
+from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import MOST_COLUMNS, window_elements
 from solver.scenes.material_parameters import LINEAR
 from solver.scenes.parameters import Accuracy, by_accuracy, described

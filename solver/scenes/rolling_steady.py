@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from solver.scenes.rolling_parameters import RollingParameters
     from solver.steady import Pass, Track
-    from solver.steady.load import Load
+    from solver.steady.load import PassingLoad
 
     Array = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def _rim(radius: float, reach: float, h: float, material: Material) -> Rim:
     return Rim(wheel_body(axle, reach, h, material), "rim")
 
 
-def load_on(track: Track, run: RollingParameters, parameters: RollingParameters) -> Load:
+def load_on(track: Track, run: RollingParameters, parameters: RollingParameters) -> PassingLoad:
     """Return what passes over the track of a run, along +x, with the parameters of a pass.
 
     Raises

@@ -11,7 +11,7 @@ from solver.errors import LimitLoad
 from solver.loading.control import Control
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
-from solver.loading.settling import Settling
+from solver.loading.refinement import StepRefinement
 from solver.model.model import Model
 from solver.results.audit.figures import AUDIT
 from solver.results.look import Look, Output, Values
@@ -59,7 +59,7 @@ class Scene:
         where there is none
     trace : (samples, states of a lap) -> what is kept of each lap
     watch : (samples, converged increment) -> what is kept of it in ``outcome.history``
-    settling : (parameters) -> how increments are halved, or None to take those of the program
+    refinement : (parameters) -> how increments are halved, or None to take those of the program
     effort : (parameters, values of ``branch``) -> the work of walking this path, told in
         microseconds, without a mesh; without it a study is estimated by its runs alone
     warnings : (run) -> texts for the user, added to the message of its record
@@ -83,7 +83,7 @@ class Scene:
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
     watch: Callable[[Samples, Any], Any] | None = None
-    settling: Callable[[Any], Settling | None] | None = None
+    refinement: Callable[[Any], StepRefinement | None] | None = None
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
     warnings: Callable[[Look], tuple[str, ...]] | None = None
     advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
@@ -192,7 +192,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
         system,
         Control(),
         trace=partial(scene.trace, samples) if scene.trace else None,
-        settling=scene.settling(last) if scene.settling else None,
+        refinement=scene.refinement(last) if scene.refinement else None,
         report=_counted(programs, monitor),
         watch=partial(scene.watch, samples) if scene.watch else None,
     )

@@ -9,7 +9,7 @@ from solver.steady.layers import Layers
 from solver.steady.passing import Pass
 from solver.steady.rim import Rim
 from solver.steady.rolling import rolling
-from solver.steady.touching import Touching
+from solver.steady.touching import RollingContact
 from solver.steady.track import Track, standing_pressure, track_of
 from solver.steady.wheel import RollingWheel
 
@@ -17,8 +17,8 @@ __all__ = [
     "Layers",
     "Pass",
     "Rim",
+    "RollingContact",
     "RollingWheel",
-    "Touching",
     "Track",
     "rolling",
     "standing_pressure",

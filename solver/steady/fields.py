@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 
     from solver.steady.layers import Layers
     from solver.steady.passing import Pass
-    from solver.steady.rows import Rows
+    from solver.steady.rows import FlowRows
     from solver.steady.track import Track
 
     Array = NDArray[np.float64]
 
 
-class Fields(NamedTuple):
+class TrackFields(NamedTuple):
     """Displacements (n,) [mm], strain (4, n_points) Mandel, and internal variables.
 
-    ``surface`` has strain and internal variables at the surface, above `Rows.highest`.
+    ``surface`` has strain and internal variables at the surface, above `FlowRows.highest`.
     """
 
     u: Array
@@ -32,7 +32,7 @@ class Fields(NamedTuple):
     surface: tuple[Array, PlasticState]
 
 
-def of_layers(track: Track, layers: Layers) -> Fields:
+def of_layers(track: Track, layers: Layers) -> TrackFields:
     """Return the fields of a half-plane whose state is a function of depth alone."""
     rows, n = track.rows, track.part.weights.size
 
@@ -44,10 +44,10 @@ def of_layers(track: Track, layers: Layers) -> Fields:
         return strain, plastic
 
     above = at(rows.above, len(rows.highest), layers.top)
-    return Fields(_sunk(track, layers), *at(rows.every, n, layers), above)
+    return TrackFields(_sunk(track, layers), *at(rows.every, n, layers), above)
 
 
-def under_load(track: Track, found: Pass) -> Fields:
+def under_load(track: Track, found: Pass) -> TrackFields:
     """Return the fields while the load of a pass is there, which goes along +x."""
     rows, before, after = track.rows, of_layers(track, found.before), found.after
     grown = after.plastic_strain - found.before.plastic_strain
@@ -62,7 +62,7 @@ def under_load(track: Track, found: Pass) -> Fields:
 
 
 def _pass(
-    rows: Rows,
+    rows: FlowRows,
     every: NDArray[np.int64],
     plastic: PlasticState,
     flow: tuple[Array, Array],

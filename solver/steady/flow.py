@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
-    from solver.steady.rows import Rows
+    from solver.steady.rows import FlowRows
 
     Array = NDArray[np.float64]
 
@@ -27,11 +27,11 @@ LEAST = 0.05
 much for the deepest row."""
 
 
-class Flow:
+class RowFlow:
     """What material gathers on its way along the rows for given strains, and its derivative."""
 
     def __init__(
-        self, rows: Rows, material: Material, before: Layers, added: Array, parts: int
+        self, rows: FlowRows, material: Material, before: Layers, added: Array, parts: int
     ) -> None:
         rule, self._elasticity = material.hardening_rule, material.elasticity
         double_shear = 2 * self._elasticity.shear_modulus

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Loading:
+class AppliedLoad:
     """A load on a track whose m unknowns its operator keeps.
 
     Attributes
@@ -30,16 +30,16 @@ class Loading:
     along: Callable[[Array], Array]
 
 
-class Load(Protocol):
+class PassingLoad(Protocol):
     """Something that passes over a track along +x."""
 
-    def on(self, u: Array) -> Loading:
+    def on(self, u: Array) -> AppliedLoad:
         """Return the load on a track that has these displacements (m,) without it."""
 
-    def scaled(self, share: float) -> Load:
+    def scaled(self, share: float) -> PassingLoad:
         """Return the same load with a share of its forces."""
 
-    def driven(self, share: float) -> Load:
+    def driven(self, share: float) -> PassingLoad:
         """Return the same load, driven or braked by a share of its moment."""
 
     @property
@@ -47,7 +47,7 @@ class Load(Protocol):
         """Given moment that drives or, if positive, brakes it / radius [N]; 0 where none is."""
 
     @property
-    def slipping(self) -> Load:
+    def slipping(self) -> PassingLoad:
         """The same load, driven or braked by what full slip bears, if a moment does it."""
 
 
@@ -58,24 +58,24 @@ class Given:
     force: Array
     u: Array
 
-    def on(self, u: Array) -> Loading:
-        """See `Load`."""
-        return Loading(self.force, u + self.u, lambda change: change)
+    def on(self, u: Array) -> AppliedLoad:
+        """See `PassingLoad`."""
+        return AppliedLoad(self.force, u + self.u, lambda change: change)
 
     def scaled(self, share: float) -> Given:
-        """See `Load`."""
+        """See `PassingLoad`."""
         return Given(share * self.force, share * self.u)
 
     def driven(self, share: float) -> Given:
-        """See `Load`; its shear is no moment."""
+        """See `PassingLoad`; its shear is no moment."""
         return self
 
     @property
     def moment(self) -> float:
-        """See `Load`."""
+        """See `PassingLoad`."""
         return 0.0
 
     @property
     def slipping(self) -> Given:
-        """See `Load`."""
+        """See `PassingLoad`."""
         return self

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
-from solver.steady.flow import Flow
+from solver.steady.flow import RowFlow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
-    from solver.steady.load import Load, Loading
+    from solver.steady.load import AppliedLoad, PassingLoad
     from solver.steady.track import Track
 
     Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ class Pass:
     accumulated: Array
     surface: tuple[Array, Array]
     last_steps: tuple[Array, Array]
-    loading: Loading
+    loading: AppliedLoad
     left_over: float
     steps: int
     solves: int
@@ -108,7 +108,7 @@ class Pass:
 def passing(
     track: Track,
     material: Material,
-    load: Load,
+    load: PassingLoad,
     before: Layers,
     guess: Array | None = None,
     *,
@@ -145,7 +145,7 @@ def passing(
     def at(added: Array) -> _At:
         nonlocal solves
         solves += 1
-        flow = Flow(rows, material, before, added, parts)
+        flow = RowFlow(rows, material, before, added, parts)
         loading = load.on(solve(flow.force))
         residual = rows.strain(loading.u) - added
         return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
@@ -207,8 +207,8 @@ class _At:
     """Where Newton's method is: strains, what they make, the residual and its norm."""
 
     added: Array
-    flow: Flow
-    loading: Loading
+    flow: RowFlow
+    loading: AppliedLoad
     residual: Array
     size: float
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
-    from solver.steady.load import Load
+    from solver.steady.load import PassingLoad
     from solver.steady.passing import Pass
     from solver.steady.track import Track
 
@@ -62,7 +62,7 @@ class Expected:
 def rolling(
     track: Track,
     material: Material,
-    load: Load | Iterable[Load],
+    load: PassingLoad | Iterable[PassingLoad],
     directions: Iterable[int],
     *,
     guess: Array | None = None,

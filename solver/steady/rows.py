@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
-    from solver.steady.condensed import Condensed
+    from solver.steady.condensed import CondensedTrack
 
     Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _LEVEL = 1e-6
 """Difference of depth / depth of the rows, up to which points lie on one row."""
 
 
-class Rows:
+class FlowRows:
     """The points of the window, and the strain that plastic strain there makes.
 
     Parameters
@@ -53,7 +53,7 @@ class Rows:
     def __init__(
         self,
         part: Discretisation,
-        operator: Condensed,
+        operator: CondensedTrack,
         ahead: float,
         behind: float,
         deep: float,
@@ -145,7 +145,7 @@ class Rows:
         """Return the strains (n_rows, n_columns, 4) of displacements (m,)."""
         return np.asarray((self._strain @ u).reshape(*self.shape, 4))
 
-    def interpolated(self, strain: Array, rows: Rows) -> Array:
+    def interpolated(self, strain: Array, rows: FlowRows) -> Array:
         """Return strains (n_rows, n_columns, 4) here from those at the points of other rows."""
         x, depth = (rows.part.points.reshape(2, -1)[k, rows.points] for k in (0, 1))
         here = self.part.points.reshape(2, -1)[:, self.points]

@@ -17,7 +17,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, WindowTooSmall
 from solver.steady.passing import PARTS, TOLERANCE, passing
-from solver.steady.touching import Touching
+from solver.steady.touching import RollingContact
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.steady.layers import Layers
-    from solver.steady.load import Load
+    from solver.steady.load import PassingLoad
     from solver.steady.passing import Pass
     from solver.steady.track import Track
 
@@ -51,7 +51,7 @@ _PARTS, _TOLERANCE = 8, 2e-3
 def search(
     track: Track,
     material: Material,
-    load: Load,
+    load: PassingLoad,
     before: Layers,
     guess: Array | None = None,
     *,
@@ -67,10 +67,10 @@ def search(
         30 % of plastic strain
     """
 
-    def exactly(load: Load, guess: Array | None = None) -> Pass:
+    def exactly(load: PassingLoad, guess: Array | None = None) -> Pass:
         return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
 
-    def eased(load: Load, ratio: float, guess: Array | None) -> Pass:
+    def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass:
         harder = replace(material, hardening="kinematic", hardening_ratio=ratio)
         return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
 
@@ -107,7 +107,7 @@ def _too_much(ratio: float) -> LimitLoad:
     return LimitLoad(f"{much}: this counts as the limit")
 
 
-def _not_spinning(exactly: Callable[[Load], Pass], load: Load) -> None:
+def _not_spinning(exactly: Callable[[PassingLoad], Pass], load: PassingLoad) -> None:
     """Raise `Spins` where a wheel is turned by more than full slip bears.
 
     That may be less than friction times load. Shear on a slope carries a part of the load, and
@@ -116,7 +116,7 @@ def _not_spinning(exactly: Callable[[Load], Pass], load: Load) -> None:
     most = _tried(exactly, load.slipping) if load.moment else None
     if most is None or isinstance(most, NotConverged):
         return
-    assert isinstance(most.loading, Touching)
+    assert isinstance(most.loading, RollingContact)
     borne = most.loading.moment / load.moment
     if borne < 1.0:
         much = (
@@ -173,7 +173,7 @@ def _fading(
 
 def _approached(
     exactly: Callable[..., Pass],
-    eased: Callable[[float], Load],
+    eased: Callable[[float], PassingLoad],
     shares: tuple[float, ...],
     begun: Pass | NotConverged | None,
     failure: NotConverged,

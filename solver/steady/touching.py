@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.steady.load import Loading
+from solver.steady.load import AppliedLoad
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Touching(Loading):
+class RollingContact(AppliedLoad):
     """A wheel on a track.
 
     Attributes

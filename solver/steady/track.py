@@ -18,9 +18,9 @@ from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
-from solver.steady.condensed import Condensed
+from solver.steady.condensed import CondensedTrack
 from solver.steady.load import Given
-from solver.steady.rows import Rows
+from solver.steady.rows import FlowRows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,7 +78,7 @@ class Track:
         self._contact = _CONTACT * reach * a
         self.part = Discretisation(_body(*self._lines, self._contact, elasticity))
         self._window = h * ahead, h * behind, window_depth(a, reach)
-        self.rows = Rows(self.part, self.operator, *self._window, interleaved=interleaved)
+        self.rows = FlowRows(self.part, self.operator, *self._window, interleaved=interleaved)
 
     @cached_property
     def mirrored(self) -> Discretisation:
@@ -102,13 +102,13 @@ class Track:
         return self.part.body.law.elasticity
 
     @cached_property
-    def operator(self) -> Condensed:
+    def operator(self) -> CondensedTrack:
         """The inverse of the elastic stiffness, which keeps the m unknowns of the window."""
         x, y = self.part.X
         ahead, behind, deep = self._window
         edge = 1e-6 * deep
         inside = (x < ahead + edge) & (x > -behind - edge) & (y > -deep - edge)
-        return Condensed(self.part, np.flatnonzero(inside))
+        return CondensedTrack(self.part, np.flatnonzero(inside))
 
     @cached_property
     def at_surface(self) -> NDArray[np.int64]:

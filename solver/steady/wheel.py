@@ -28,7 +28,7 @@ from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem
 from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.steady.rim import flowed
-from solver.steady.touching import Touching
+from solver.steady.touching import RollingContact
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -150,7 +150,7 @@ class RollingWheel:
             other._drive, other._creepage = None, float(np.sign(self.moment))
         return other
 
-    def on(self, u: Array) -> Touching:
+    def on(self, u: Array) -> RollingContact:
         """See `Load`.
 
         Raises
@@ -173,7 +173,7 @@ class RollingWheel:
         moved = problem.offset + problem.W @ found.forces + problem.A @ found.rigid
         gap[geometry.at] = moved[: len(geometry.at)]
         turns = self._drive is not None
-        return Touching(
+        return RollingContact(
             force=self._nodal(self._known.on_track),
             u=u + response @ self._known.on_track,
             along=along,

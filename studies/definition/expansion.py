@@ -28,7 +28,7 @@ class _Setting(NamedTuple):
     entries: tuple[str, ...]
 
 
-class _Axis(NamedTuple):
+class _SweepAxis(NamedTuple):
     """An axis: the parameters it sets, their places in the names of runs and of paths."""
 
     names: tuple[str, ...]
@@ -120,7 +120,7 @@ class Expansion:
     def _indices(self) -> Iterator[tuple[int, ...]]:
         return itertools.product(*(range(len(axis.settings)) for axis in self._sets))
 
-    def _at(self, index: tuple[int, ...]) -> list[tuple[_Axis, _Setting]]:
+    def _at(self, index: tuple[int, ...]) -> list[tuple[_SweepAxis, _Setting]]:
         return [(axis, axis.settings[i]) for axis, i in zip(self._sets, index, strict=True)]
 
     def _case(self, index: tuple[int, ...]) -> Case:
@@ -138,7 +138,7 @@ class Expansion:
             values.update(zip(axis.names, setting.typed, strict=True))
         return self._scene.parameters(**values)
 
-    def _axis(self, settings: list[dict[str, Any]]) -> _Axis:
+    def _axis(self, settings: list[dict[str, Any]]) -> _SweepAxis:
         known = parameters_of(self._scene)
         names = tuple(settings[0])
         positions = [
@@ -149,7 +149,7 @@ class Expansion:
             )
             for values in settings
         ]
-        return _Axis(names, self._run.places(names), self._path.places(names), positions)
+        return _SweepAxis(names, self._run.places(names), self._path.places(names), positions)
 
     def _located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
         """Return what the scene refused, named as the study file names it.

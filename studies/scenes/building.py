@@ -16,7 +16,7 @@ from solver.scenes.material_parameters import MaterialParameters
 from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
-from studies.scenes.shape_tables import Line
+from studies.scenes.shape_tables import LineTable
 from studies.scenes.shapes import mesh_of
 
 if TYPE_CHECKING:
@@ -102,7 +102,9 @@ class Builder:
             f"materials.{name}", lambda: MaterialParameters(**given).material(elastic=elastic)
         )
 
-    def _body(self, name: str, table: tables.Body, laws: Mapping[str, Law | None]) -> Body | None:
+    def _body(
+        self, name: str, table: tables.BodyTable, laws: Mapping[str, Law | None]
+    ) -> Body | None:
         from solver.model.body import Body
 
         where = f"bodies.{name}"
@@ -144,22 +146,22 @@ class Builder:
             ),
         )
 
-    def _rigid(self, name: str, table: tables.Rigid) -> RigidBody | None:
-        from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc
+    def _rigid(self, name: str, table: tables.RigidTable) -> RigidBody | None:
+        from solver.model.rigid import Moved, Pushed, RigidBody, RigidSurface, arc
 
         if f"rigid.{name}" in self.absent:
             return None
         self._boundaries[name] = list(table.surfaces)
         surfaces = {}
         for each, surface in table.surfaces.items():
-            if isinstance(surface, Line):
-                surfaces[each] = Curve(points=np.array(surface.points).T)
+            if isinstance(surface, LineTable):
+                surfaces[each] = RigidSurface(points=np.array(surface.points).T)
             else:
                 start, end = np.radians(surface.angles)
                 surfaces[each] = arc(surface.centre, surface.radius, (start, end), surface.edges)
         motions: dict[str, Moved | Pushed] = {}
         for axis in ("x", "y", "rotation"):
-            motion: tables.Motion = getattr(table, axis)
+            motion: tables.MotionTable = getattr(table, axis)
             amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
             if motion.pushed is not None:
                 motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude)
@@ -192,7 +194,7 @@ class Builder:
 
         where = f"loads[{k}]"
         given = table.model_dump(exclude={"kind", "body", "amplitude"}, exclude_unset=True)
-        if isinstance(table, tables.InitialStress):
+        if isinstance(table, tables.InitialStressTable):
             even = np.array([[table.xx], [table.yy], [table.zz], [table.xy]])
             return loads.InitialStress(stress=lambda x: np.tile(even, x.shape[1]))
         kinds = {"pressure": loads.Pressure, "traction": loads.Traction,
@@ -200,7 +202,7 @@ class Builder:
         made: Load = kinds[table.kind](**given, amplitude=self._amplitude(where, table.amplitude))
         return made
 
-    def _contact(self, k: int, table: tables.Contact) -> ContactPair | None:
+    def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
 
         given = table.model_dump(exclude={"name", "slave", "master", "amplitude", "shear_limit"})
@@ -264,12 +266,12 @@ def _place(names: list[str]) -> Any:
     return words
 
 
-def mesh_of_body(table: tables.Body, meshes: Mapping[str, MeshFile] | None) -> Mesh:
+def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
     """Return the mesh of a body where it stands, with the boundaries of its table."""
     return _placed(_made(table, meshes), table)
 
 
-def _made(table: tables.Body, meshes: Mapping[str, MeshFile] | None) -> Mesh:
+def _made(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
     """Return the mesh of a body as its shape or its file has it."""
     if table.mesh is None:
         cells = "tri" if (table.element or "").startswith("tri") else "quad"
@@ -279,7 +281,7 @@ def _made(table: tables.Body, meshes: Mapping[str, MeshFile] | None) -> Mesh:
     return meshes[table.mesh].mesh(table.part)
 
 
-def _placed(mesh: Mesh, table: tables.Body) -> Mesh:
+def _placed(mesh: Mesh, table: tables.BodyTable) -> Mesh:
     """Return a mesh where its body stands, with the boundaries of its table."""
     if any(table.move):
         mesh = mesh.translated(table.move)
@@ -287,7 +289,7 @@ def _placed(mesh: Mesh, table: tables.Body) -> Mesh:
     return mesh.with_boundaries(own) if own else mesh
 
 
-def _within(mesh: Mesh, name: str, table: tables.Boundary) -> Any:
+def _within(mesh: Mesh, name: str, table: tables.BoundaryTable) -> Any:
     """Return the facets of other boundaries whose middles lie in a box."""
     known = mesh.boundaries or {}
     for other in table.of:

@@ -37,7 +37,7 @@ def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[S
 
 
 def declarations(
-    parameters: Mapping[str, tables.Parameter], used: set[str]
+    parameters: Mapping[str, tables.ParameterTable], used: set[str]
 ) -> Iterator[StudyError]:
     """Yield what is wrong with declared parameters.
 
@@ -147,7 +147,7 @@ def _look(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield from _one_of(f"look.points.{name}.body", point.body, scene.bodies)
 
 
-def _map(where: str, axis: tables.Spaced) -> Iterator[StudyError]:
+def _map(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
     start, stop = axis.start, axis.stop
     if not start < stop:
         yield StudyError(f"{where}.stop", stop, f"must be > start = {start:g}")

@@ -19,7 +19,7 @@ from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
-from studies.scenes.tables import Parameter, SceneFile
+from studies.scenes.tables import ParameterTable, SceneFile
 from studies.toml import toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived")
@@ -109,7 +109,7 @@ class Description:
         return self.digest, json.dumps(self.content, sort_keys=True, default=str)
 
     @cached_property
-    def parameters(self) -> dict[str, Parameter]:
+    def parameters(self) -> dict[str, ParameterTable]:
         """The declared parameters.
 
         Raises

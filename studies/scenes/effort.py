@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from studies.scenes.description import Description
 
 
-class _Size(NamedTuple):
+class _MeshSize(NamedTuple):
     """Elements and nodes of a mesh, and edges of its boundaries."""
 
     elements: int
@@ -59,11 +59,11 @@ def effort_of(
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
 
 
-_SIZES: WeakKeyDictionary[Description, dict[str, _Size]] = WeakKeyDictionary()
+_SIZES: WeakKeyDictionary[Description, dict[str, _MeshSize]] = WeakKeyDictionary()
 """What was found of the bodies of each file that is in use, by their tables."""
 
 
-def _size_of(description: Description, name: str, body: tables.Body) -> _Size:
+def _size_of(description: Description, name: str, body: tables.BodyTable) -> _MeshSize:
     """Return the size of a body."""
     known = _SIZES.setdefault(description, {})
     key = body.model_dump_json(exclude={"supports", "material"})
@@ -76,8 +76,8 @@ def _size_of(description: Description, name: str, body: tables.Body) -> _Size:
     return known[key]
 
 
-def _size(body: tables.Body, mesh: Mesh) -> _Size:
+def _size(body: tables.BodyTable, mesh: Mesh) -> _MeshSize:
     quadratic = body.element not in ("quad4", "tri3")
     nodes = mesh.nvertices + quadratic * mesh.nfacets + (body.element == "quad9") * mesh.nelements
     edges = {name: len(facets) for name, facets in (mesh.boundaries or {}).items()}
-    return _Size(mesh.nelements, int(nodes), edges)
+    return _MeshSize(mesh.nelements, int(nodes), edges)

@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.results.asked import Asked, Looked
 from solver.results.places import (
-    Fields,
     Places,
+    SystemFields,
     along_lines,
     at_points,
     on_pairs,
@@ -75,7 +75,7 @@ def places_of(scene: tables.SceneFile) -> Looked:
 def looked(scene: tables.SceneFile, program: Program, look: Look) -> Values:
     """Return all that a scene file asks for of a run."""
     system: Any = look.system
-    fields = Fields(system, {name: look.outcome.points[name] for name in look.view.stages})
+    fields = SystemFields(system, {name: look.outcome.points[name] for name in look.view.stages})
     lines, points, contacts, numbers = places_of(scene)
     out: dict[Any, Any] = {}
     if lines:
@@ -91,7 +91,7 @@ def looked(scene: tables.SceneFile, program: Program, look: Look) -> Values:
     return out
 
 
-def places(line: tables.LookLine, samples: int) -> Array:
+def places(line: tables.LookLineTable, samples: int) -> Array:
     """Return the points of a line (2, n) [mm]."""
     if line.start is not None and line.end is not None:
         return np.linspace(line.start, line.end, samples).T

@@ -194,7 +194,9 @@ def _branch(description: Description) -> str:
     return "" if name in others else name
 
 
-def _parameters(description: Description, declared: Mapping[str, tables.Parameter]) -> type[Any]:
+def _parameters(
+    description: Description, declared: Mapping[str, tables.ParameterTable]
+) -> type[Any]:
     """Return the class of the scene's parameters, which checks itself as those of scenes do."""
 
     def checked(self: Any) -> None:
@@ -234,13 +236,13 @@ def _again(description: Description, values: Mapping[str, Any]) -> Any:
     return file_scene(description).parameters(**values)
 
 
-def _default(declared: tables.Parameter) -> Any:
+def _default(declared: tables.ParameterTable) -> Any:
     """Return a default; a whole number with a unit is a length or the like, not a count."""
     whole = isinstance(declared.default, int) and not isinstance(declared.default, bool)
     return float(declared.default) if whole and declared.unit != "1" else declared.default
 
 
-def _kind(declared: tables.Parameter) -> Any:
+def _kind(declared: tables.ParameterTable) -> Any:
     """Return the annotated type of a parameter."""
     default = _default(declared)
     if isinstance(default, bool):

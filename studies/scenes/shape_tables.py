@@ -8,10 +8,10 @@ from annotated_types import Interval
 from pydantic import Field
 
 from solver.scenes.parameters import Length
-from studies.scenes.table import Count, Place, Span, Table
+from studies.scenes.table import Count, Place, SceneTable, Span
 
 
-class Near(Table):
+class NearTable(SceneTable):
     """Where a built-in shape is meshed finely.
 
     Elements have the side ``size`` [mm] within ``radius`` of the place, and grow away from there.
@@ -22,7 +22,7 @@ class Near(Table):
     radius: Annotated[float, Interval(ge=0.0, le=1e6)] = 0.0
 
 
-class _Meshed(Table):
+class _MeshedTable(SceneTable):
     """What shapes that are divided along two directions have.
 
     ``size`` is the largest element side, ``growth`` the ratio of neighbouring sides.
@@ -30,10 +30,10 @@ class _Meshed(Table):
 
     size: Length
     growth: Annotated[float, Interval(gt=1.0, le=3.0)] = 1.3
-    near: tuple[Near, ...] = ()
+    near: tuple[NearTable, ...] = ()
 
 
-class Rectangle(_Meshed):
+class RectangleTable(_MeshedTable):
     """From ``x[0]`` to ``x[1]`` and ``y[0]`` to ``y[1]``: left, right, bottom, top."""
 
     kind: Literal["rectangle"]
@@ -41,7 +41,7 @@ class Rectangle(_Meshed):
     y: Span
 
 
-class HalfPlane(_Meshed):
+class HalfPlaneTable(_MeshedTable):
     """A rectangle below y = 0, as deep as it reaches to either side; its half where symmetric."""
 
     kind: Literal["half_plane"]
@@ -49,7 +49,7 @@ class HalfPlane(_Meshed):
     symmetric: bool = False
 
 
-class Pad(_Meshed):
+class PadTable(_MeshedTable):
     """A block on y = 0, its bottom an arc that touches x = 0: left, right, bottom, top.
 
     It is as high at its sides as in its middle.
@@ -61,7 +61,7 @@ class Pad(_Meshed):
     radius: Length
 
 
-class Ring(_Meshed):
+class RingTable(_MeshedTable):
     """Between two radii, and between two angles [degrees]: inner, outer, start, end."""
 
     kind: Literal["ring", "sector"]
@@ -70,7 +70,7 @@ class Ring(_Meshed):
     angles: Span = (0.0, 360.0)
 
 
-class Fillet(_Meshed):
+class FilletTable(_MeshedTable):
     """A bar that narrows from ``wide`` to ``narrow`` over a fillet at y = 0, its axis at x = 0.
 
     It reaches ``lengths`` below and above: left (the axis), bottom, right (the end of the wide
@@ -84,7 +84,7 @@ class Fillet(_Meshed):
     lengths: tuple[Length, Length]
 
 
-class Disc(Table):
+class DiscTable(SceneTable):
     """A whole disc, meshed evenly: rim, and its quarters east, north, west, south."""
 
     kind: Literal["disc"]
@@ -93,7 +93,7 @@ class Disc(Table):
     size: Length
 
 
-class Round(Table):
+class RoundTable(SceneTable):
     """A disc that touches y = 0 at ``at``, fine there, without a cap on its far side.
 
     Its boundaries are those of `solver.mesh.ball`: where it lies above, surface and cap.
@@ -110,18 +110,19 @@ class Round(Table):
 
 
 Shape = Annotated[
-    Rectangle | HalfPlane | Pad | Ring | Fillet | Disc | Round, Field(discriminator="kind")
+    RectangleTable | HalfPlaneTable | PadTable | RingTable | FilletTable | DiscTable | RoundTable,
+    Field(discriminator="kind"),
 ]
 
 
-class Line(Table):
+class LineTable(SceneTable):
     """A straight surface of a rigid body, which lies on the left of one who walks along it."""
 
     kind: Literal["line"]
     points: Annotated[tuple[Place, ...], Field(min_length=2, max_length=10_000)]
 
 
-class Arc(Table):
+class ArcTable(SceneTable):
     """An arc [degrees]; counter-clockwise the rigid body is inside the circle."""
 
     kind: Literal["arc"]

@@ -38,29 +38,32 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
     ModelError
         naming the entry of the shape that is wrong
     """
-    if cells == "tri" and not isinstance(shape, tables.Rectangle | tables.HalfPlane):
+    if cells == "tri" and not isinstance(shape, tables.RectangleTable | tables.HalfPlaneTable):
         raise ModelError("element", cells, f"a {shape.kind} is meshed with quadrilaterals")
     match shape:
-        case tables.Rectangle():
+        case tables.RectangleTable():
             return _rectangle(shape, shape.x, shape.y, cells)
-        case tables.HalfPlane(extent=extent):
+        case tables.HalfPlaneTable(extent=extent):
             return _rectangle(
                 shape, (0.0 if shape.symmetric else -extent, extent), (-extent, 0.0), cells
             )
-        case tables.Pad():
+        case tables.PadTable():
             return _pad(shape)
-        case tables.Ring():
+        case tables.RingTable():
             return _ring(shape)
-        case tables.Fillet():
+        case tables.FilletTable():
             return _fillet(shape)
-        case tables.Disc():
+        case tables.DiscTable():
             return _disc(shape)
         case _:
             return _round(shape)
 
 
 def _rectangle(
-    shape: tables.Rectangle | tables.HalfPlane | tables.Pad, x: Span, y: Span, cells: str
+    shape: tables.RectangleTable | tables.HalfPlaneTable | tables.PadTable,
+    x: Span,
+    y: Span,
+    cells: str,
 ) -> Mesh:
     from solver.mesh import grid
 
@@ -71,7 +74,7 @@ def _rectangle(
     return grid(along, up, cells)
 
 
-def _pad(shape: tables.Pad) -> Mesh:
+def _pad(shape: tables.PadTable) -> Mesh:
     from solver.mesh import mapped
 
     half, R = shape.width / 2, shape.radius
@@ -88,7 +91,7 @@ def _pad(shape: tables.Pad) -> Mesh:
     return mapped(block, bent)
 
 
-def _ring(shape: tables.Ring) -> Mesh:
+def _ring(shape: tables.RingTable) -> Mesh:
     from solver.mesh import grid, mapped
     from solver.mesh.grids import merged
 
@@ -122,7 +125,7 @@ def _ring(shape: tables.Ring) -> Mesh:
     return _named(bent, names)
 
 
-def _fillet(shape: tables.Fillet) -> Mesh:
+def _fillet(shape: tables.FilletTable) -> Mesh:
     from solver.mesh import grid, mapped
 
     wide, narrow, r = shape.wide, shape.narrow, shape.radius
@@ -169,7 +172,7 @@ def _fillet(shape: tables.Fillet) -> Mesh:
     })  # fmt: skip
 
 
-def _disc(shape: tables.Disc) -> Mesh:
+def _disc(shape: tables.DiscTable) -> Mesh:
     from solver.mesh import grid, mapped
     from solver.mesh.grids import merged
 
@@ -222,7 +225,7 @@ def _joined(blocks: Sequence[Any]) -> Any:
     return MeshQuad2(doflocs=nodes, t=joined.t, sort_t=False, validate=False)
 
 
-def _round(shape: tables.Round) -> Mesh:
+def _round(shape: tables.RoundTable) -> Mesh:
     from solver.mesh import grid, mapped
     from solver.mesh.ball import ball_lines, onto_disc
 

@@ -20,7 +20,7 @@ Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
 """A surface: ``body.boundary``."""
 
 
-class Table(BaseModel):
+class SceneTable(BaseModel):
     """A table without unknown entries; numbers are finite."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

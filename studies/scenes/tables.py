@@ -13,13 +13,13 @@ from pydantic import Field, StringConstraints, create_model
 from solver.mesh.grids import closer
 from solver.scenes.material_parameters import MaterialParameters
 from solver.scenes.parameters import Friction, Length, Stress
-from studies.scenes.shape_tables import Arc, Line, Shape
-from studies.scenes.table import Count, FileName, Label, Place, Side, Span, Table
+from studies.scenes.shape_tables import ArcTable, LineTable, Shape
+from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
 
 # -- bodies ------------------------------------------------------------------------------------
 
 
-class Boundary(Table):
+class BoundaryTable(SceneTable):
     """Facets of other boundaries whose middles lie in a box, under a name of their own."""
 
     of: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -27,7 +27,7 @@ class Boundary(Table):
     y: Span | None = None
 
 
-class Body(Table):
+class BodyTable(SceneTable):
     """A body: a shape, or a mesh file and the part of it that the body is."""
 
     material: str
@@ -36,11 +36,11 @@ class Body(Table):
     part: str | None = None
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] | None = None
     move: Place = (0.0, 0.0)
-    boundaries: dict[Label, Boundary] = Field(default_factory=dict)
+    boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)
 
 
-def _material() -> type[Table]:
+def _material() -> type[SceneTable]:
     """Return the table of a material: the parameters of the scenes' materials."""
     hints = get_type_hints(MaterialParameters, include_extras=True)
     known = {
@@ -50,7 +50,7 @@ def _material() -> type[Table]:
     }
     known |= {name: (hints[name], ...) for name in ("youngs_modulus", "poisson_ratio")}
     known["yield_stress"] = (Stress | None, None)
-    made: type[Table] = create_model("Material", __base__=Table, **known)  # type: ignore[call-overload]
+    made: type[SceneTable] = create_model("Material", __base__=SceneTable, **known)  # type: ignore[call-overload]
     made.__doc__ = "A material; one without a yield stress is elastic."
     return made
 
@@ -65,7 +65,7 @@ Amplitude = dict[Label, float]
 """Stage -> load factor at its end; a stage left out keeps that of the one before."""
 
 
-class Motion(Table):
+class MotionTable(SceneTable):
     """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``)."""
 
     moved: float | None = None
@@ -73,27 +73,28 @@ class Motion(Table):
     amplitude: Amplitude | None = None
 
 
-class Rigid(Table):
+class RigidTable(SceneTable):
     """A rigid body: its surfaces by name, its centre and motions."""
 
     surfaces: Annotated[
-        dict[Label, Annotated[Line | Arc, Field(discriminator="kind")]], Field(min_length=1)
+        dict[Label, Annotated[LineTable | ArcTable, Field(discriminator="kind")]],
+        Field(min_length=1),
     ]
     centre: Place = (0.0, 0.0)
-    x: Motion = Motion()
-    y: Motion = Motion()
-    rotation: Motion = Motion()
+    x: MotionTable = MotionTable()
+    y: MotionTable = MotionTable()
+    rotation: MotionTable = MotionTable()
 
 
 # -- what acts -----------------------------------------------------------------------------------
 
 
-class _Load(Table):
+class _LoadTable(SceneTable):
     body: str
     amplitude: Amplitude | None = None
 
 
-class Pressure(_Load):
+class PressureTable(_LoadTable):
     """A pressure on a boundary, positive when it pushes [MPa]."""
 
     kind: Literal["pressure"]
@@ -101,7 +102,7 @@ class Pressure(_Load):
     value: float
 
 
-class Traction(_Load):
+class TractionTable(_LoadTable):
     """A force per area in fixed directions [MPa]."""
 
     kind: Literal["traction"]
@@ -110,7 +111,7 @@ class Traction(_Load):
     y: float = 0.0
 
 
-class Displacement(_Load):
+class DisplacementTable(_LoadTable):
     """A prescribed displacement of a boundary [mm]; what is left out is free."""
 
     kind: Literal["displacement"]
@@ -119,7 +120,7 @@ class Displacement(_Load):
     y: float | None = None
 
 
-class Temperature(_Load):
+class TemperatureTable(_LoadTable):
     """An even rise of temperature [K], which expands and softens the body."""
 
     kind: Literal["temperature"]
@@ -129,7 +130,7 @@ class Temperature(_Load):
     yield_drop: float = 0.0
 
 
-class InitialStress(Table):
+class InitialStressTable(SceneTable):
     """An even stress before any load [MPa]."""
 
     kind: Literal["initial_stress"]
@@ -141,11 +142,12 @@ class InitialStress(Table):
 
 
 Load = Annotated[
-    Pressure | Traction | Displacement | Temperature | InitialStress, Field(discriminator="kind")
+    PressureTable | TractionTable | DisplacementTable | TemperatureTable | InitialStressTable,
+    Field(discriminator="kind"),
 ]
 
 
-class Contact(Table):
+class ContactTable(SceneTable):
     """Two surfaces that may touch; see `solver.ContactPair`. Its label is ``name``."""
 
     name: Label
@@ -160,14 +162,14 @@ class Contact(Table):
     amplitude: Amplitude | None = None
 
 
-class Singular(Table):
+class SingularTable(SceneTable):
     """A point at which strain has no bound; see `solver.SingularPoint`."""
 
     at: Place
     radius: Length
 
 
-class Stage(Table):
+class StageTable(SceneTable):
     """A part of the loading, in equal increments.
 
     At the end of the first one a load without an amplitude is at its full value; where ``release``
@@ -179,7 +181,7 @@ class Stage(Table):
     release: bool = False
 
 
-class Loading(Table):
+class LoadingTable(SceneTable):
     """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away."""
 
     factor: Annotated[float, Interval(gt=0.0, le=1e6)]
@@ -190,7 +192,7 @@ class Loading(Table):
 # -- where to look -------------------------------------------------------------------------------
 
 
-class Spaced(Table):
+class SpacedTable(SceneTable):
     """Points from ``start`` to ``stop``: in equal steps, or ``size`` apart at ``near``."""
 
     start: float
@@ -206,14 +208,14 @@ class Spaced(Table):
         return closer(self.start, self.stop, self.num, self.near, self.size)
 
 
-class Map(Table):
+class MapTable(SceneTable):
     """A grid on which stress and strain are stored."""
 
-    x: Spaced
-    y: Spaced
+    x: SpacedTable
+    y: SpacedTable
 
 
-class LookLine(Table):
+class LookLineTable(SceneTable):
     """A straight line from one place to another, or an arc [degrees], in a body."""
 
     body: str
@@ -224,23 +226,23 @@ class LookLine(Table):
     angles: Span | None = None
 
 
-class LookPoint(Table):
+class LookPointTable(SceneTable):
     """A place in a body."""
 
     body: str
     at: Place
 
 
-class Look(Table):
+class LookTable(SceneTable):
     """Where results are stored; ``samples`` is their number along lines and contact surfaces."""
 
     samples: Annotated[int, Interval(ge=2, le=5000)] = 201
-    map: Map | None = None
-    lines: dict[Label, LookLine] = Field(default_factory=dict)
-    points: dict[Label, LookPoint] = Field(default_factory=dict)
+    map: MapTable | None = None
+    lines: dict[Label, LookLineTable] = Field(default_factory=dict)
+    points: dict[Label, LookPointTable] = Field(default_factory=dict)
 
 
-class Output(Table):
+class OutputTable(SceneTable):
     """A number of every run, and the place where it was found.
 
     ``of`` is a stress (``stress.xx``), ``mises``, ``plastic_strain`` or a displacement
@@ -267,7 +269,7 @@ class Output(Table):
 # -- the whole -----------------------------------------------------------------------------------
 
 
-class Parameter(Table):
+class ParameterTable(SceneTable):
     """A declared parameter: its default, range or choices, unit and meaning."""
 
     default: bool | int | float | str
@@ -277,7 +279,7 @@ class Parameter(Table):
     description: Annotated[str, StringConstraints(max_length=400)] = ""
 
 
-class SceneFile(Table):
+class SceneFile(SceneTable):
     """A whole scene file."""
 
     name: Label
@@ -285,19 +287,19 @@ class SceneFile(Table):
     kinematics: Literal["plane_strain", "plane_stress", "axisymmetric"] = "plane_strain"
     thickness: Length = 1.0
     symmetric: bool = False
-    parameters: dict[Label, Parameter] = Field(default_factory=dict)
+    parameters: dict[Label, ParameterTable] = Field(default_factory=dict)
     derived: dict[Label, Any] = Field(default_factory=dict)
     materials: Annotated[dict[Label, Material], Field(min_length=1)]  # type: ignore[valid-type]
-    bodies: Annotated[dict[Label, Body], Field(min_length=1)]
-    rigid: dict[Label, Rigid] = Field(default_factory=dict)
-    contacts: tuple[Contact, ...] = ()
-    singular: tuple[Singular, ...] = ()
+    bodies: Annotated[dict[Label, BodyTable], Field(min_length=1)]
+    rigid: dict[Label, RigidTable] = Field(default_factory=dict)
+    contacts: tuple[ContactTable, ...] = ()
+    singular: tuple[SingularTable, ...] = ()
     allow: tuple[Literal["large_strain"], ...] = ()
     loads: tuple[Load, ...] = ()
-    stages: tuple[Stage, ...] = ()
-    loading: Loading | None = None
-    look: Look = Look()
-    outputs: dict[Label, Output] = Field(default_factory=dict)
+    stages: tuple[StageTable, ...] = ()
+    loading: LoadingTable | None = None
+    look: LookTable = LookTable()
+    outputs: dict[Label, OutputTable] = Field(default_factory=dict)
 
     @property
     def stage_names(self) -> list[str]:

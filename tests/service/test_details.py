@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from service.errors import NotFound
-from service.job import Job, State
+from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
 from service.schemas import StudyDetail, Window
@@ -72,7 +72,7 @@ def test_who_asks_after_a_change_sees_it_although_others_look_already(details: C
     async def change() -> None:
         before = asyncio.create_task(details.get("a", Window()))
         await asyncio.sleep(0.03)  # its look has begun
-        details.jobs.finish("a", State.FAILED, "why")
+        details.jobs.finish("a", StudyState.FAILED, "why")
         assert status(await details.get("a", Window())) == "failed"
         assert status(await before) in ("running", "failed")
 

@@ -14,7 +14,7 @@ import h5py
 import pytest
 
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.job import State
+from service.job import StudyState
 from service.jobs import Jobs
 from service.lock import DirectoryInUse, lock_directory
 from service.recovery import open_queue
@@ -52,7 +52,7 @@ def test_first_come_first_served(jobs: Jobs) -> None:
     served = []
     while (name := taken(jobs)) is not None:
         served.append(name)
-        jobs.finish(name, State.SUCCESSFUL, "")
+        jobs.finish(name, StudyState.SUCCESSFUL, "")
     assert served == order
 
 
@@ -79,7 +79,7 @@ def test_studies_that_share_a_run_are_computed_one_after_the_other(jobs: Jobs) -
     assert taken(jobs) == "a"
     assert taken(jobs, "a") == "c"
     assert taken(jobs, "a", "c") is None
-    jobs.finish("a", State.SUCCESSFUL, "")
+    jobs.finish("a", StudyState.SUCCESSFUL, "")
     assert taken(jobs, "c") == "b"
 
 
@@ -184,7 +184,7 @@ def test_a_queue_that_is_lost_is_made_anew(tmp_path: Path, damage: str) -> None:
     study = Study.from_dict({"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}})
     store.save_study(study)
     (job,), _ = open_queue(path, store, None).page(limit=9, offset=0)
-    assert (job.id, job.state) == (study.id, State.ACCEPTED)
+    assert (job.id, job.state) == (study.id, StudyState.ACCEPTED)
     assert (tmp_path / "jobs.sqlite.damaged").exists() == (damage != "deleted")
 
 
@@ -202,7 +202,7 @@ def test_a_study_computed_without_the_service_is_found_when_it_starts(tmp_path: 
         jobs, total = open_queue(path, store, None).page(limit=9, offset=0)
         assert total == 2
         states = {job.id: job.state for job in jobs}
-        assert states == {known.id: State.ACCEPTED, ended.id: State.SUCCESSFUL}
+        assert states == {known.id: StudyState.ACCEPTED, ended.id: StudyState.SUCCESSFUL}
     (job,), _ = open_queue(path, store, None).page(limit=9, offset=0, tag="own")
     assert job.name == "by-hand"
 
@@ -215,7 +215,7 @@ def test_in_a_queue_made_anew_what_is_computed_is_running(tmp_path: Path) -> Non
         store.save_study(study)
     jobs = open_queue(tmp_path / "jobs.sqlite", store, None, [studies[0].id])
     states = [jobs.get(study.id).state for study in studies]
-    assert states == [State.RUNNING, State.ACCEPTED]
+    assert states == [StudyState.RUNNING, StudyState.ACCEPTED]
 
 
 @pytest.mark.parametrize("end", ["ok", "error"])
@@ -228,8 +228,8 @@ def test_a_retry_that_is_computed_forgets_its_old_end_in_a_queue_made_anew(
     monkeypatch.setattr(Store, "outcomes", lambda self, study_id: {end: 1})
     jobs = open_queue(tmp_path / "jobs.sqlite", store, None, [study.id])
     job = jobs.get(study.id)
-    assert (job.state, job.message, job.progress) == (State.RUNNING, "", 0)
-    left = State.SUCCESSFUL if end == "ok" else State.DISMISSED
+    assert (job.state, job.message, job.progress) == (StudyState.RUNNING, "", 0)
+    left = StudyState.SUCCESSFUL if end == "ok" else StudyState.DISMISSED
     assert jobs.dismiss(study.id).state is left
 
 
@@ -241,7 +241,7 @@ def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> Non
         connection.execute(f"INSERT INTO job VALUES ({', '.join('?' * 12)})", row)
     jobs = Jobs(path)
     job = jobs.get("a")
-    assert (job.name, job.scene, job.size, job.state) == ("a", "fake", 2, State.FAILED)
+    assert (job.name, job.scene, job.size, job.state) == ("a", "fake", 2, StudyState.FAILED)
     assert (jobs.runs("a"), jobs.study("a")) == (["x", "y"], STUDY)
     assert Jobs(path).get("a") == job
 
@@ -257,8 +257,8 @@ def test_a_queue_of_a_later_form_is_left_alone(tmp_path: Path) -> None:
 def test_a_dismissed_retry_of_a_successful_study_leaves_it_successful(jobs: Jobs) -> None:
     jobs.accept("a", STUDY, ["run"])
     for end, left in (
-        (State.SUCCESSFUL, State.SUCCESSFUL),
-        (State.FAILED, State.DISMISSED),
+        (StudyState.SUCCESSFUL, StudyState.SUCCESSFUL),
+        (StudyState.FAILED, StudyState.DISMISSED),
     ):
         jobs.take()
         jobs.finish("a", end, "")
@@ -266,7 +266,9 @@ def test_a_dismissed_retry_of_a_successful_study_leaves_it_successful(jobs: Jobs
         assert jobs.dismiss("a").state is left
         jobs.retry("a")
         assert taken(jobs) == "a"
-        assert jobs.dismiss("a").state is (left if left is State.SUCCESSFUL else State.DISMISSED)
+        assert jobs.dismiss("a").state is (
+            left if left is StudyState.SUCCESSFUL else StudyState.DISMISSED
+        )
         jobs.retry("a")
 
 
@@ -282,7 +284,7 @@ def test_a_retried_job_waits_behind_the_others(jobs: Jobs) -> None:
         jobs.accept(name, STUDY, ["run"])
     assert taken(jobs) == "a"
     jobs.note("a", 100.0)
-    jobs.finish("a", State.FAILED, "reason")
+    jobs.finish("a", StudyState.FAILED, "reason")
     asked = time.time_ns()
     assert asked <= jobs.retry("a").since <= time.time_ns()
     assert jobs.get("a").progress == 0
@@ -293,10 +295,10 @@ def test_a_job_dismissed_while_it_runs_stays_dismissed(jobs: Jobs) -> None:
     jobs.accept("a", STUDY, ["run"])
     jobs.take()
     jobs.dismiss("a")
-    jobs.finish("a", State.SUCCESSFUL, "")
+    jobs.finish("a", StudyState.SUCCESSFUL, "")
     jobs.note("a", 50.0, "late")
     job = jobs.get("a")
-    assert (job.state, job.message, job.progress) == (State.DISMISSED, "", 0)
+    assert (job.state, job.message, job.progress) == (StudyState.DISMISSED, "", 0)
     assert taken(jobs) is None
 
 
@@ -305,7 +307,7 @@ def test_what_the_state_does_not_allow_is_refused(jobs: Jobs) -> None:
     with pytest.raises(Conflict, match="accepted"):
         jobs.retry("a")
     jobs.take()
-    jobs.finish("a", State.SUCCESSFUL, "")
+    jobs.finish("a", StudyState.SUCCESSFUL, "")
     with pytest.raises(Conflict, match="successful"):
         jobs.dismiss("a")
     for act in (jobs.get, jobs.study, jobs.dismiss, jobs.retry):

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.errors import Conflict, NotFound
-from service.job import State
+from service.job import StudyState
 from service.jobs import Jobs
 from service.pool import Pool
 from service.retention import Keeper
@@ -48,7 +48,7 @@ class Place:
             self.jobs.accept(study.id, study.to_dict(), ids(study))
             taken = self.jobs.take()
             assert taken is not None and taken.id == study.id
-            self.jobs.finish(study.id, State.SUCCESSFUL, "")
+            self.jobs.finish(study.id, StudyState.SUCCESSFUL, "")
         return study
 
     def runs(self) -> set[str]:
@@ -116,7 +116,7 @@ def test_a_study_whose_run_was_deleted_keeps_its_data_set(place: Place) -> None:
     place.keeper().delete_run(first)
     assert place.runs() == {second}
     assert place.store.dataset_path(study.id).is_file()
-    assert place.jobs.get(study.id).state is State.SUCCESSFUL
+    assert place.jobs.get(study.id).state is StudyState.SUCCESSFUL
 
 
 @pytest.mark.parametrize("point", ["before the runs", "after the runs", "after the directory"])
@@ -141,7 +141,7 @@ def test_a_crash_in_the_middle_leaves_a_study_that_can_be_deleted_again(
         with pytest.raises(PowerCut):
             place.keeper().purge(study.id)
     job = place.jobs.get(study.id)
-    assert job.state is State.DISMISSED and "delete it again" in job.message
+    assert job.state is StudyState.DISMISSED and "delete it again" in job.message
     assert (len(place.runs()) == 0) is point.startswith("after")
     place.keeper().purge(study.id)
     assert not place.there(study) and not place.runs()
@@ -156,7 +156,7 @@ def test_a_study_retried_in_the_middle_of_its_deletion_stays(
     )
     with pytest.raises(Conflict, match="accepted"):
         place.keeper().purge(study.id)
-    assert place.jobs.get(study.id).state is State.ACCEPTED
+    assert place.jobs.get(study.id).state is StudyState.ACCEPTED
     assert place.runs() == {*ids(study)}
 
 

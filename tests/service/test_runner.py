@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from service import processes
-from service.job import Job, State
+from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.pool import Pool
 from service.processes import Starter
@@ -72,27 +72,27 @@ def carried_out(
 def test_every_child_of_a_retry_knows_when_it_was_asked_for(tmp_path: Path) -> None:
     job, orders = carried_out(tmp_path, [AWAY], [RUN], [RUN], [ALL_FAILED], again=True)
     assert job.since > 0 and orders == [job.since] * 4
-    assert job.state is State.FAILED
+    assert job.state is StudyState.FAILED
 
 
 def test_a_study_that_brings_nothing_new_is_given_up(tmp_path: Path) -> None:
     job, orders = carried_out(tmp_path, [RUN], [], again=True)
     assert len(orders) == 3
-    assert job.state is State.FAILED and "without a result or an error message" in job.message
+    assert job.state is StudyState.FAILED and "without a result or an error message" in job.message
 
 
 @pytest.mark.parametrize("line", [GIBBERISH, ENDLESS], ids=["gibberish", "endless"])
 def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line: str) -> None:
     job, orders = carried_out(tmp_path, [RUN, line])
     assert len(orders) == 2
-    assert job.state is State.FAILED and "sent what cannot be read" in job.message
+    assert job.state is StudyState.FAILED and "sent what cannot be read" in job.message
 
 
 def test_time_of_work_is_no_time_of_waiting(tmp_path: Path) -> None:
     """The first child computes for longer than the service is patient."""
     script = [[RUN] * 3, [RUN], [AWAY], [{"kind": "outcome", "content": {"ok": 2}}]]
     job, orders = carried_out(tmp_path, *script, patience_seconds=1.0, poll_seconds=0.05)
-    assert len(orders) == 4 and job.state is State.SUCCESSFUL
+    assert len(orders) == 4 and job.state is StudyState.SUCCESSFUL
 
 
 def test_a_frozen_process_is_told_of_and_ended(
@@ -129,7 +129,7 @@ def test_a_frozen_process_is_told_of_and_ended(
 def test_a_study_that_waits_too_long_for_workers_is_given_up(tmp_path: Path) -> None:
     job, orders = carried_out(tmp_path, [AWAY], patience_seconds=0.2)
     assert len(orders) >= 2
-    assert job.state is State.FAILED and "the store is busy" in job.message
+    assert job.state is StudyState.FAILED and "the store is busy" in job.message
 
 
 def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> None:
@@ -147,9 +147,9 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
                 await asyncio.sleep(0.01)
 
     asyncio.run(work())
-    assert jobs.get("bad").state is State.FAILED
+    assert jobs.get("bad").state is StudyState.FAILED
     assert "cannot be read" in jobs.get("bad").message
-    assert jobs.get("good").state is State.RUNNING
+    assert jobs.get("good").state is StudyState.RUNNING
 
 
 def test_a_process_is_ready_before_it_is_needed() -> None:

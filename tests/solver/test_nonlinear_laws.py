@@ -152,8 +152,10 @@ def test_only_flow_between_the_normals_of_tresca_is_associated(stress, flow, rig
     for _ in range(5):
         turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
         tensors = [_mandel(turn @ np.diag(v) @ turn.T)[:, None] for v in (stress, flow)]
-        stray = Tresca().stray(tensors[0], dp * tensors[1], np.array([dp]), 2 * G)[0]
-        assert (stray < 1e-9) if right else (stray > 0.1 * dp)
+        flow_rule_error = Tresca().flow_rule_error(
+            tensors[0], dp * tensors[1], np.array([dp]), 2 * G
+        )[0]
+        assert (flow_rule_error < 1e-9) if right else (flow_rule_error > 0.1 * dp)
 
 
 def test_a_return_asks_its_curve_a_few_times():

@@ -11,7 +11,7 @@ import pytest
 from solver import Amplitude, Body, ContactPair, Material, Model, ModelError, Stage, solve
 from solver.loading.control import PathControl
 from solver.mesh import graded, grid
-from solver.model.rigid import Curve, Moved, Pushed, RigidBody, arc, line
+from solver.model.rigid import Moved, Pushed, RigidBody, RigidSurface, arc, line
 from solver.results.history import curve
 
 pytestmark = pytest.mark.solves
@@ -190,11 +190,14 @@ def test_a_turn_in_one_increment_is_divided(turn: float) -> None:
     ("own", "message"),
     [
         ({"surfaces": {}}, "surfaces = .*: must be at least one"),
-        ({"surfaces": {"base": Curve(points=np.zeros((2, 1)))}}, "surfaces.base .* two or more"),
-        ({"surfaces": {"base": Curve(points=np.zeros((2, 2)))}}, "must be points apart"),
-        ({"surfaces": {"base": Curve(points=np.full((2, 2), np.nan))}}, "must be finite"),
         (
-            {"surfaces": {"base": Curve(points=np.eye(2), quadratic=True)}},
+            {"surfaces": {"base": RigidSurface(points=np.zeros((2, 1)))}},
+            "surfaces.base .* two or more",
+        ),
+        ({"surfaces": {"base": RigidSurface(points=np.zeros((2, 2)))}}, "must be points apart"),
+        ({"surfaces": {"base": RigidSurface(points=np.full((2, 2), np.nan))}}, "must be finite"),
+        (
+            {"surfaces": {"base": RigidSurface(points=np.eye(2), quadratic=True)}},
             "surfaces.base = .*must be points",
         ),
         ({"y": Pushed(value=np.inf)}, "y = inf: must be finite"),
@@ -258,7 +261,7 @@ def test_the_work_of_a_plate_that_turns_is_found_again(
     block = Body(name="block", mesh=grid(x, x / 2 - 2.5), supports={"bottom": "xy"},
                  material=Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=800.0,
                                    hardening="isotropic", hardening_ratio=0.1))  # fmt: skip
-    face = Curve(points=np.array([[-6.0, 0.0], [6.0, 0.0]]).T)
+    face = RigidSurface(points=np.array([[-6.0, 0.0], [6.0, 0.0]]).T)
     plate = RigidBody(name="plate", surfaces={"face": face}, centre=(centre, 0.0), y=down,
                       rotation=turning)  # fmt: skip
     pair = ContactPair(slave=("block", "top"), master=("plate", "face"), friction=0.3,

@@ -139,5 +139,5 @@ def test_no_tangent_in_a_corner_of_the_yield_surface_is_no_limit_load() -> None:
     (record,) = scene.path(parameters, [0.6], lambda fraction: None)
     assert record.status in (Status.OK, Status.NOT_CONVERGED)
     law, strained = parameters.material().in_plane_stress(), PlaneStress(parameters.material())
-    assert law is None and strained.cornered
-    assert not PlaneStress(PunchParameters().material()).cornered
+    assert law is None and strained.has_corners
+    assert not PlaneStress(PunchParameters().material()).has_corners

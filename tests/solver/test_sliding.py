@@ -23,7 +23,7 @@ from solver import (
     solve,
 )
 from solver.mesh import grid, mapped
-from solver.model.rigid import Curve, arc, line
+from solver.model.rigid import RigidSurface, arc, line
 from tests.verification.test_hertz_point import press
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
@@ -41,17 +41,17 @@ def block(bend: float = 0.0, element: str = "quad8") -> Body:
                 supports={"bottom": "xy"})  # fmt: skip
 
 
-def plate(surface: Curve, way: float = 0.0) -> RigidBody:
+def plate(surface: RigidSurface, way: float = 0.0) -> RigidBody:
     return RigidBody(name="plate", surfaces={"base": surface}, x=Moved(value=way),
                      y=Pushed(value=-100.0))  # fmt: skip
 
 
 STRAIGHT = line((-2.0, 0.0), (2.0, 0.0))
 ROUND = arc((0.0, 50.0), 50.0, (-np.pi / 2 - 0.05, -np.pi / 2 + 0.05), 20)
-KINKED = Curve(points=np.array([[-2.0, 0.0, 2.0], [0.1, 0.0, 0.1]]))
+KINKED = RigidSurface(points=np.array([[-2.0, 0.0, 2.0], [0.1, 0.0, 0.1]]))
 
 
-def finite(body: Body, surface: Curve, sliding: str = "auto") -> bool:
+def finite(body: Body, surface: RigidSurface, sliding: str = "auto") -> bool:
     pair = ContactPair(**PAIR, sliding=sliding)
     (interface,) = System(
         Model(bodies=(body,), rigid=(plate(surface),), contacts=(pair,))

@@ -27,7 +27,7 @@ from solver.fem.fields import Sampler
 from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
 from solver.loading.program import Lap, shared
-from solver.loading.settling import Settling
+from solver.loading.refinement import StepRefinement
 from solver.materials import TrescaMaterial
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
@@ -447,9 +447,9 @@ def test_programs_are_compared_lap_by_lap():
 
 
 def test_settling_needs_increments_that_may_be_divided(system):
-    settling = Settling(measure=lambda trace: trace, tolerance=1e-12)
-    walker = Walker(system, CONTROL, trace=lambda points: np.zeros(1), settling=settling)
-    with pytest.raises(ModelError, match="settling"):
+    refinement = StepRefinement(measure=lambda trace: trace, tolerance=1e-12)
+    walker = Walker(system, CONTROL, trace=lambda points: np.zeros(1), refinement=refinement)
+    with pytest.raises(ModelError, match="refinement"):
         list(walker.walk([CONTROL.program(0.2)]))
 
 

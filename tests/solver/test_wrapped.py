@@ -48,7 +48,13 @@ class Plain(Wrapped):
 
 
 def test_there_are_members() -> None:
-    assert {"elasticity", "surface", "misfit", "ultimate_shear_stress", "stray"} <= MEMBERS.keys()
+    assert {
+        "elasticity",
+        "surface",
+        "misfit",
+        "ultimate_shear_stress",
+        "flow_rule_error",
+    } <= MEMBERS.keys()
 
 
 @pytest.mark.parametrize("name", sorted(MEMBERS.keys() - OWN))
@@ -111,7 +117,9 @@ def test_a_flow_of_a_heated_law_is_judged_as_by_the_law_of_its_constants() -> No
     found = own.respond(strain, before)
     flow = found.state.plastic_strain + rng.normal(0.0, 1e-4, (6, 4))
     given = found.stress, flow, found.state.accumulated, found.state
-    np.testing.assert_allclose(heated.stray(*given), own.stray(*given), rtol=1e-9)
+    np.testing.assert_allclose(
+        heated.flow_rule_error(*given), own.flow_rule_error(*given), rtol=1e-9
+    )
     np.testing.assert_allclose(
         heated.flow_direction(found.stress, found.state),
         own.flow_direction(found.stress, found.state),

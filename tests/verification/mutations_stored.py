@@ -42,12 +42,12 @@ from solver.model.loads import InitialStress, Load, Temperature
 from solver.model.model import ContactPair
 from solver.results.asked import Asked
 from solver.results.look import Look
-from solver.results.places import Fields, Places
+from solver.results.places import Places, SystemFields
 from solver.results.samples import Nodal, Samples
 from solver.results.shakedown import ShakedownState
 from solver.results.slave import Slave
 from solver.results.steady import SteadyContact
-from solver.results.touch import Contact
+from solver.results.touch import SceneContact
 from solver.results.view import Axis, View
 from solver.scenes.scene import Scene
 from solver.steady.layers import Layers
@@ -549,21 +549,25 @@ MUTATIONS: dict[str, Mutation] = {
     "the state under load for the released one": _pressed(loaded_for_unloaded, "stored"),
     "depth told in m": _pressed(other_coordinates("depth", 1e-3), "stored"),
     "x told from the corner": _pressed(other_coordinates("x", -1.0), "stored"),
-    "lines beside their places": _file(instead(Fields, "at", aside), "stored"),
-    "stages in another order": _file(instead(Fields, "__init__", other_stages), "stored"),
+    "lines beside their places": _file(instead(SystemFields, "at", aside), "stored"),
+    "stages in another order": _file(instead(SystemFields, "__init__", other_stages), "stored"),
     "displacement against its way": _file(
         instead(solver.results.nodal, "nodal_fields", back_to_front), "stored"
     ),
     # contact
     "pressure on half the circumference": _fitted(pressure_times(2.0), "stored"),
     "pressure of a unit of thickness": _file(pressure_times(2.0), "stored"),
-    "shear on the other body": _fitted(instead(Contact, "along", part_times(1, -1.0)), "stored"),
+    "shear on the other body": _fitted(
+        instead(SceneContact, "along", part_times(1, -1.0)), "stored"
+    ),
     "gap opened": _fitted(
-        instead(Contact, "along", lambda old: lambda *a: (*old(*a)[:2], old(*a)[2] + 1e-3)),
+        instead(SceneContact, "along", lambda old: lambda *a: (*old(*a)[:2], old(*a)[2] + 1e-3)),
         "stored",
     ),
-    "width for half-width": _pressed(instead(Contact, "extent", part_times(0, 2.0)), "stored"),
-    "peak pressure too high": _pressed(instead(Contact, "extent", part_times(1, 1.01)), "stored"),
+    "width for half-width": _pressed(instead(SceneContact, "extent", part_times(0, 2.0)), "stored"),
+    "peak pressure too high": _pressed(
+        instead(SceneContact, "extent", part_times(1, 1.01)), "stored"
+    ),
     "forces told an increment later": _file(
         instead(solver.results.places, "_in_order", later), "stored"
     ),

@@ -18,7 +18,7 @@ from solver import (
     solve,
 )
 from solver.mesh import graded, grid, mapped
-from solver.model.rigid import Curve, arc, line
+from solver.model.rigid import RigidSurface, arc, line
 
 E, NU, RADIUS, HALF_WIDTH = 2e5, 0.3, 20.0, 0.5
 STEEL = Material(youngs_modulus=E, poisson_ratio=NU)
@@ -174,7 +174,7 @@ def test_a_flat_punch_stays_the_slave_on_a_finer_plane() -> None:
 def test_a_plate_under_an_eccentric_force_turns_by_as_much_however_it_is_divided(
     edges: int,
 ) -> None:
-    def turned(slave: str, base: Curve) -> float:
+    def turned(slave: str, base: RigidSurface) -> float:
         block = Body(name="block", mesh=grid(np.linspace(-4.0, 4.0, 17), np.linspace(-4, 0, 9)),
                      material=STEEL, supports={"bottom": "xy"})  # fmt: skip
         plate = RigidBody(name="plate", surfaces={"base": base}, centre=(1.0, 0.0),

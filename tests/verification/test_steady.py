@@ -16,7 +16,7 @@ from solver.materials import PlasticState
 from solver.results.sliding_limits import melan_limit
 from solver.steady import Track, rolling, track_of
 from solver.steady.fields import under_load
-from solver.steady.flow import Flow
+from solver.steady.flow import RowFlow
 
 YIELD = 502.0
 K = YIELD / sqrt(3)
@@ -122,10 +122,10 @@ def test_the_derivative_of_the_flow_is_that_of_differences():
     step = 1e-6
 
     def force(strain):
-        return Flow(rows, material, rows.virgin, strain, 4).force
+        return RowFlow(rows, material, rows.virgin, strain, 4).force
 
     differences = (force(loaded + step * change) - force(loaded - step * change)) / (2 * step)
-    exact = Flow(rows, material, rows.virgin, loaded, 4).along(change)
+    exact = RowFlow(rows, material, rows.virgin, loaded, 4).along(change)
     assert np.linalg.norm(exact - differences) < 1e-4 * np.linalg.norm(differences)
 
 

@@ -10,7 +10,7 @@ import pytest
 from solver import LimitLoad, Material
 from solver.errors import NotConverged, WindowTooSmall
 from solver.fem.fields import recovery
-from solver.results.steady import HalfPlane
+from solver.results.steady import TrackBody
 from solver.scenes.rolling_grids import wheel_nodes
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.steady import search as steady_search
@@ -202,7 +202,7 @@ def test_a_change_that_turns_back_or_grows_is_not_carried_further():
 
 def test_nodes_of_the_surface_have_values_of_their_own():
     track = track_of(8.0, 4.0, 1.3, RollingParameters().material().elasticity)
-    half_plane = HalfPlane(track, 1)
+    half_plane = TrackBody(track, 1)
     part = half_plane.full("half_space")
     depth = -part.points[1].ravel()
     x = part.points[0].ravel()

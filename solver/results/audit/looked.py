@@ -10,7 +10,7 @@ from solver.model.rigid import Moved, RigidBody
 from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, Compared, some
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
-from solver.results.audit.values import Places, flowed
+from solver.results.audit.values import Located, flowed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,9 +106,9 @@ class LookedAt:
 
     def _fields(
         self, kind: str, body: str, X: Array, stress: Array, mises: Array, strain: Array
-    ) -> Places:
+    ) -> Located:
         """Compare fields (stage, ..., n) at places (2, n) of a body."""
-        places = Places(self._source.plain(body), X)
+        places = Located(self._source.plain(body), X)
         for k, stage in enumerate(self._look.view.stages):
             fields = self._source.fields(body, stage)
             for name, told, nodal in (
@@ -246,7 +246,7 @@ class LookedAt:
             values = mises if kind == "mises" else flow
         else:
             nodal = flowed(fields) if kind == "plastic_strain" else getattr(fields, kind)
-            places = None if X is None else Places(self._source.plain(body), X)
+            places = None if X is None else Located(self._source.plain(body), X)
             values = nodal if places is None else places.of(nodal)
             values = values[_PARTS[part]] if part else np.maximum(values, 0.0)
             X = fields.plain.part.X if X is None else X

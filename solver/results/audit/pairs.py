@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from solver.contact.state import Converged, State
     from solver.contact.system import System
     from solver.model.model import ContactPair
-    from solver.results.audit.surfaces import Touching
+    from solver.results.audit.surfaces import PairState
 
     Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _STILL = 1e-3
 """Least slip / elastic approach, in the work that wrong slip is compared with."""
 
 
-class Stray(NamedTuple):
+class LeftOut(NamedTuple):
     """What small sliding leaves out, means weighted with the force.
 
     Attributes
@@ -57,7 +57,7 @@ class Stray(NamedTuple):
     y: float
 
 
-_STRAY = Stray(way=np.inf, sides=1.0, length=0.01, off=5e-3, x=np.nan, y=np.nan)
+_LEFT_OUT = LeftOut(way=np.inf, sides=1.0, length=0.01, off=5e-3, x=np.nan, y=np.nan)
 """What it may leave out; of the length of the contact where a surface is curved."""
 
 
@@ -96,7 +96,7 @@ class AuditedPair:
         self._state = converged.state
         self._closed = _closed(converged.state, number)
         self.surfaces = Surfaces(system, number, finite=contact.finite)
-        self.touching: Touching = self.surfaces.touching(
+        self.touching: PairState = self.surfaces.touching(
             converged.state, converged.start, self.normal, self.tangential
         )
 
@@ -147,7 +147,7 @@ class AuditedPair:
         }
 
     @cached_property
-    def stray(self) -> Stray | None:
+    def left_out(self) -> LeftOut | None:
         """What small sliding leaves out; None where nothing slides, or sliding is finite."""
         if self.surfaces.finite or self.force <= 0.0:
             return None
@@ -158,7 +158,7 @@ class AuditedPair:
         off = float(np.abs(np.nan_to_num(touching.true_gap - touching.gap)) @ share)
         slave = self.surfaces.slave
         x, y = slave.X[:, slave.vertices[moved.argmax()]]
-        return Stray(
+        return LeftOut(
             way=way,
             sides=way / float(edge @ share),
             length=way / float(edge[self._closed].sum()),
@@ -170,25 +170,26 @@ class AuditedPair:
     @property
     def outside(self) -> tuple[str, ...]:
         """What small sliding leaves out, where that is more than the side of an element."""
-        stray = self.stray
-        return (self._told(stray),) if stray and stray.sides > _STRAY.sides else ()
+        left_out = self.left_out
+        return (self._told(left_out),) if left_out and left_out.sides > _LEFT_OUT.sides else ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What small sliding leaves out, where that is less and yet matters."""
-        stray = self.stray
-        if not stray or self.outside:
+        left_out = self.left_out
+        if not left_out or self.outside:
             return ()
-        far = self.surfaces.curved and stray.length > _STRAY.length
-        return (self._told(stray),) if far or stray.off > _STRAY.off else ()
+        far = self.surfaces.curved and left_out.length > _LEFT_OUT.length
+        return (self._told(left_out),) if far or left_out.off > _LEFT_OUT.off else ()
 
-    def _told(self, stray: Stray) -> str:
+    def _told(self, left_out: LeftOut) -> str:
         slave, master = (".".join(side) for side in (self._pair.slave, self._pair.master))
         return (
-            f"{slave} moved {stray.way:.2g} mm along {master}, mostly at ({stray.x:z.4g}, "
-            f"{stray.y:z.4g}): {stray.sides:.2g} sides of an element, {stray.length:.1%} of the "
-            f"length of contact; gaps differ by {stray.off:.1%} of the elastic approach. Small "
-            'sliding leaves this out: give this pair sliding = "finite"'
+            f"{slave} moved {left_out.way:.2g} mm along {master}, mostly at ({left_out.x:z.4g}, "
+            f"{left_out.y:z.4g}): {left_out.sides:.2g} sides of an element, "
+            f"{left_out.length:.1%} of the length of contact; gaps differ by {left_out.off:.1%} of "
+            "the elastic approach. Small sliding leaves this out: give this pair "
+            'sliding = "finite"'
         )
 
     @property

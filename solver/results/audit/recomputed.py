@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-class Fields(Protocol):
+class BodyFields(Protocol):
     """Fields of one body in one state: stress xx, yy, zz, xy [MPa], and flow.
 
     Attributes
@@ -70,7 +70,7 @@ class Recomputed(Protocol):
     def plain(self, name: str) -> PlainBody:
         """Return a body."""
 
-    def fields(self, name: str, stage: str) -> Fields:
+    def fields(self, name: str, stage: str) -> BodyFields:
         """Return the fields of a body in a state."""
 
     def exact(self, stage: str) -> bool:

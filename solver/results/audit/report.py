@@ -115,7 +115,9 @@ def audit(
     figures["audit_error_contact"] = contact_error(system, loaded)
     strain = strain_of(system, states[1])
     figures["audit_plastic_strain"] = strain.value
-    figures["audit_small_sliding"] = max((p.stray.sides for p in pairs if p.stray), default=0.0)
+    figures["audit_small_sliding"] = max(
+        (p.left_out.sides for p in pairs if p.left_out), default=0.0
+    )
     return Audit(
         figures,
         violations=_violations(system, figures, loaded, pairs),

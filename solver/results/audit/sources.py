@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.model.motion import TravellingPressure
-    from solver.results.audit.recomputed import Fields
+    from solver.results.audit.recomputed import BodyFields
     from solver.results.look import Look
     from solver.results.view import View
 
@@ -45,7 +45,7 @@ class OfStates:
         self.fields = cache(self._fields)
         self.tractions = cache(self._tractions)
 
-    def _fields(self, name: str, stage: str) -> Fields:
+    def _fields(self, name: str, stage: str) -> BodyFields:
         state, number = self._look.outcome.points[stage].state, self.system.part(name)
         plastic = state.plastic[number] if self.system.parts[number].meshed else None
         u = self.system.displacement(name, state)

@@ -22,7 +22,7 @@ from solver.results.audit.report import (
 from solver.results.audit.sources import between, hertz
 from solver.results.audit.theory import Strained, largest_strain
 from solver.results.audit.values import PassFields
-from solver.steady import Touching
+from solver.steady import RollingContact
 from solver.steady.fields import of_layers, under_load
 from solver.steady.flow import INFLOW, LEAST
 from solver.steady.passing import TOLERANCE
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from solver.materials.material import Material
     from solver.model.motion import TravellingPressure
-    from solver.results.audit.recomputed import Fields
-    from solver.results.steady import HalfPlane
+    from solver.results.audit.recomputed import BodyFields
+    from solver.results.steady import TrackBody
     from solver.steady import Pass, Track
 
     Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ def _largest(values: Array) -> float:
 def _of_contact(material: Material, found: Pass) -> dict[str, float]:
     """Return the figures of the contact with a wheel, none without a wheel."""
     touching = found.loading
-    if not isinstance(touching, Touching):
+    if not isinstance(touching, RollingContact):
         return {}
     strength = float(
         material.shear_strength(PlasticState(found.after.plastic_strain.T, found.after.accumulated))
@@ -199,7 +199,7 @@ class OfPass:
 
     def __init__(
         self,
-        half_plane: HalfPlane,
+        half_plane: TrackBody,
         found: Pass,
         moving: TravellingPressure | None,
         released: str,
@@ -209,7 +209,7 @@ class OfPass:
         self.fields = cache(self._fields)
         self.plain = cache(lambda name: PlainBody(half_plane.full(name)))
 
-    def _fields(self, name: str, stage: str) -> Fields:
+    def _fields(self, name: str, stage: str) -> BodyFields:
         del name
         return PassFields(self._half_plane, self._found, loaded=stage != self._released)
 
@@ -226,7 +226,7 @@ class OfPass:
     def _vertices(self) -> tuple[Array, Array, Array]:
         """Places along x, and pressure and shear there, as one sees them who stands beside."""
         touching, chain = self._found.loading, self._half_plane.track.surface
-        assert isinstance(touching, Touching)
+        assert isinstance(touching, RollingContact)
         x, way = chain.X[0, chain.vertices], self._found.direction
         side = np.abs(np.diff(x)) / 2
         area = np.append(side, 0.0) + np.append(0.0, side)

@@ -20,7 +20,7 @@ from solver.results.audit.compared import LEAST_STRAIN, LIMIT, MEASURED, STEADY,
 from solver.results.audit.figures import AUDIT
 from solver.results.audit.looked import LookedAt
 from solver.results.audit.sources import OfStates, along, between
-from solver.results.audit.values import Places, equivalent, flowed
+from solver.results.audit.values import Located, equivalent, flowed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.results.asked import Looked
-    from solver.results.audit.recomputed import Fields, Recomputed
+    from solver.results.audit.recomputed import BodyFields, Recomputed
     from solver.results.look import Look
     from solver.results.record import Record
     from solver.results.view import View
@@ -148,7 +148,7 @@ class _Viewed:
         name: str,
         stored: Array,
         own: Array,
-        places: tuple[Places, ...],
+        places: tuple[Located, ...],
         scale: float,
         stage: str = "",
     ) -> None:
@@ -174,10 +174,10 @@ class _Viewed:
         flat = {name: v.reshape(*v.shape[:-2], -1) for name, v in there.items()}
         at = some(len(x) * len(y), *flat.values())
         X = self._place(x[at % len(x)], -y[at // len(x)])
-        places = {name: Places(self._source.plain(name), X) for name in view.surfaces}
+        places = {name: Located(self._source.plain(name), X) for name in view.surfaces}
         bodies = tuple(places.values())
 
-        def sampled(of: Callable[[Fields], Array], stage: str) -> Array:
+        def sampled(of: Callable[[BodyFields], Array], stage: str) -> Array:
             """Return values (..., n) of the first body that holds a place."""
             out = np.full(len(at), np.nan)
             unsure = np.zeros(len(at), dtype=bool)
@@ -214,7 +214,7 @@ class _Viewed:
         flat = np.moveaxis(stress, 1, 0).reshape(4, -1)
         at = some(strain.size, flat, strain.ravel())
         where = self._place(station[at // len(depth)], depth[at % len(depth)])
-        places = Places(self._source.plain(view.profile_body), where)
+        places = Located(self._source.plain(view.profile_body), where)
         fields = self._source.fields(view.profile_body, view.unloaded)
         own = places.of(fields.stress)
         self._against("residual_profile", flat[:, at], own, (places,), self.stress_scale)
@@ -231,7 +231,7 @@ class _Viewed:
         for k, name in enumerate(view.surfaces if residual is not None else ()):
             assert residual is not None
             at = some(len(s), residual[k])
-            places = Places(self._source.plain(name), self._place(s[at], np.zeros(len(at))))
+            places = Located(self._source.plain(name), self._place(s[at], np.zeros(len(at))))
             own = places.of(self._source.fields(name, view.unloaded).stress)
             self._against("surface_residual", residual[k][:, at], own, (places,),
                           self.stress_scale)  # fmt: skip
@@ -326,7 +326,7 @@ class _Viewed:
             self._out.add(f"{name}_{axes[0]}", near, 0.0, self.stress_scale)
 
 
-def _stress(fields: Fields) -> Array:
+def _stress(fields: BodyFields) -> Array:
     return fields.stress
 
 

@@ -71,7 +71,7 @@ def _turned(x: Array, centre: Array, angle: float, moved: tuple[float, float]) -
 
 
 @dataclass(frozen=True)
-class Touching:
+class PairState:
     """One pair in one state.
 
     Attributes
@@ -202,7 +202,7 @@ class Surfaces:
             weaker = np.fmin(weaker, strength * mean(at_points(left)[0], partner.faces))
         return weaker
 
-    def touching(self, state: State, start: State, normal: Array, tangential: Array) -> Touching:
+    def touching(self, state: State, start: State, normal: Array, tangential: Array) -> PairState:
         """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
         slave, master = self.slave, self.master
         (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
@@ -247,7 +247,7 @@ class Surfaces:
         true_gap = true.distance(on_slave(xs))
         factor = load_factor(self.pair.amplitude, state.time)
         offset = self.pair.gap - factor * self.pair.interference
-        return Touching(
+        return PairState(
             area=area,
             gap=mean((apart * n).sum(axis=0), partner.faces) + offset,
             true_gap=mean(true_gap, true.faces) + offset,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged
     from solver.contact.system import System
-    from solver.results.audit.surfaces import Touching
+    from solver.results.audit.surfaces import PairState
 
     Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Tractions:
         self._moved = deformed(system, slave, state)[0][:, self._chain.nodes]
 
     @cached_property
-    def touching(self) -> Touching:
+    def touching(self) -> PairState:
         """Gaps and motions on the deformed bodies."""
         surfaces, state, start = self._measured
         return surfaces.touching(state, start, self._contact.normal, self._contact.tangential)

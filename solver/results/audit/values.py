@@ -1,7 +1,7 @@
 """Fields of a body at its nodes and at places, without the operators that results are taken with.
 
 `StateFields` makes them from displacements, internal variables and declared loads; `PassFields`
-from the layers that a steady pass meets and leaves. `Places` finds where in a body places lie.
+from the layers that a steady pass meets and leaves. `Located` finds where in a body places lie.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.materials.state import PlasticState
-    from solver.results.audit.recomputed import Fields
-    from solver.results.steady import HalfPlane
+    from solver.results.audit.recomputed import BodyFields
+    from solver.results.steady import TrackBody
     from solver.steady import Pass
 
     Array = NDArray[np.float64]
@@ -41,13 +41,13 @@ def equivalent(stress: Array) -> Array:
     return np.asarray(np.sqrt(square))
 
 
-def flowed(fields: Fields) -> Array:
+def flowed(fields: BodyFields) -> Array:
     """Return the plastic strain at nodes (n_nodes,), not below zero."""
     return np.maximum(fields.accumulated, 0.0)
 
 
 class StateFields:
-    """`Fields` of a body from its displacements (n,), its internal variables and its loads."""
+    """`BodyFields` of a body from its displacements (n,), its internal variables and its loads."""
 
     def __init__(
         self, plain: PlainBody, u: Array, plastic: PlasticState | None, time: float
@@ -91,13 +91,13 @@ class StateFields:
 
 
 class PassFields:
-    """`Fields` of a half-plane that a steady pass leaves, or of its window under the load.
+    """`BodyFields` of a half-plane that a steady pass leaves, or of its window under the load.
 
     The state that a pass leaves is a function of depth alone: Hooke's law for strains along x and
     z that are zero. Nodes of the surface have values of their own.
     """
 
-    def __init__(self, half_plane: HalfPlane, found: Pass, *, loaded: bool) -> None:
+    def __init__(self, half_plane: TrackBody, found: Pass, *, loaded: bool) -> None:
         self.plain = PlainBody(half_plane.full(""))
         self._track, self._found, self._loaded = half_plane.track, found, loaded
         self._way = found.direction
@@ -207,7 +207,7 @@ class PassFields:
         return X, mises, np.append(total, np.full(count, self._surface[1]))
 
 
-class Places:
+class Located:
     """Where places (2, n) lie in a body, before it deforms.
 
     Attributes

@@ -51,7 +51,7 @@ class Kind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
+class Style:
     """How values are drawn: flags by kind; other numbers, where there are no flags, by colour."""
 
     flags: Mapping[int, Kind]
@@ -106,7 +106,7 @@ def known_values(dataset: xr.Dataset, field: str) -> xr.DataArray:
     return dataset[field].astype(float).where(status == OK)
 
 
-def look_of(dataset: xr.Dataset, field: str) -> Look:
+def look_of(dataset: xr.Dataset, field: str) -> Style:
     """Return how a field is drawn; numbers that change sign have zero in the middle."""
     known = known_values(dataset, field).to_numpy()
     known = known[np.isfinite(known)]
@@ -121,8 +121,8 @@ def look_of(dataset: xr.Dataset, field: str) -> Look:
     }
     if low < 0.0 < high:
         low, high = min(low, -high), max(high, -low)
-        return Look(flags=kinds, norm=Normalize(low, high), colours=SIGNED)
-    return Look(flags=kinds, norm=Normalize(low, high), colours="viridis")
+        return Style(flags=kinds, norm=Normalize(low, high), colours=SIGNED)
+    return Style(flags=kinds, norm=Normalize(low, high), colours="viridis")
 
 
 def absent(known: np.ndarray, status: np.ndarray) -> dict[Kind, np.ndarray]:

@@ -18,7 +18,7 @@ from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.curves import curve_figure
 from studies.views.plots.limits import draw_shakedown_limits
-from studies.views.plots.runs import POINTS, Look, absent, known_values, look_of, standing
+from studies.views.plots.runs import POINTS, Style, absent, known_values, look_of, standing
 
 MOST_PANELS = 6
 
@@ -118,7 +118,7 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
 
 
 def _draw(
-    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Look
+    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Style
 ) -> list[Line2D]:
     """Draw the runs of a panel; return marks to explain: of flags, and of what is absent."""
     up, across = places
@@ -137,7 +137,7 @@ def _draw(
 
 
 def _contours(
-    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Look
+    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Style
 ) -> bool:
     """Fill between contours where the sweep is dense, not where runs have no value; tell if so."""
     up, across = (panel[name] for name in places)

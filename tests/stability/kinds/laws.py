@@ -49,9 +49,9 @@ class Bar:
     seed: int
 
     @property
-    def cornered(self) -> bool:
+    def has_corners(self) -> bool:
         """Whether the stress of the bar lies on an edge: softness then proves no limit."""
-        return self.law.cornered
+        return self.law.has_corners
 
     def solve(self) -> Solution:
         """Pull the bar and let it go."""
@@ -197,7 +197,7 @@ def scenes(count: int = COUNT) -> list[Scene]:
             certain=bar.limit * (1 + 1e-6),
             safe=bar.limit * (1 - 1e-6),
             load=bar.load,
-            honest=tells("increment between") if bar.cornered else None,
+            honest=tells("increment between") if bar.has_corners else None,
         )
         for bar in made
     ]

@@ -7,8 +7,8 @@ import pytest
 
 from solver.contact.system import System
 from solver.fem.following import Following
-from solver.loading.carrying import Carrier
 from solver.loading.control import Control
+from solver.loading.prediction import Predictor
 from solver.loading.walker import Walker
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_parameters import RollingParameters
@@ -43,7 +43,7 @@ def stress(system, outcome):
 def test_what_is_carried_along_saves_iterations_and_changes_no_result(share, changed, monkeypatch):
     """Both end at the same tolerance, 1e-8 of the force; measured 70 to 80 % of the iterations."""
     system, (predicted,) = walked(**changed)
-    monkeypatch.setattr(Carrier, "carried", lambda self, past, now, time: None)
+    monkeypatch.setattr(Predictor, "predicted", lambda self, past, now, time: None)
     _, (plain,) = walked(**changed)
     assert sum(predicted.tally.iterations) < share * sum(plain.tally.iterations)
     assert np.abs(stress(system, predicted) - stress(system, plain)).max() < 0.01
@@ -65,7 +65,7 @@ def test_a_change_of_the_track_moves_by_whole_elements_and_tears_none():
     part, side = system.parts[number], system.interfaces[0].slave_surface.shortest_edge
     middle = outcome.points["mid_track"]
     change = middle.state.u[number] - middle.start.u[number]
-    moved = Following(part, side).carried(change)
+    moved = Following(part, side).predicted(change)
     fine = np.abs(part.X[0]) < 20
     behind = np.flatnonzero(fine)
     places = part.X[:, behind] - [[side], [0.0]]
@@ -79,9 +79,9 @@ def test_a_change_of_the_track_moves_by_whole_elements_and_tears_none():
 def test_nothing_is_carried_along_where_no_earlier_increment_is_like_the_next():
     system, (outcome,) = walked(advance_step=3.0)
     middle, last = outcome.points["mid_track"], outcome.points["loaded"]
-    assert Carrier(system).carried((), middle.state, last.state.time) is None
+    assert Predictor(system).predicted((), middle.state, last.state.time) is None
     past = (middle.start,)
     state = middle.state
     on = 2 * state.time - middle.start.time
-    assert Carrier(system).carried(past, state, on) is not None
-    assert Carrier(system).carried(past, state, on + 1.0) is None
+    assert Predictor(system).predicted(past, state, on) is not None
+    assert Predictor(system).predicted(past, state, on + 1.0) is None

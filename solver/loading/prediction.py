@@ -33,7 +33,7 @@ _OFF = 0.1
 """Way of the load / element side, up to which it may differ from a whole number of sides."""
 
 
-class Carrier:
+class Predictor:
     """Predicts the states of a system whose loads move, from those before."""
 
     def __init__(self, system: System) -> None:
@@ -43,7 +43,7 @@ class Carrier:
             self._sides[number] = min(self._sides[number], surface.shortest_edge)
         self._known: dict[tuple[int, int], Following] = {}
 
-    def carried(self, past: Sequence[State], now: State, time: float) -> State | None:
+    def predicted(self, past: Sequence[State], now: State, time: float) -> State | None:
         """Return the state predicted for ``time``, or None where no earlier increment is like it.
 
         ``past`` are the states before ``now``, in their order. Prescribed motions are those at
@@ -78,7 +78,7 @@ class Carrier:
         """Return ``now`` after another increment like that from ``before`` to ``after``."""
         following = [self._following(number, count) for number, count in enumerate(steps)]
         each = zip(now.u, before.u, after.u, following, strict=True)
-        u = tuple(n + follow.carried(a - b) for n, b, a, follow in each)
+        u = tuple(n + follow.predicted(a - b) for n, b, a, follow in each)
         contacts = tuple(
             _follow(b, a, n, _on_vertices(interface, following[interface.slave].source))
             for b, a, n, interface in zip(

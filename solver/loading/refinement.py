@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 HALVINGS = 6
-"""Most times that `Settling` halves the increments."""
+"""Most times that `StepRefinement` halves the increments."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settling:
+class StepRefinement:
     """How small increments must be: halved until the result of the first lap no longer changes.
 
     Backward Euler in the plastic strain is of first order in the increment, so the change by
