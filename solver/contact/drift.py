@@ -16,7 +16,7 @@ _STILL, _FAR = 0.01, 0.5
 """Motion along the partner / side of an element: below the first nothing is left out, above the
 second surfaces are paired anew, before the audit finds fault with small sliding."""
 _GAP = 1e-3
-"""Error of the gap / side of an element, above which they are."""
+"""Ratio of the error of the gap to the side of an element, above which they are."""
 
 
 def followed(system: System, before: State, after: State) -> State | None:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 _ROUNDS = 5
 """Times the motion is found anew: curved surfaces do not move apart along straight lines."""
 _FARTHEST = 5.0
-"""Motion / overlap, above which bodies are not moved: a wedge or a taper would leave its fit."""
+"""Ratio of the motion to the overlap, above which bodies are not moved: a wedge or a taper would
+leave its fit."""
 _HELD = 1e-9
 """Residual of the dual problem, below which no motion parts the bodies."""
 

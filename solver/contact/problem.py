@@ -8,8 +8,7 @@ motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction
     |T| <= s,  slip = 0 where below,  T = -s sign(slip) where equal
     s = min(mu N + c, limit),  where N < c:  s = min((mu + 1) N, limit)
 
-A point that hardly touches has no cohesion: if all of it were lost at once where N vanishes, many
-problems would have no solution.
+Cohesion grows with N up to c: a jump at N = 0 would leave many problems without a solution.
 """
 
 from __future__ import annotations

@@ -26,10 +26,11 @@ if TYPE_CHECKING:
 _RIGID = (0.4, 1.1)
 """Edges of a rigid slave / those of its partner."""
 _COARSE = 2.0
-"""Edges of a slave / those of its partner, above which the partner is the slave where they are
-curved."""
+"""Ratio of the edges of a slave to those of its partner, above which the partner is the slave
+where they are curved."""
 _NEAR = 0.01
-"""Distance beyond the nearest one / edge, up to which a vertex is near contact."""
+"""Ratio of the distance beyond the nearest one to the edge, up to which a vertex is near
+contact."""
 
 
 def with_slaves(model: Model, surfaces: Mapping[tuple[str, str], Surface]) -> Model:

@@ -96,7 +96,8 @@ def _none() -> NDArray[np.float64]:
 
 
 _LITTLE = 0.01
-"""Force of a pair / that of the pair with most, below which its timing does not count."""
+"""Ratio of the force of a pair to that of the pair with most, below which its timing does not
+count."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -41,9 +41,9 @@ LEAST = 1e-7
 LEAST_ENERGY = 1e-8
 """The same of energies: of free expansion a hundred-millionth of 1e-5 is left by rounding."""
 _TOUCHING = 1e-9
-"""Gap / length of the longest contact surface, below which vertices touch."""
+"""Ratio of the gap to the length of the longest contact surface, below which vertices touch."""
 _SET_DOWN = 1e-9
-"""Gap / radius of a wheel that is set down, below which vertices touch."""
+"""Ratio of the gap to the radius of a wheel that is set down, below which vertices touch."""
 _EXPANDED = 8
 """States of condensed bodies whose displacements are kept: results and audit ask for them often."""
 

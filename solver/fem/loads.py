@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Push = Callable[[Array, Array], Array]
 
 _SAME = 1e-9
-"""Difference / size of what is given, below which it is rounding."""
+"""Ratio of the difference to the size of what is given, below which it is rounding."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _WINDOWS = 4
 """Windows kept in memory: a load that moves leaves them one by one."""
 _SMALL = 0.25
-"""Elements of a window / of the body, above which a window saves too little."""
+"""Ratio of the elements of a window to those of the body, above which a window saves too little."""
 
 
 class Operator(Protocol):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _ROUNDING = float(np.finfo(float).eps)
 _SAME = 1e-6
-"""Distance / size of a body, below which two places are the same."""
+"""Ratio of the distance to the size of a body, below which two places are the same."""
 
 
 def same_unknowns(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.int64]:

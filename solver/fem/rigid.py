@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 
 _AXIS = 1e-9
-"""Distance from the axis / size of the body, below which a point is on the axis."""
+"""Ratio of the distance from the axis to the size of the body, below which a point is on the
+axis."""
 
 
 class RigidMotion(NamedTuple):

@@ -26,11 +26,13 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _SLOW = 0.6
-"""Size of a step / size of the one before, above which convergence counts as slow."""
+"""Ratio of the size of a step to the size of the one before, above which convergence counts as
+slow."""
 _PATIENCE = 5
 """Slow steps in a row before they count as a series: a change of contact status makes a few."""
 _WINDING = 3.0
-"""Size of a step / size of the one before, above which it does not continue the series."""
+"""Ratio of the size of a step to the size of the one before, above which it does not continue the
+series."""
 _ALONG = 0.7
 """Cosine of the angle between two steps, above which they go in one direction."""
 _DEPTH = 5

@@ -1,4 +1,4 @@
-"""Prescribed shear that no body can bear."""
+"""Prescribed shear against the shear strength of the material."""
 
 from __future__ import annotations
 

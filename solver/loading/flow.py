@@ -33,8 +33,8 @@ class SoftestStep:
     """The step that met the least resistance.
 
     ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
-    ``place`` (x, y) [mm] say what it strained most, ``proves`` whether its material can have no
-    other reason for it than a limit load: it hardens no more, and its stress meets no corner.
+    ``place`` (x, y) [mm] say what it strained most, ``proves`` whether vanishing stiffness proves a
+    limit load: no hardening is left, and the stress is at no corner of the yield surface.
     ``excludes`` says that the kinematic theorem leaves no equilibrium at this load (`collapses`),
     from whatever state it is tried.
     """

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _APART = 1e-4
-"""Gap / edge, above which a vertex without force is no contact that has just closed."""
+"""Ratio of the gap to the edge, above which a vertex without force is no contact that has just
+closed."""
 
 
 def lost(system: System, before: Converged, now: Converged) -> float:

@@ -58,7 +58,8 @@ _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies that bear nothing / that at which their rounding is out of balance."""
 _MOVING = 0.01
-"""Last step / displacements of the increment, above which the bodies are still moving."""
+"""Ratio of the last step to the displacements of the increment, above which the bodies are still
+moving."""
 _LATE = 1
 """Iteration from which on a step without stiffness means that the structure flows."""
 

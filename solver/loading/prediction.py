@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 MEMORY = 8
 """States before the last that are kept: most increments to an element side."""
 _OFF = 0.1
-"""Way of the load / element side, up to which it may differ from a whole number of sides."""
+"""Ratio of the way of the load to the element side, up to which it may differ from a whole number
+of sides."""
 
 
 class Predictor:

@@ -35,13 +35,16 @@ if TYPE_CHECKING:
 
 
 _NEAR = 8
-"""Way to a load without equilibrium / last part that failed, up to which it is that limit load."""
+"""Ratio of the way to a load without equilibrium to the last part that failed, up to which it is
+that limit load."""
 _TURN = 0.1
 """Largest rotation of a rigid body in an increment [rad]."""
 _UNTIMED = 0.02
-"""Friction that is not known / most friction, above which an increment is divided."""
+"""Ratio of the friction that is not known to the largest friction, above which an increment is
+divided."""
 _PASSAGE = 0.5
-"""Way of a contact in an increment / its width, above which the increment is divided."""
+"""Ratio of the way of a contact in an increment to its width, above which the increment is
+divided."""
 _SHORTEST = 2.0**-6
 """Shortest part into which it is divided."""
 

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     Points = Mapping[str, Converged]
 
 _NOTHING = 1e-6
-"""Plastic work of a lap / plastic work so far, below which the lap counts as elastic."""
+"""Ratio of the plastic work of a lap to the plastic work so far, below which the lap counts as
+elastic."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

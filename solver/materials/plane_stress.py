@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _ZZ = 2
 _ROUNDING = float(np.finfo(float).eps)
-"""Stress zz / size of the terms it is a sum of, below which it is rounding."""
+"""Ratio of stress zz to the size of the terms it is a sum of, below which it is rounding."""
 _SMALL = 1e-9
 """The same for laws that solve an equation by iteration, and are less exact."""
 _MAX_ITERATIONS = 100

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _MOST = 1_000_000
 """Elements that a line may be divided into."""
 _SAME = 1e-9
-"""Distance / size of a mesh, below which corners are merged."""
+"""Ratio of the distance to the size of a mesh, below which corners are merged."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> NDArray[np.float64]:

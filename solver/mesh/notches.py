@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from skfem import Mesh
 
 _SAME = 1e-9
-"""Distance / size of a mesh, below which lines are the same."""
+"""Ratio of the distance to the size of a mesh, below which lines are the same."""
 
 
 def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float]) -> Mesh:

@@ -163,7 +163,7 @@ class Temperature(Load):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InitialStress(Load):
-    """Stress that the body has before any load, as its making left it.
+    """Stress present before any load, for instance from manufacture.
 
     It is there from the beginning, and is brought to equilibrium before any load acts: what is not
     in balance bends the body. Give no amplitude.

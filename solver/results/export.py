@@ -17,14 +17,9 @@ if TYPE_CHECKING:
 
     from solver.results.mesh_fields import MeshFields
 
-_CELLS = {
-    "quad4": "quad",
-    "quad8": "quad8",
-    "quad9": "quad9",
-    "tri3": "triangle",
-    "tri6": "triangle6",
-}
-"""Element -> cell of meshio. Corners, mid-sides and the middle have the same order in both."""
+_CELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+"""Nodes of an element -> cell of meshio. Corners, mid-sides and the middle have the same order in
+both."""
 _PVD = "stages.pvd"
 
 
@@ -87,7 +82,7 @@ def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
     every = list(fields.bodies.values())
     return meshio.Mesh(
         np.pad(fields.X.T, ((0, 0), (0, 1))),
-        [(_CELLS[element], cells) for element, cells in every],
+        [(_CELLS[cells.shape[1]], cells) for _, cells in every],
         point_data={
             "displacement": np.pad(moved.T, ((0, 0), (0, 1))),
             **{f"stress_{c}": each for c, each in zip(COMPONENTS, stress, strict=True)},

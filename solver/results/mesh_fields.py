@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 NO_NODE = -1
 """Fills the rows of faces and cells that have fewer nodes than others."""
 
-_FACES: Mapping[str, tuple[tuple[int, ...], ...]] = {
-    "quad4": ((0, 1, 2, 3),),
-    "quad8": ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
-    "quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
-    "tri3": ((0, 1, 2),),
-    "tri6": ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
+_FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {
+    3: ((0, 1, 2),),
+    4: ((0, 1, 2, 3),),
+    6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
+    8: ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
+    9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
 }
-"""Element -> triangles and quadrilaterals that use each of its nodes."""
+"""Nodes of an element -> triangles and quadrilaterals that use each of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +54,8 @@ class MeshFields:
         Elements with nodes between their corners are divided. A triangle ends with `NO_NODE`.
         """
         faces, numbers = [], []
-        for number, (element, cells) in enumerate(self.bodies.values()):
-            for corners in _FACES[element]:
+        for number, (_, cells) in enumerate(self.bodies.values()):
+            for corners in _FACES[cells.shape[1]]:
                 nodes = cells[:, corners]
                 lacking = ((0, 0), (0, 4 - len(corners)))
                 faces.append(np.pad(nodes, lacking, constant_values=NO_NODE))

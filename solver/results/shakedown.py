@@ -31,21 +31,22 @@ if TYPE_CHECKING:
 QUIET = 1e-3
 """Accumulated plastic strain of a cycle, over the yield strain, below which nothing flows."""
 CLOSED = 0.05
-"""Plastic strain left by a cycle / strain accumulated in it, up to which the cycle is closed. Also
-the share of the largest accumulated strain, up to which that at a depth may be an interpolation
-error, and is left out."""
+"""Ratio of the plastic strain left by a cycle to the strain accumulated in it, up to which the
+cycle is closed. Also the share of the largest accumulated strain, up to which that at a depth may
+be an interpolation error, and is left out."""
 STEADY = 0.02
 """Relative change from cycle to cycle, up to which a sequence has reached its limit. Over the
 second half of the sequence twice this change is allowed."""
 AT_REST = 2e-3
 """Relative change from cycle to cycle, below which earlier values do not matter."""
 KEPT = 0.8
-"""Last value of a sequence / its value half-way, below which its limit may be zero. A decay as
-1 / n^p has the ratio 1 / 2^p, however long it has lasted."""
+"""Ratio of the last value of a sequence to its value half-way, below which its limit may be zero. A
+decay as 1 / n^p has the ratio 1 / 2^p, however long it has lasted."""
 SLOWEST = 0.95
 """Ratio of successive changes, above which no limit can be extrapolated."""
 KNOWN = 0.1
-"""Distance between the bounds of a limit / the upper one, up to which their mean is the limit."""
+"""Ratio of the distance between the bounds of a limit to the upper one, up to which their mean is
+the limit."""
 
 
 class ShakedownState(IntEnum):

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 
 _LEVEL = 1e-6
-"""Fall of the squared pressure over an edge / its largest, below which it does not fall."""
+"""Ratio of the fall of the squared pressure over an edge to its largest, below which it does not
+fall."""
 
 
 class Slave(NamedTuple):

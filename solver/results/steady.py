@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 _LOADED, _RELEASED = 0.0, 1.0
 _LEVEL = 1e-6
-"""Difference of depth / depth of the first row, up to which points and nodes are on one line."""
+"""Ratio of the difference of depth to the depth of the first row, up to which points and nodes are
+on one line."""
 _MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
 
 

@@ -159,7 +159,7 @@ class RollingParameters(WheelParameters):
                 f"at most {_MOST_INCREMENTS}",
             )  # fmt: skip
         if self.periodic and self.half_space_size != 400.0:
-            allowed = "must be 400 where the half-space repeats itself"
+            allowed = "cannot be set with periodic = true: the depth is the length of the track"
             raise ModelError("half_space_size", self.half_space_size, allowed)
         if self.periodic and self.length < _PERIOD * self.half_width:
             raise ModelError(

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 INFLOW = 0.1
-"""Plastic strain gathered where the window begins / that of the pass, up to which it is large
-enough. Rows that an earlier pass left at yield flow as soon as the load comes near, however large
-the window is; 5 % then change stress by 1 % of the yield stress."""
+"""Ratio of the plastic strain gathered where the window begins to that of the pass, up to which it
+is large enough. Rows that an earlier pass left at yield flow as soon as the load comes near,
+however large the window is; 5 % then change stress by 1 % of the yield stress."""
 LEAST = 0.05
-"""Plastic strain / yield strain, up to which a pass gathers nothing to speak of. Its tenth is too
-much for the deepest row."""
+"""Ratio of the plastic strain to the yield strain, up to which a pass gathers nothing to speak of.
+Its tenth is too much for the deepest row."""
 
 
 class RowFlow:

@@ -56,8 +56,8 @@ _SHORTEST = 1 / 32
 _AWAY = 3.0
 """Growth of the residual that a whole step may cause."""
 _FLOWS, _RUNS = 0.1, 1.0
-"""Plastic strain gathered in a pass, above which one that leads nowhere flows without limit, and
-above which any does. A material that hardens has no limit: Newton's method has lost its way."""
+"""Plastic strain of a pass. A solve that stalls counts as a limit load above the first, any solve
+above the second. A material that hardens has no limit: there Newton's method has diverged."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """After so many steps the residual must be smaller than this part of what it was."""
 

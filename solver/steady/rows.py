@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LEVEL = 1e-6
-"""Difference of depth / depth of the rows, up to which points lie on one row."""
+"""Ratio of the difference of depth to the depth of the rows, up to which points lie on one row."""
 
 
 class FlowRows:

@@ -1,10 +1,14 @@
 """A steady pass from whatever guess there is: directly, or by way of passes easier to find.
 
-Newton's method may lose its way where much flows at once, and take that for a limit. Where friction
-asks for more shear than the material bears, the contact must flatten until it does, and strain is
-not small. The same load on a material that hardens leads there, as its strain grows while hardening
-fades away, or a heavier load does: where a small part more of load makes the contact sink in, one
-comes back from there. On a track that was rolled before, lighter loads lead there.
+Where much flows at once, Newton's method may diverge though there is a pass. Then, in turn:
+
+1. without contact forces to begin with: the same load with smaller moments first
+2. on a track that was not rolled: the same load on a material that hardens, as hardening fades to
+   its own; then a heavier load, and back
+3. on a track that was rolled: lighter loads first
+
+Where friction asks for more shear than a material bears that does not harden, the contact flattens
+until it does; more than 30 % of plastic strain in a pass counts as the limit load.
 """
 
 from __future__ import annotations

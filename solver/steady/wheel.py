@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 
 _ROUNDS = 40
 _NEAR = 0.01
-"""Expected change of a contact force / load, up to which a contact is looked for from there."""
+"""Ratio of the expected change of a contact force to the load, up to which a contact is looked for
+from there."""
 _COVERED = 0.999
 """Share of the hat of a vertex that must face the rim for the vertex to be a contact point."""
 _SETTLED = 1e-7

@@ -131,7 +131,6 @@ class Builder:
         law = laws.get(table.material)
         if law is None:
             return None
-        usual = "quad8" if mesh.t.shape[0] == 4 else "tri6"
         return self.tried(
             where,
             lambda: Body(
@@ -139,7 +138,7 @@ class Builder:
                 mesh=mesh,
                 material=law,
                 kinematics=self.scene.kinematics,
-                element=table.element or usual,
+                element=table.element or usual_element(mesh),
                 thickness=self.scene.thickness,
                 supports=supports,
                 loads=loads,
@@ -264,6 +263,11 @@ def _place(names: list[str]) -> Any:
         return f"{time - k:.4g} of stage {names[k]}"
 
     return words
+
+
+def usual_element(mesh: Mesh) -> str:
+    """Return the element of a body that names none."""
+    return "quad8" if mesh.t.shape[0] == 4 else "tri6"
 
 
 def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:

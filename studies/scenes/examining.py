@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _NEAR = 0.1
-"""Gap / shortest edge of a surface, up to which a body held by contact alone counts as touching."""
+"""Ratio of the gap to the shortest edge of a surface, up to which a body held by contact alone
+counts as touching."""
 
 
 def examined(description: Description, *, built: bool) -> tables.SceneFile:

@@ -34,7 +34,7 @@ class BodyTable(SceneTable):
     shape: Shape | None = None
     mesh: FileName | None = None
     part: str | None = None
-    element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] | None = None
+    element: str | None = None
     move: Place = (0.0, 0.0)
     boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)

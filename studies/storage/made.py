@@ -1,4 +1,4 @@
-"""What was made of what, so that nothing is made again that is there: ``made.json`` of a study.
+"""Memo of derived files (``made.json``): data set, report, picture are kept while inputs last.
 
 A result is one or several files, such as the data set. Of each, a digest of all it was made of is
 kept, and one of every file. A result is made anew where a file is gone or is not what was written,

@@ -56,7 +56,7 @@ def test_a_small_half_space_is_another_problem() -> None:
     ("own", "allowed"),
     [
         ({}, "must be 400.0, or track a length"),
-        ({"track": 100.0, "periodic": True}, "must be 400 where the half-space repeats itself"),
+        ({"track": 100.0, "periodic": True}, "the depth is the length of the track"),
     ],
 )
 def test_its_size_is_refused_where_it_means_nothing(own: dict[str, Any], allowed: str) -> None:

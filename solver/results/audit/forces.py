@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 _ROUNDED = 1e-5
 """Largest rounding of nodal forces that is left out / force level."""
 _LITTLE = 1e-4
-"""Contact force / force level, below which errors are compared with this level instead."""
+"""Ratio of the contact force to the force level, below which errors are compared with this level
+instead."""
 
 
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _PRESSED = 1e-6
-"""Normal force / force level, below which a vertex counts as open."""
+"""Ratio of the normal force to the force level, below which a vertex counts as open."""
 _GAP = 2e-3
 """Largest gap allowed / elastic approach."""
 _OVERLAP = (0.02, 2.5e-3)
@@ -33,7 +33,8 @@ _COARSE = 0.36
 """Largest edge allowed / width of the contact of curved surfaces: three vertices across it, which
 tell Hertz's pressure to 4 %."""
 _LITTLE = 0.01
-"""Force / force level, below which it does not count how well a contact is resolved."""
+"""Ratio of the force to the force level, below which it does not count how well a contact is
+resolved."""
 _STILL = 1e-3
 """Least slip / elastic approach, in the work that wrong slip is compared with."""
 

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 
 _FIGURE = AUDIT["audit_stored"].name
 _NEAR = 0.1
-"""Gap / largest way or gap, below which gaps measured by other projections are compared."""
+"""Ratio of the gap to the largest way or gap, below which gaps measured by other projections are
+compared."""
 
 
 @dataclass(frozen=True, slots=True)

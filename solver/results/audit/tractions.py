@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _LEVEL = 1e-6
-"""Fall of the squared pressure over an edge / its largest, below which it does not fall."""
+"""Ratio of the fall of the squared pressure over an edge to its largest, below which it does not
+fall."""
 _WHOLE = 1e-6
 """Share of the hat of a vertex that may not face the master, where the vertex faces it."""
 

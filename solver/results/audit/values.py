@@ -31,7 +31,8 @@ _INSIDE, _OUTSIDE = 1e-8, 1e-6
 """Reference coordinate beyond an element, up to which a place is in it, and above which it is not.
 Between them either is right."""
 _SAME_DEPTH = 1e-6
-"""Difference of depth / depth of the first row, up to which points are in one row."""
+"""Ratio of the difference of depth to the depth of the first row, up to which points are in one
+row."""
 
 
 def equivalent(stress: Array) -> Array:

@@ -110,6 +110,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "must be a number",
     ),
     "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
+    "unknown element": (
+        put("bodies", "upper", "element", "hex8"),
+        "bodies.upper.element",
+        "must be one of quad8",
+    ),
     "unknown parameter": (
         put("contacts", 0, "friction", "$nu"),
         "contacts[0].friction",

@@ -10,16 +10,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
 from fastapi.testclient import TestClient
+from skfem import ElementQuad1
 
 import studies.scenes.registry as registry
 from residua.cli import main
 from service.app import create_app
 from service.settings import Settings
 from solver import SCENES, ModelError, Record, Status, System
+from solver.mesh.elements import ELEMENTS, ElementType
+from solver.results.export import write_vtu
 from solver.scenes.punch import PUNCH, PunchParameters
 from studies import Store, Study, StudyError, open_study, run_study, scene_schema
 from studies.errors import SceneError
@@ -521,3 +525,27 @@ def test_pressure_at_the_end_of_coarse_arcs_is_as_stored() -> None:
     }  # fmt: skip
     record = run(built(tables))
     assert record.status is Status.OK, record.message
+
+
+@pytest.mark.solves
+def test_an_element_of_ones_own_is_named_and_written_like_any_other(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    plain = ElementType(
+        element=ElementQuad1(), cells="quad", order=3, full_order=3, quadratic=False
+    )
+    monkeypatch.setitem(ELEMENTS, "quad4_plain", plain)
+    records = {}
+    for element in ("quad4", "quad4_plain"):
+        tables = blocks()
+        for body in tables["bodies"].values():
+            body["element"] = element
+        records[element] = run(built(tables))
+        assert records[element].status is Status.OK, records[element].message
+    mesh = records["quad4_plain"].mesh
+    assert mesh is not None
+    write_vtu(mesh(), tmp_path)
+    assert [cells.type for cells in meshio.read(tmp_path / "0-pressed.vtu").cells] == ["quad"]
+    assert np.shape(mesh().faces[0]) == np.shape(records["quad4"].mesh().faces[0])
+    differ = records["quad4_plain"].scalars["least"] - records["quad4"].scalars["least"]
+    assert differ != 0.0, "dilatation is averaged in one of them"

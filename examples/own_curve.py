@@ -1,0 +1,40 @@
+"""A hardening curve of one's own: Swift's law, k (e0 + p)^n, held against a bar in tension."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver import Body, Displacement, Model, solve
+from solver.materials import Chaboche, Elasticity
+from solver.mesh import grid
+
+
+@dataclass(frozen=True)
+class Swift:
+    """Size of the yield surface k (e0 + p)^n [MPa] at the accumulated plastic strain p."""
+
+    k: float
+    e0: float
+    n: float
+    limit = np.inf  # it grows without bound
+
+    def flow_stress(self, p):
+        """Return the size of the yield surface [MPa]."""
+        return self.k * (self.e0 + p) ** self.n
+
+    def slope(self, p):
+        """Return its derivative by the plastic strain [MPa]."""
+        return self.n * self.k * (self.e0 + p) ** (self.n - 1)
+
+
+E, curve = 2e5, Swift(k=900.0, e0=0.002, n=0.2)
+law = Chaboche(elasticity=Elasticity(youngs_modulus=E, poisson_ratio=0.3), curve=curve)
+bar = Body(
+    name="bar", mesh=grid(np.linspace(0, 10, 3), np.linspace(0, 2, 2)), material=law,
+    kinematics="plane_stress", supports={"left": "x", "bottom": "y"},
+    loads=(Displacement(boundary="right", x=0.2),),
+)  # fmt: skip
+stress = solve(Model(bodies=(bar,))).stress("bar", "loaded")[0]
+plastic = 0.2 / 10 - stress / E  # what is not elastic of a strain of 2 %
+assert np.allclose(stress, curve.flow_stress(plastic), rtol=1e-9), stress
+print(f"stress at a strain of 2 %: {stress[0]:.2f} MPa")
