@@ -47,6 +47,7 @@ def test_every_verdict_is_counted_once() -> None:
     assert sorted(counted, key=str) == sorted(Verdict, key=str)
 
 
+@pytest.mark.processes
 def test_scenes_run_in_processes_and_are_told_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.report(["same-0", "wild-0"], 1) == 0
     text = capsys.readouterr().out
@@ -58,6 +59,7 @@ def test_scenes_run_in_processes_and_are_told_by_name(capsys: pytest.CaptureFixt
     assert text.rstrip().rpartition("\n")[2].startswith("bad")
 
 
+@pytest.mark.processes
 def test_a_process_that_does_not_answer_or_is_gone_is_ended() -> None:
     late = pool._Worker(patience=-pool.START)
     late.take("endless-1")

@@ -169,6 +169,7 @@ def test_memory_does_not_grow_with_the_number_of_runs() -> None:
         for each in (study.run_ids(), study.cases(), study.paths()):
             assert sum(1 for _ in each)
 
+    Study.known(many(20))
     passed(many(20))  # what is kept for all studies of the scene
     axis = peak(lambda: Study.known(many(4000)).size)  # what each value of an axis sets is held
     assert axis < 200_000

@@ -236,13 +236,13 @@ def one_support_more(patch: Patch) -> None:
 
 
 def soft_condensation(patch: Patch) -> None:
-    build = substructure._Condensed.__init__
+    build = substructure._CondensedBody.__init__
 
     def softer(self: Any, *args: Any) -> None:
         build(self, *args)
         self.stiffness = 0.9 * self.stiffness
 
-    patch.setattr(substructure._Condensed, "__init__", softer)
+    patch.setattr(substructure._CondensedBody, "__init__", softer)
     patch.setattr(substructure, "_CACHE", type(substructure._CACHE)())
 
 
