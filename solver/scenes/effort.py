@@ -37,7 +37,8 @@ class Lattice(NamedTuple):
 
 
 @cache
-def _per_place(element: str) -> tuple[str, int, int, int]:
+def per_place(element: str) -> tuple[str, int, int, int]:
+    """Return the cells of an element, and its nodes at a corner, on an edge and inside."""
     from solver.mesh.elements import element_type  # scikit-fem takes a third of a second to import
 
     kind = element_type(element)
@@ -47,7 +48,7 @@ def _per_place(element: str) -> tuple[str, int, int, int]:
 
 def lattice(columns: int, rows: int, element: str) -> Lattice:
     """Return what `solver.mesh.grid` makes of so many columns and rows of rectangles."""
-    cells, at_corner, on_edge, inside = _per_place(element)
+    cells, at_corner, on_edge, inside = per_place(element)
     parts = 2 if cells == "tri" else 1  # triangles cut each rectangle along a diagonal
     corners, rectangles = (columns + 1) * (rows + 1), columns * rows
     edges = columns * (rows + 1) + rows * (columns + 1) + (parts - 1) * rectangles

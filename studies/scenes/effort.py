@@ -6,11 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
 from solver.errors import ModelError
-from solver.mesh.elements import element_type
-from solver.scenes.effort import Effort
+from solver.scenes.effort import Effort, per_place
 from studies.errors import StudyError
 from studies.scenes import tables
 from studies.scenes.building import mesh_of_body, usual_element
@@ -80,8 +77,7 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> _Me
 
 
 def _size(body: tables.BodyTable, mesh: Mesh) -> _MeshSize:
-    kind = element_type(body.element or usual_element(mesh)).element
-    each = kind.nodal_dofs, kind.facet_dofs, kind.interior_dofs
-    nodes = np.dot(each, (mesh.nvertices, mesh.nfacets, mesh.nelements))
+    _, at_corner, on_edge, inside = per_place(body.element or usual_element(mesh))
+    nodes = at_corner * mesh.nvertices + on_edge * mesh.nfacets + inside * mesh.nelements
     edges = {name: len(facets) for name, facets in (mesh.boundaries or {}).items()}
     return _MeshSize(mesh.nelements, int(nodes), edges)
