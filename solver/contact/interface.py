@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
-    from solver.fem.heat import HotSurface
+    from solver.fem.heat import Heat
     from solver.fem.part import Part
     from solver.fem.rigid import RigidPart
     from solver.fem.surface import Surface
@@ -44,7 +44,7 @@ class Interface:
     master_surface: Surface
     friction: float
     shear_strength: float
-    hot: tuple[HotSurface | None, HotSurface | None]
+    hot: tuple[Heat | None, Heat | None]
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
@@ -98,7 +98,7 @@ class Interface:
         least = np.full(len(pairing.gap), np.inf)
         for part, hot, rows in zip(self.parts, self.hot, pairing.normal, strict=True):
             strength = part.body.material.shear_yield_stress
-            left = 1.0 if hot is None else _mean(rows, hot.left(time))
+            left = 1.0 if hot is None else _mean(rows, hot.strong(time))
             least = np.minimum(least, strength * left)
         return self.declared.shear_limit * least
 

@@ -10,7 +10,7 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
-from solver.fem.heat import Heat, HotSurface
+from solver.fem.heat import Heat
 from solver.fem.loads import (
     Superposed,
     eigenstrains,
@@ -76,7 +76,8 @@ class Discretisation(Nodes, Part):
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.moves = body.travelling is not None
         self.loads = nodal_forces(self)
-        self._eigenstrains, self.heat = eigenstrains(self), Heat.of(self)
+        self._eigenstrains = eigenstrains(self)
+        self.heat = Heat.of(self, self.points.reshape(2, -1))
         self._hold()
 
     def _hold(self) -> None:
@@ -161,9 +162,10 @@ class Discretisation(Nodes, Part):
         """Return the law of its points at a time: heat may change it."""
         return self.heat.law(self.body.law, time) if self.heat else self.body.law
 
-    def hot(self, surface: Surface) -> HotSurface | None:
+    def hot(self, surface: Surface) -> Heat | None:
         """Return what heat takes of the yield stress at a surface; None where it takes nothing."""
-        return HotSurface.of(self, surface.nodes)
+        heat = Heat.of(self, self.X[:, surface.nodes])
+        return heat if heat and heat.strength.fields.any() else None
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
         """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""

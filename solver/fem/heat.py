@@ -24,19 +24,18 @@ _LEAST = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Heat:
-    """Losses (n_points,) of Young's modulus and of the yield stress, as shares of both."""
+    """Losses (n,) of Young's modulus and of the yield stress at places, as shares of both."""
 
     modulus: Superposed
     strength: Superposed
 
     @classmethod
-    def of(cls, part: Nodes) -> Heat | None:
-        """Return what the temperatures of a body do; None where they only make it expand."""
+    def of(cls, part: Nodes, x: NDArray[np.float64]) -> Heat | None:
+        """Return what the temperatures of a body do at places (2, n); None if they only expand."""
         loads = [load for load in part.body.every_load
                  if isinstance(load, Temperature) and load.softens]  # fmt: skip
         if not loads:
             return None
-        x = part.points.reshape(2, -1)
         rises = [load.at(x) for load in loads]
         both = list(zip(loads, rises, strict=True))
         return cls(
@@ -47,27 +46,12 @@ class Heat:
     def law(self, cold: Law, time: float) -> Law:
         """Return the law at a time; the cold one as long as nothing has changed."""
         stiff = _left(self.modulus, "modulus_drop", time)
-        strong = _left(self.strength, "yield_drop", time)
+        strong = self.strong(time)
         unchanged = (stiff == 1).all() and (strong == 1).all()
         return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)
 
-
-@dataclass(frozen=True, slots=True)
-class HotSurface:
-    """Losses (n_nodes,) of the yield stress at the nodes of a surface, as shares of it."""
-
-    strength: Superposed
-
-    @classmethod
-    def of(cls, part: Nodes, nodes: NDArray[np.int64]) -> HotSurface | None:
-        """Return what the temperatures of a body do at some of its nodes; None if nothing."""
-        loads = [load for load in part.body.every_load
-                 if isinstance(load, Temperature) and load.yield_drop]  # fmt: skip
-        each = ((load, load.yield_drop * load.at(part.X[:, nodes])) for load in loads)
-        return cls(Superposed.of(len(nodes), each)) if loads else None
-
-    def left(self, time: float) -> NDArray[np.float64]:
-        """Return the share (n_nodes,) of the yield stress that is left at a time."""
+    def strong(self, time: float) -> NDArray[np.float64]:
+        """Return the share (n,) of the yield stress that is left at a time."""
         return _left(self.strength, "yield_drop", time)
 
 

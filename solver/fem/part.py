@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
 
-    from solver.fem.heat import HotSurface
+    from solver.fem.heat import Heat
     from solver.fem.loads import Superposed
     from solver.fem.operators import PartOperators
     from solver.fem.surface import Surface
@@ -144,7 +144,7 @@ class Part(ABC):
         del time
         return self.body.law
 
-    def hot(self, surface: Surface) -> HotSurface | None:
+    def hot(self, surface: Surface) -> Heat | None:
         """Return what heat takes of the yield stress at a surface; None where it takes nothing."""
         del surface
         return None

@@ -22,7 +22,7 @@ from solver import (
     solve,
 )
 from solver.contact.problem import STICK
-from solver.fem.heat import HotSurface
+from solver.fem.discretisation import Discretisation
 from solver.mesh import grid, mapped
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch import model as punch_model
@@ -190,9 +190,7 @@ def test_a_hot_wheel_that_is_dragged_keeps_the_limit(hot):
 
 @pytest.mark.solves
 def test_the_audit_asks_for_the_limit_of_the_hot_surface(monkeypatch):
-    monkeypatch.setattr(
-        HotSurface, "left", lambda self, time: np.ones(self.strength.fields.shape[0])
-    )
+    monkeypatch.setattr(Discretisation, "hot", lambda self, surface: None)
     found = solve(heated(pushed_block(0.9 * FULL), "block", 200.0))
     assert any(text.startswith("audit_friction_excess") for text in found.audit().violations)
 
