@@ -61,7 +61,8 @@ class Examiner:
         """
         what = dict(content), self.directory, self.bounds
         name = content.get("name")
-        return await self.process.call(examined, *what, name=name, advice=": sweep less")
+        async with self.process.turn():
+            return await self.process.call(examined, *what, name=name, advice=": sweep less")
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:

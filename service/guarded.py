@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import resource
 import signal
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import TypeVar
 
 from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after
@@ -37,10 +38,19 @@ class Guarded:
         self.field, self.waiting, self.seconds = field, waiting, seconds
         self.one = CapacityLimiter(1)
 
+    @asynccontextmanager
+    async def turn(self) -> AsyncIterator[None]:
+        """Wait until no other call is carried out; raise `Busy` if too many wait."""
+        if self.one.statistics().tasks_waiting >= self.waiting:
+            waiting = f"{self.waiting} requests to read a {self.field} wait already"
+            raise Busy(f"{waiting}: ask later")
+        async with self.one:
+            yield
+
     async def call(
         self, function: Callable[..., Found], *given: object, name: object, advice: str = ""
     ) -> Found:
-        """Return ``function(*given)``; all of it must be picklable.
+        """Return ``function(*given)`` in one's `turn`; all of it must be picklable.
 
         Parameters
         ----------
@@ -51,14 +61,11 @@ class Guarded:
         StudyError
             where time or memory did not suffice; besides it what the function raises
         Busy
-            if too many others wait, or the process was killed
+            if the process was killed
         """
-        if self.one.statistics().tasks_waiting >= self.waiting:
-            raise Busy(f"{self.waiting} times a {self.field} waits to be read already: ask later")
         try:
-            async with self.one:
-                with fail_after(self.seconds):
-                    return await run_sync(_limited, function, *given, cancellable=True)
+            with fail_after(self.seconds):
+                return await run_sync(_limited, function, *given, cancellable=True)
         except BrokenWorkerProcess:
             raise Busy(f"the process that reads a {self.field} has ended: ask again") from None
         except (TimeoutError, MemoryError):

@@ -50,10 +50,11 @@ class Inspector:
             if not (FILE_NAME.fullmatch(name) and name.lower().endswith(FORMATS)):
                 allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
                 raise StudyError("meshes", name, allowed)
-        with tempfile.TemporaryDirectory() as folder:
-            for name, data in {**meshes, _FILE: text}.items():
-                (Path(folder) / name).write_bytes(data)
-            found = json.loads(await self.process.call(inspected, folder, name=_FILE))
+        async with self.process.turn():
+            with tempfile.TemporaryDirectory() as folder:
+                for name, data in {**meshes, _FILE: text}.items():
+                    (Path(folder) / name).write_bytes(data)
+                found = json.loads(await self.process.call(inspected, folder, name=_FILE))
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}

@@ -58,9 +58,12 @@ def test_what_fails_in_the_process_is_told_and_the_next_call_is_answered(
 def test_a_queue_that_is_full_takes_no_more() -> None:
     process = Guarded("study", 1, 60.0)
 
+    async def one(number: int) -> int:
+        async with process.turn():
+            return await process.call(doubled, number, name="a")
+
     async def calls() -> list[object]:
-        each = [process.call(doubled, k, name="a") for k in range(4)]
-        return await asyncio.gather(*each, return_exceptions=True)
+        return await asyncio.gather(*map(one, range(4)), return_exceptions=True)
 
     found = asyncio.run(calls())
     assert found[:2] == [0, 2]
