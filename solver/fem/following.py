@@ -45,7 +45,7 @@ class Following:
             self._solver = linear.analyse(upper)
             self._solver.factorise(upper.data)
 
-    def predicted(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+    def carried(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a change of the unknowns (n,), farther on by the way [mm]."""
         moved = np.where(self._known, change[self.source], 0.0)
         if len(self._others):

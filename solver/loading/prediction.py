@@ -79,7 +79,7 @@ class Predictor:
         """Return ``now`` after another increment like that from ``before`` to ``after``."""
         following = [self._following(number, count) for number, count in enumerate(steps)]
         each = zip(now.u, before.u, after.u, following, strict=True)
-        u = tuple(n + follow.predicted(a - b) for n, b, a, follow in each)
+        u = tuple(n + follow.carried(a - b) for n, b, a, follow in each)
         contacts = tuple(
             _follow(b, a, n, _on_vertices(interface, following[interface.slave].source))
             for b, a, n, interface in zip(

@@ -195,10 +195,8 @@ class Law(ABC):
         worst = np.maximum(worst, np.where(dp > 0, np.abs(beyond), np.maximum(beyond, 0.0)))
         flow = after.plastic_strain - before.plastic_strain
         turned = _ROUNDING * 2 * G * np.abs(strain).max(axis=0) / self.flow_stress(after)
-        flow_rule_error = np.maximum(
-            self.flow_rule_error(stress, flow, dp, after) - dp * turned, 0.0
-        )
-        return np.asarray(np.maximum(worst, 2 * G * np.maximum(flow_rule_error, -dp)))
+        aside = np.maximum(self.flow_rule_error(stress, flow, dp, after) - dp * turned, 0.0)
+        return np.asarray(np.maximum(worst, 2 * G * np.maximum(aside, -dp)))
 
     def flow_rule_error(
         self, stress: Array, flow: Array, growth: Array, after: PlasticState

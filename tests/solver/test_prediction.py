@@ -65,7 +65,7 @@ def test_a_change_of_the_track_moves_by_whole_elements_and_tears_none():
     part, side = system.parts[number], system.interfaces[0].slave_surface.shortest_edge
     middle = outcome.points["mid_track"]
     change = middle.state.u[number] - middle.start.u[number]
-    moved = Following(part, side).predicted(change)
+    moved = Following(part, side).carried(change)
     fine = np.abs(part.X[0]) < 20
     behind = np.flatnonzero(fine)
     places = part.X[:, behind] - [[side], [0.0]]

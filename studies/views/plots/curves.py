@@ -22,7 +22,7 @@ from studies.views.plots.captions import (
     wrapped,
 )
 from studies.views.plots.legends import MOST_LINES, add_legend, is_number
-from studies.views.plots.runs import Kind, absent, known_values, look_of, standing
+from studies.views.plots.runs import Kind, absent, known_values, standing, style_of
 
 _MARKS = "osD^vPh*"
 _SIZE = (8.0, 4.6)
@@ -61,7 +61,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
             field,
             f"would take {curves} curves, at most {MOST_LINES} are drawn: select values of {rest}",
         )
-    look_of(dataset, field)  # where no run has a value: say so
+    style_of(dataset, field)  # where no run has a value: say so
     sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
     numeric = is_number(across)

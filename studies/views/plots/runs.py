@@ -106,7 +106,7 @@ def known_values(dataset: xr.Dataset, field: str) -> xr.DataArray:
     return dataset[field].astype(float).where(status == OK)
 
 
-def look_of(dataset: xr.Dataset, field: str) -> Style:
+def style_of(dataset: xr.Dataset, field: str) -> Style:
     """Return how a field is drawn; numbers that change sign have zero in the middle."""
     known = known_values(dataset, field).to_numpy()
     known = known[np.isfinite(known)]

@@ -18,7 +18,7 @@ from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.curves import curve_figure
 from studies.views.plots.limits import draw_shakedown_limits
-from studies.views.plots.runs import POINTS, Style, absent, known_values, look_of, standing
+from studies.views.plots.runs import POINTS, Style, absent, known_values, standing, style_of
 
 MOST_PANELS = 6
 
@@ -68,12 +68,12 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     for number, axis in ((across, grid[0, 0].xaxis), (up, grid[0, 0].yaxis)):
         if number.dtype.kind in "iu":
             axis.set_major_locator(MaxNLocator(integer=True))
-    look = look_of(dataset, field)
+    style = style_of(dataset, field)
     overlay = OVERLAYS.get((field, str(up.name), str(across.name)))
     legend: dict[object, Line2D] = {}
     for axes, at in zip(grid.flat, np.ndindex(*(each.size for each in others)), strict=True):
         panel = dataset.isel({each.dims[0]: i for each, i in zip(others, at, strict=True)})
-        drawn = _draw(axes, panel, field, (str(up.name), str(across.name)), look)
+        drawn = _draw(axes, panel, field, (str(up.name), str(across.name)), style)
         if overlay:
             drawn += overlay(axes, panel, axes in grid[:, -1])
         legend |= {each.get_label(): each for each in drawn}
@@ -84,8 +84,8 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
         axes.set_title(", ".join(title), fontsize=10)
         axes.grid(color="0.92")
         axes.set_axisbelow(True)
-    if not look.flags:
-        colours = ScalarMappable(look.norm, look.colours)
+    if not style.flags:
+        colours = ScalarMappable(style.norm, style.colours)
         sheet.colorbar(colours, ax=grid, label=short_label(dataset[field]), shrink=0.8)
     if legend:
         sheet.legend(handles=list(legend.values()), loc="outside right center", frameon=False)
@@ -118,36 +118,36 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
 
 
 def _draw(
-    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Style
+    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], style: Style
 ) -> list[Line2D]:
     """Draw the runs of a panel; return marks to explain: of flags, and of what is absent."""
     up, across = places
     every = known_values(panel, field), panel["status"], panel[up], panel[across]
     values, status, y, x = (each.to_numpy().ravel() for each in xr.broadcast(*every))
     known = np.isfinite(values)
-    kinds = [(kind, values == value) for value, kind in look.flags.items()]
+    kinds = [(kind, values == value) for value, kind in style.flags.items()]
     kinds += absent(known, status).items()
-    if not look.flags:
-        dense = _contours(axes, panel, field, places, look)
+    if not style.flags:
+        dense = _contours(axes, panel, field, places, style)
         axes.scatter(
-            x[known], y[known], c=values[known], s=2.0 if dense else POINTS**2, cmap=look.colours,
-            norm=look.norm, edgecolor="0.3", linewidth=0.5, zorder=3.0,
+            x[known], y[known], c=values[known], s=2.0 if dense else POINTS**2, cmap=style.colours,
+            norm=style.norm, edgecolor="0.3", linewidth=0.5, zorder=3.0,
         )  # fmt: skip
     return [kind.draw(axes, x[there], y[there]) for kind, there in kinds if there.any()]
 
 
 def _contours(
-    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], look: Style
+    axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], style: Style
 ) -> bool:
     """Fill between contours where the sweep is dense, not where runs have no value; tell if so."""
     up, across = (panel[name] for name in places)
-    low, high = look.norm.vmin, look.norm.vmax
+    low, high = style.norm.vmin, style.norm.vmax
     if min(up.size, across.size) < _DENSE or low is None or high is None or low == high:
         return False
     order = {str(each.dims[0]): np.argsort(panel[each.name].to_numpy()) for each in (up, across)}
     values = known_values(panel, field).isel(order).squeeze().transpose(*order).to_numpy()
     x, y = np.sort(panel[places[1]].to_numpy()), np.sort(panel[places[0]].to_numpy())
     levels = MaxNLocator(_CONTOURS).tick_values(low, high)
-    axes.contourf(x, y, values, levels, cmap=look.colours, norm=look.norm)
+    axes.contourf(x, y, values, levels, cmap=style.colours, norm=style.norm)
     axes.contour(x, y, values, levels, colors="0.25", linewidths=0.4)
     return True
