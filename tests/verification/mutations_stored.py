@@ -468,7 +468,7 @@ MUTATIONS: dict[str, Mutation] = {
     # declared loads
     "thermal strain doubled": _file(eigenstrains_times(Temperature, 2.0), "law"),
     "initial stress dropped": _file(eigenstrains_times(InitialStress, 0.0), "law"),
-    "heat softens nothing": _file(instead(Heat, "of", lambda old: lambda part: None), "law"),
+    "heat softens nothing": _file(instead(Heat, "of", lambda old: lambda part, x: None), "law"),
     "interference halved": _fitted(
         instead(ContactPair, "offset", less_interference), "closed_gap", "overlap"
     ),
