@@ -16,13 +16,13 @@ from annotated_types import Interval, Unit
 from solver import SCENES, Body, Model, Program, Scene, Status
 from solver.loading.program import load_and_release
 from solver.mesh import grid
+from solver.parameters import Length, Ratio, described
 from solver.results.fields import maps, profiles
 from solver.results.figures import cost, extremes
 from solver.results.look import Look, Values
 from solver.results.quantities import declare
 from solver.results.view import View
 from solver.scenes.material_parameters import MaterialParameters
-from solver.scenes.parameters import Length, Ratio, described
 from studies import Store, Study, open_study, run_study
 
 

@@ -29,6 +29,7 @@ from solver.model.body import Body
 from solver.model.loads import Traction
 from solver.model.model import Model
 from solver.model.rigid import RigidBody, line
+from solver.parameters import Accuracy, Length, by_accuracy, described
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, profiles
@@ -38,7 +39,6 @@ from solver.results.record import Status
 from solver.results.view import View
 from solver.scenes.effort import Effort, lattice
 from solver.scenes.material_parameters import ContactParameters
-from solver.scenes.parameters import Accuracy, Length, by_accuracy, described
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:

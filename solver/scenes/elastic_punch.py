@@ -30,6 +30,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.loading.program import Program, load_and_release
 from solver.model.model import ContactPair, Model
+from solver.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.results.contact import contact
 from solver.results.fields import isochromatics
 from solver.results.figures import cost
@@ -51,7 +52,6 @@ from solver.scenes.flat_punch import (
     SmallestElement,
 )
 from solver.scenes.material_parameters import ElasticParameters
-from solver.scenes.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:

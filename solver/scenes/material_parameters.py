@@ -18,7 +18,7 @@ from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
 from solver.materials.tresca import TrescaMaterial
 from solver.model.model import ContactPair, effective_friction
-from solver.scenes.parameters import (
+from solver.parameters import (
     Accuracy,
     Fraction,
     Friction,

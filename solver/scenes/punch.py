@@ -25,6 +25,13 @@ from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.grids import cells
 from solver.model.model import Model
 from solver.model.singular import SingularPoint
+from solver.parameters import (
+    Accuracy,
+    Length,
+    Ratio,
+    by_accuracy,
+    described,
+)
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
 from solver.results.fields import maps, profiles, surfaces
@@ -36,13 +43,6 @@ from solver.results.view import View
 from solver.scenes.effort import Effort
 from solver.scenes.flat_punch import FlatPunch, Growth, HalfPlaneSize, PunchHeight, SmallestElement
 from solver.scenes.material_parameters import ContactParameters
-from solver.scenes.parameters import (
-    Accuracy,
-    Length,
-    Ratio,
-    by_accuracy,
-    described,
-)
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:

@@ -26,6 +26,7 @@ from solver.mesh import grid
 from solver.model.body import Body
 from solver.model.model import ContactPair, Model
 from solver.model.rigid import Pushed, RigidBody, RigidSurface
+from solver.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.results.contact import contact
 from solver.results.fields import isochromatics
 from solver.results.figures import cost
@@ -38,7 +39,6 @@ from solver.scenes.corner import corner
 from solver.scenes.effort import Effort
 from solver.scenes.flat_punch import FlatPunch, Growth, HalfPlaneSize, SmallestElement
 from solver.scenes.material_parameters import ElasticParameters
-from solver.scenes.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import MOST_COLUMNS, window_elements
+from solver.parameters import Accuracy, by_accuracy, described
 from solver.scenes.material_parameters import LINEAR
-from solver.scenes.parameters import Accuracy, by_accuracy, described
 from solver.scenes.schedule import Schedule
 from solver.scenes.sequence import OF_A_PASS, block_of
 from solver.scenes.wheel_parameters import WheelParameters

@@ -10,8 +10,8 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials.material import Material
+from solver.parameters import Friction, Length, Poisson, described
 from solver.scenes.material_parameters import ContactParameters
-from solver.scenes.parameters import Friction, Length, Poisson, described
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

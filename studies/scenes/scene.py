@@ -12,11 +12,11 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
+from solver.parameters import check, described
 from solver.results.fields import maps, stress_maps
 from solver.results.figures import cost
 from solver.results.look import Look, Values
 from solver.scenes.effort import Effort
-from solver.scenes.parameters import check, described
 from solver.scenes.scene import Scene
 from studies.errors import SceneError
 from studies.scenes import tables

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval
 from pydantic import Field
 
-from solver.scenes.parameters import Length
+from solver.parameters import Length
 from studies.scenes.table import Count, Place, SceneTable, Span
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
 from solver.mesh.grids import closer
+from solver.parameters import Friction, Length, Stress
 from solver.scenes.material_parameters import MaterialParameters
-from solver.scenes.parameters import Friction, Length, Stress
 from studies.scenes.shape_tables import ArcTable, LineTable, Shape
 from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
 

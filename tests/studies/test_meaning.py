@@ -15,7 +15,7 @@ from studies.definition.meaning import meaning
 LAW = '''"""Return mapping."""
 
 from solver.errors import ModelError, NotConverged
-from solver.scenes.parameters import described
+from solver.parameters import described
 
 STEPS = 4
 OUTPUTS = {"stress": {"long_name": "residual stress", "units": "MPa"}}

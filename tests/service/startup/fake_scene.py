@@ -15,8 +15,8 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.parameters import check
 from solver.results.record import Record, Status
-from solver.scenes.parameters import check
 from solver.scenes.scene import Scene
 
 LOG = "FAKE_SCENE_LOG"

@@ -1,0 +1,157 @@
+"""Parts that studies and scene files name by a word: hardening rules, friction laws, loads.
+
+A part is a frozen dataclass whose fields are its parameters; it says its word where it is defined.
+What studies and scene files accept, and what the documentation lists, is made of these
+declarations. Files of one's own, named in the environment variable ``RESIDUA_PARTS``, add parts
+like those of the package.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib.util
+import os
+import sys
+import typing
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from solver.errors import ModelError
+
+T = TypeVar("T")
+C = TypeVar("C", bound=type[Any])
+
+SETTING = "RESIDUA_PARTS"
+"""Environment variable that names Python files with parts of one's own, joined as in ``PATH``."""
+
+
+class Parts(Generic[T]):
+    """The parts of one kind, by the word that names them.
+
+    Parameters
+    ----------
+    kind : the parameter that names one of them, such as ``hardening``
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self._known: dict[str, type[T]] = {}
+
+    def word(self, word: str) -> Callable[[C], C]:
+        """Return the decorator that gives a class its word.
+
+        Raises
+        ------
+        ModelError
+            when another class has the word, or declares one of its parameters otherwise
+        """
+
+        def named(part: C) -> C:
+            before = self._known.get(word)
+            if before is not None and (before.__qualname__, _file(before)) != (
+                part.__qualname__,
+                _file(part),
+            ):
+                raise ModelError(self.kind, word, f"is the word of {before.__qualname__} already")
+            self._known[word] = part
+            self.parameters()  # refuses those that do not go together
+            return part
+
+        return named
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the words."""
+        return iter(self.all())
+
+    def __getitem__(self, word: str) -> type[T]:
+        """Return the class of a word or raise `ModelError`."""
+        known = self.all()
+        if word not in known:
+            raise ModelError(self.kind, word, "must be one of " + ", ".join(known))
+        return known[word]
+
+    def all(self) -> Mapping[str, type[T]]:
+        """Return word -> class, those of files of one's own too."""
+        load_own_parts()
+        return self._known
+
+    def parameters(self) -> dict[str, tuple[Any, dataclasses.Field[Any]]]:
+        """Return the parameters of all parts: name -> annotation and field.
+
+        Raises
+        ------
+        ModelError
+            when two parts declare one parameter with another type, range, default or meaning
+        """
+        found: dict[str, tuple[Any, dataclasses.Field[Any]]] = {}
+        for word, part in self._known.items():
+            for name, (hint, field) in declared(part).items():
+                hint0, field0 = found.setdefault(name, (hint, field))
+                if (hint0, field0.default, field0.metadata) != (
+                    hint,
+                    field.default,
+                    field.metadata,
+                ):
+                    allowed = f"declares its parameter {name} as no other part does"
+                    raise ModelError(self.kind, word, allowed)
+        return found
+
+    def used(self, word: str) -> frozenset[str]:
+        """Return the names of the parameters of a part."""
+        return frozenset(declared(self[word]))
+
+    def made(self, word: str, values: Any) -> T:
+        """Return the part of a word with its parameters, attributes of ``values``."""
+        part = self[word]
+        return part(**{name: getattr(values, name) for name in declared(part)})
+
+
+def declared(part: type[Any]) -> dict[str, tuple[Any, dataclasses.Field[Any]]]:
+    """Return the parameters of a part, in their order: name -> annotation and field."""
+    hints = typing.get_type_hints(part, include_extras=True)
+    return {f.name: (hints[f.name], f) for f in dataclasses.fields(part) if f.init}
+
+
+def own_files() -> tuple[Path, ...]:
+    """Return the files of one's own that ``RESIDUA_PARTS`` names."""
+    given = os.environ.get(SETTING, "")
+    return tuple(Path(each).resolve() for each in given.split(os.pathsep) if each)
+
+
+def own_digest() -> str:
+    """Return a digest of the files of one's own; empty where there are none."""
+    files = own_files()
+    if not files:
+        return ""
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
+
+
+@cache
+def load_own_parts() -> None:
+    """Run the files of one's own, once in a process.
+
+    Raises
+    ------
+    ModelError
+        naming the file that cannot be read or run
+    """
+    for path in own_files():
+        name = f"residua_parts_{path.stem}"
+        spec = importlib.util.spec_from_file_location(name, path)
+        if spec is None or spec.loader is None or not path.is_file():
+            raise ModelError(SETTING, str(path), "must name Python files")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            del sys.modules[name]
+            raise ModelError(SETTING, str(path), f"must run: {error}") from error
+
+
+def _file(part: type[Any]) -> str:
+    """Return the file of a class; a script that is run has one name, the file it loads another."""
+    return str(getattr(sys.modules.get(part.__module__), "__file__", part.__module__))
