@@ -54,7 +54,8 @@ audit = solution.audit()
 assert audit.passed, audit.violations
 
 # Under load the contact carries what pushes on the pad: 450 MPa on 10 mm, per mm of thickness.
-where, pressure, shear = solution.contact()
+acting = solution.contact()
+where, pressure, shear = acting.X, acting.pressure, acting.shear
 order = np.argsort(where[0])
 force = np.trapezoid(pressure[order], where[0, order])
 assert np.isclose(force, 450.0 * 10.0, rtol=0.01), force

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from solver import SCENES, Status
-from solver.results.look import Look, Values
 from solver.results.quantities import QUANTITIES, declare
+from solver.results.run import FinishedRun, Values
 
 PUNCH = SCENES["punch"]
 
@@ -19,10 +19,10 @@ YIELDED_DEPTH = declare(
 )
 
 
-def yielded_depth(look: Look) -> Values:
+def yielded_depth(run: FinishedRun) -> Values:
     """Return the largest depth [mm] with plastic strain at the first station, x = 0."""
-    _, strain = look.samples.profile(look.unloaded)  # over station and depth
-    yielded = look.view.depth[strain[0] > 1e-6]
+    strain = run.samples.profile("plastic_strain", run.unloaded)  # over station and depth
+    yielded = run.view.depth[strain[0] > 1e-6]
     return {YIELDED_DEPTH: float(yielded.max(initial=0.0))}
 
 

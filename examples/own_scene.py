@@ -17,10 +17,10 @@ from solver import SCENES, Body, Model, Program, Scene, Status
 from solver.loading.program import load_and_release
 from solver.mesh import grid
 from solver.parameters import Length, Ratio, described
-from solver.results.fields import maps, profiles
 from solver.results.figures import cost, extremes
-from solver.results.look import Look, Values
+from solver.results.maps import maps, profiles
 from solver.results.quantities import declare
+from solver.results.run import FinishedRun, Values
 from solver.results.view import View
 from solver.scenes.material_parameters import MaterialParameters
 from studies import Store, Study, open_study, run_study
@@ -64,7 +64,7 @@ def program(parameters: DieParameters) -> Program:
 
 
 def view(parameters: DieParameters) -> View:
-    """Return where the block is looked at: a function of its size, not of its mesh."""
+    """Return where results are taken: a function of its size, not of its mesh."""
     return View(
         x=parameters.width / 2 * (np.arange(20) + 0.5) / 20,
         y=-parameters.height * (np.arange(20) + 0.5) / 20,
@@ -80,10 +80,14 @@ def view(parameters: DieParameters) -> View:
 SIDE_PRESSURE = declare("side_pressure", "pressure that the die keeps on the sides", "MPa")
 
 
-def side_pressure(look: Look) -> Values:
+def side_pressure(run: FinishedRun) -> Values:
     """Return the mean pressure on the side that the die holds."""
-    side = look.system.full("block").boundary_nodes("right")
-    return {SIDE_PRESSURE: -float(look.samples.stress("block", look.unloaded)[0, side].mean())}
+    side = run.system.full("block").boundary_nodes("right")
+    return {
+        SIDE_PRESSURE: -float(
+            run.samples.fields.at_nodes(run.unloaded, "block").stress[0, side].mean()
+        )
+    }
 
 
 SCENES["die"] = Scene(

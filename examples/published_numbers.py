@@ -40,7 +40,7 @@ def found(runs, row, case, number):
     """Return value and depth of the feature of a row, after a pass of a case."""
     after = runs.sel({"case": case, "pass": number}).sel(station=0.0, method="nearest")
     if row.component == "plastic_strain":
-        profile = after["plastic_strain_profile"]
+        profile = after["profile_plastic_strain"]
     else:
         profile = after["residual_profile"].sel(component=row.component)
     return feature(profile, row.quantity, row.top, row.bottom)

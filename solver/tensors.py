@@ -58,7 +58,7 @@ def not_below_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.maximum(values, 0.0)
 
 
-def stress_difference(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return sigma1 - sigma2 (...) of the xy plane, of Mandel components (4, ...) [MPa]."""
-    xx, yy, _, xy = mandel
-    return np.hypot(xx - yy, SQRT2 * xy)
+def stress_difference(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sigma1 - sigma2 (...) of the xy plane, of components xx, yy, zz, xy (4, ...) [MPa]."""
+    xx, yy, _, xy = stress
+    return np.hypot(xx - yy, 2 * xy)

@@ -1,4 +1,4 @@
-"""Contact pressure, shear and gap along the surface, half-width and peak of the contact."""
+"""What acts between surfaces: along the view of a scene, and on contact pairs by name."""
 
 from __future__ import annotations
 
@@ -6,20 +6,35 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.places import FRACTION
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
-    from solver.results.look import Look, Values
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.results.contact_result import ContactResult
+    from solver.results.run import FinishedRun, Values
 
 _LINE = ("stage", "s")
+_PAIR, _PAIRS = ("contact", "fraction"), ("contact", "stage", "fraction")
 CONTACT_PRESSURE = declare("contact_pressure", "contact pressure", "MPa", dims=_LINE)
 CONTACT_SHEAR = declare(
-    "contact_shear", "contact shear traction on the lower body along x", "MPa", dims=_LINE
+    "contact_shear", "contact shear on the lower body, or the master, along s", "MPa", dims=_LINE
 )
-CONTACT_GAP = declare(
-    "contact_gap", "gap between the contact surfaces under load", "mm", dims=_LINE
+CONTACT_GAP = declare("contact_gap", "gap between the contact surfaces", "mm", dims=_LINE)
+CONTACT_SLIP = declare("contact_slip", "slip of the slave along s", "mm", dims=_PAIRS)
+CONTACT_PRESSURE_DEFORMED = declare(
+    "contact_pressure_deformed", "contact pressure over the deformed area", "MPa", dims=_PAIRS
 )
-CONTACT_HALF_WIDTH = declare("contact_half_width", "half-width of the contact under load", "mm")
+CONTACT = declare("contact", "contact pair", "", dims=("contact",))
+CONTACT_X = declare("contact_x", "position along x of a point of the slave", "mm", dims=_PAIR)
+CONTACT_Y = declare("contact_y", "position along y of a point of the slave", "mm", dims=_PAIR)
+CONTACT_S = declare("contact_s", "distance s along the slave from its start", "mm", dims=_PAIR)
+CONTACT_HALF_WIDTH = declare(
+    "contact_half_width", "half-width, or radius, of the contact under load", "mm"
+)
 PEAK_CONTACT_PRESSURE = declare(
     "peak_contact_pressure", "largest contact pressure under load", "MPa"
 )
@@ -30,15 +45,50 @@ PEAK_CONTACT_PRESSURE_S = declare(
 )  # fmt: skip
 
 
-def contact(look: Look) -> Values:
+def contact(run: FinishedRun) -> Values:
     """Return pressure, shear and gap along the surface, half-width, and peak with its place."""
-    along = [look.touch.along(c, look.view.s + centre) for c, centre in look.stages]
-    width, peak = look.touch.extent(look.loaded)
-    loaded = along[look.view.stages.index(look.view.loaded)][0]
+    along = [run.tractions.along(c, run.view.s + centre) for c, centre in run.stages]
+    width, peak = run.tractions.extent(run.loaded)
+    loaded = along[run.view.stages.index(run.view.loaded)][0]
     lines = (CONTACT_PRESSURE, CONTACT_SHEAR, CONTACT_GAP)
     return {
         **{line: np.stack([values[k] for values in along]) for k, line in enumerate(lines)},
         CONTACT_HALF_WIDTH: width,
         PEAK_CONTACT_PRESSURE: peak,
-        PEAK_CONTACT_PRESSURE_S: float(look.view.s[np.nan_to_num(loaded).argmax()]),
+        PEAK_CONTACT_PRESSURE_S: float(run.view.s[np.nan_to_num(loaded).argmax()]),
+    }
+
+
+def contacts(
+    results: Sequence[Sequence[ContactResult]], names: Sequence[str], samples: int
+) -> Values:
+    """Return what acts on the slaves of contact pairs, at equal fractions of their lengths.
+
+    Parameters
+    ----------
+    results : of each pair, that at each stage
+    samples : positions along each slave
+    """
+    fraction = np.linspace(0.0, 1.0, samples)
+    at = [fraction * pair[0].s[-1] for pair in results]
+
+    def spread(name: str) -> NDArray[np.float64]:
+        return np.stack([
+            np.stack([np.interp(s, each.s, getattr(each, name)) for each in pair])
+            for s, pair in zip(at, results, strict=True)
+        ])  # fmt: skip
+
+    places = zip(at, results, strict=True)
+    X = [[np.interp(s, pair[0].s, x) for x in pair[0].X] for s, pair in places]
+    return {
+        CONTACT: np.array(list(names)),
+        FRACTION: fraction,
+        CONTACT_X: np.stack([x for x, _ in X]),
+        CONTACT_Y: np.stack([y for _, y in X]),
+        CONTACT_S: np.stack(at),
+        CONTACT_PRESSURE.at(*_PAIRS): spread("pressure"),
+        CONTACT_SHEAR.at(*_PAIRS): spread("shear"),
+        CONTACT_GAP.at(*_PAIRS): spread("gap"),
+        CONTACT_SLIP: spread("slip"),
+        CONTACT_PRESSURE_DEFORMED: spread("pressure_deformed"),
     }

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.quantities import Quantity, declare
-from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.results.look import Look, Values
+    from solver.results.run import FinishedRun, Values
 
     Array = NDArray[np.float64]
 
@@ -64,20 +63,20 @@ SMALLEST = (
 """In the body, with x and y; at its contact surface, with s."""
 
 
-def residual_extremes(look: Look) -> Values:
+def residual_extremes(run: FinishedRun) -> Values:
     """Return the extreme residual stresses at the nodes of each body and of its contact surface.
 
     Of nodes with the same stress, as on a track that a pass leaves alike along x, the one nearest
     to the middle of the contact is told; where there is no stress, none.
     """
-    none = _ROUNDING * look.parameters.yield_stress
+    none = _ROUNDING * run.parameters.yield_stress
     found: dict[Quantity, list[Array]] = {each: [] for each in LARGEST + SMALLEST}
-    for name, boundary in look.view.surfaces.items():
-        body = look.system.full(name)
-        stress = to_tensor(look.samples.stress(name, look.unloaded))
-        away = np.abs(look.view.axis.reached(body.X))
+    for name, boundary in run.view.surfaces.items():
+        body = run.system.full(name)
+        stress = run.samples.fields.at_nodes(run.unloaded, name).stress
+        away = np.abs(run.view.axis.reached(body.X))
         surface = body.boundary_nodes(boundary)
-        s = look.view.axis.reached(body.X[:, surface])
+        s = run.view.axis.reached(body.X[:, surface])
         for quantities, sign in ((LARGEST, 1.0), (SMALLEST, -1.0)):
             inside, at = _most(sign * stress, none, body.X, away)
             along, where = _most(sign * stress[:, surface], none, s[None], away[surface])

@@ -1,100 +1,145 @@
-"""Maps, profiles and lines of stress and plastic strain."""
+"""Fields of bodies at their nodes, at integration points and at places, each computed once."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from solver.results.quantities import declare
-from solver.tensors import not_below_zero, stress_difference, to_tensor, von_mises
+from solver.fem.fields import Sampler
+from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
-    from solver.results.look import Look, Values
+    from numpy.typing import NDArray
+    from scipy.sparse import csr_array
 
-_MAP = ("y", "x")
+    from solver.contact.state import State
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.wheel import Hub
+    from solver.materials.state import Response
+    from solver.results.view import Places
 
-RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("component", *_MAP))
-RESIDUAL_MISES = declare(
-    "residual_mises", "von Mises stress of the residual stress", "MPa", dims=_MAP
-)
-PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain after unloading", dims=_MAP)
-MISES_LOADED = declare("mises_loaded", "von Mises stress under load", "MPa", dims=_MAP)
-STRESS_DIFFERENCE = declare(
-    "stress_difference",
-    "difference of the principal stresses in the plane under load", "MPa", dims=_MAP,
-)  # fmt: skip
-RESIDUAL_PROFILE = declare(
-    "residual_profile", "residual stress along depth", "MPa",
-    dims=("station", "component", "depth"),
-)  # fmt: skip
-PLASTIC_STRAIN_PROFILE = declare(
-    "plastic_strain_profile",
-    "equivalent plastic strain along depth after unloading",
-    dims=("station", "depth"),
-)
-MAP_STRESS = declare("map_stress", "stress", "MPa", dims=("stage", "component", *_MAP))
-MAP_MISES = declare("map_mises", "von Mises stress", "MPa", dims=("stage", *_MAP))
-MAP_PLASTIC_STRAIN = declare(
-    "map_plastic_strain", "equivalent plastic strain", dims=("stage", *_MAP)
-)
-SURFACE_RESIDUAL = declare(
-    "surface_residual", "residual stress at the contact surface", "MPa",
-    dims=("body", "component", "s"),
-)  # fmt: skip
-SURFACE_MISES = declare(
-    "surface_mises", "von Mises stress at the surface of the lower body", "MPa",
-    dims=("stage", "s"),
-)  # fmt: skip
+    Array = NDArray[np.float64]
+
+_MOST = 16
+"""Results of the last states that are kept."""
+T = TypeVar("T")
 
 
-def maps(look: Look) -> Values:
-    """Return maps around the contact: residual stress, plastic strain, stress under load."""
-    samples = look.samples
-    residual = samples.on_map(lambda body: samples.stress(body, look.unloaded))
-    under_load = samples.on_map(lambda body: samples.stress(body, look.loaded))
-    strain = not_below_zero(
-        samples.on_map(lambda body: samples.plastic_strain(body, look.unloaded))
-    )
-    return {
-        RESIDUAL_STRESS: to_tensor(residual),
-        RESIDUAL_MISES: von_mises(residual),
-        PLASTIC_STRAIN: strain,
-        MISES_LOADED: von_mises(under_load),
-    }
+class Solved(Protocol):
+    """A state that was found."""
+
+    @property
+    def state(self) -> State:
+        """Its unknowns."""
 
 
-def stress_maps(look: Look) -> Values:
-    """Return maps of stress and plastic strain in all stages, of bodies that are not released."""
-    samples = look.samples
-    states = [state for state, _ in look.stages]
-    stress = [samples.on_map(partial(samples.stress, converged=at)) for at in states]
-    strain = [samples.on_map(partial(samples.plastic_strain, converged=at)) for at in states]
-    return {
-        MAP_STRESS: np.stack([to_tensor(each) for each in stress]),
-        MAP_MISES: np.stack([von_mises(each) for each in stress]),
-        MAP_PLASTIC_STRAIN: not_below_zero(np.stack(strain)),
-    }
+class Bodies(Protocol):
+    """Bodies of which states were found, each body a whole mesh: a `System`, for one."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the bodies."""
+
+    @property
+    def n_unknowns(self) -> int:
+        """Displacement unknowns of all bodies."""
+
+    def full(self, name: str) -> Discretisation:
+        """Return a body."""
+
+    def positions(self, name: str) -> Array:
+        """Return where the points of a body are (2, n_points) [mm]."""
+
+    def recovery(self, name: str) -> csr_array:
+        """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
+
+    def response(self, name: str, converged: Any) -> Response:
+        """Return stress and internal variables at the points of a body."""
+
+    def displacement(self, name: str, state: State) -> Array:
+        """Return the displacements (n,) of a body [mm]."""
+
+    def axle(self, converged: Any) -> Hub | None:
+        """Return the motion of the first wheel, where there is one."""
 
 
-def isochromatics(look: Look) -> Values:
-    """Return the map whose contours are isochromatics: twice the largest shear in the plane."""
-    samples = look.samples
-    stress = samples.on_map(lambda body: samples.stress(body, look.loaded))
-    return {STRESS_DIFFERENCE: stress_difference(stress)}
+class BodyValues(NamedTuple):
+    """Fields of a body at n of its nodes, or at n places.
+
+    Attributes
+    ----------
+    displacement : (2, n) [mm]
+    stress : (4, n) recovered, components xx, yy, zz, xy [MPa]
+    mises : (n,) von Mises stress, recovered from the integration points and not above the largest
+        of them: that of recovered stress would go beyond the strength [MPa]
+    plastic_strain : (n,) equivalent plastic strain, recovered
+    """
+
+    displacement: Array
+    stress: Array
+    mises: Array
+    plastic_strain: Array
 
 
-def profiles(look: Look) -> Values:
-    """Return residual stress and plastic strain along depth."""
-    stress, strain = look.samples.profile(look.unloaded)
-    return {RESIDUAL_PROFILE: stress, PLASTIC_STRAIN_PROFILE: strain}
+_POSITIVE = ("mises", "plastic_strain")
 
 
-def surfaces(look: Look) -> Values:
-    """Return residual stress along the contact surfaces, and von Mises stress of the lower one."""
-    samples, bodies = look.samples, look.view.surfaces
-    return {
-        SURFACE_RESIDUAL: np.stack([samples.on_surface(body, look.unloaded) for body in bodies]),
-        SURFACE_MISES: np.stack([samples.surface_mises(c, x) for c, x in look.stages]),
-    }
+class SystemFields:
+    """Fields of a system's bodies; those of the last states are kept."""
+
+    def __init__(self, system: Bodies) -> None:
+        self.system = system
+        self.recovery = cache(system.recovery)
+        self.at_nodes = kept(self._at_nodes)
+
+    def recovered(self, body: str, points: Array) -> Array:
+        """Return nodal values (..., n_nodes) of point values (..., n_points)."""
+        return np.asarray((self.recovery(body) @ points.T).T)
+
+    def _at_nodes(self, at: Solved, body: str) -> BodyValues:
+        """Return the fields at the nodes of a body."""
+        response = self.system.response(body, at)
+        mises = von_mises(response.stress)
+        return BodyValues(
+            displacement=self.system.displacement(body, at.state).reshape(-1, 2).T,
+            stress=to_tensor(self.recovered(body, response.stress)),
+            mises=np.clip(self.recovered(body, mises), 0.0, mises.max()),
+            plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
+        )
+
+    def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:
+        """Return positions (2, n), von Mises stress and plastic strain at integration points."""
+        found = self.system.response(body, at)
+        return self.system.positions(body), von_mises(found.stress), found.state.accumulated
+
+    def at_places(self, places: Places, states: Sequence[Solved]) -> list[BodyValues]:
+        """Return the fields at places of a body in each state; NaN outside of it."""
+        sampler = Sampler(self.system.full(places.body), places.X)
+        return [
+            BodyValues(*(interpolated(sampler, values, name) for name in BodyValues._fields))
+            for values in (self.at_nodes(at, places.body) for at in states)
+        ]
+
+
+def interpolated(sampler: Sampler, values: BodyValues, name: str) -> Array:
+    """Return a field (..., n) of a body between its nodes, not below zero where it cannot be."""
+    found = sampler(getattr(values, name))
+    return not_below_zero(found) if name in _POSITIVE else found
+
+
+def kept(of: Callable[..., T]) -> Callable[..., T]:
+    """Return a function of a state, and of words, that keeps its values of the last states."""
+    known: dict[tuple[Any, ...], tuple[Any, T]] = {}
+
+    def found(at: Any, *rest: Any) -> T:
+        key = (id(at), *rest)
+        if key not in known:
+            while len(known) >= _MOST:
+                del known[next(iter(known))]
+            known[key] = at, of(at, *rest)  # a state that is kept keeps its identity
+        return known[key][1]
+
+    return found

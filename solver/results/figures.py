@@ -9,7 +9,7 @@ import numpy as np
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
-    from solver.results.look import Look, Values
+    from solver.results.run import FinishedRun, Values
 
 MAX_PLASTIC_STRAIN = declare(
     "max_plastic_strain", "largest equivalent plastic strain after unloading"
@@ -38,26 +38,26 @@ CPU_SECONDS = declare("cpu_seconds", "processor time", "s")
 DEGREES_OF_FREEDOM = declare("degrees_of_freedom", "degrees of freedom", count=True)
 
 
-def extremes(look: Look) -> Values:
+def extremes(run: FinishedRun) -> Values:
     """Return the largest plastic strain, the extreme residual stresses, and the plastic work."""
-    system = look.system
+    system = run.system
     names = system.names
-    strains = {n: system.response(n, look.unloaded).state.accumulated for n in names}
+    strains = {n: system.response(n, run.unloaded).state.accumulated for n in names}
     most = max(names, key=lambda name: strains[name].max())
     where = system.positions(most)[1, strains[most].argmax()]
-    residual = [look.samples.stress(name, look.unloaded)[:3] for name in names]
+    residual = [run.samples.fields.at_nodes(run.unloaded, name).stress[:3] for name in names]
     return {
         MAX_PLASTIC_STRAIN: float(strains[most].max()),
         DEPTH_OF_MAX_PLASTIC_STRAIN: float(-where) if strains[most].max() > 0 else np.nan,
         PEAK_RESIDUAL_TENSION: float(max(r.max() for r in residual)),
         PEAK_RESIDUAL_COMPRESSION: float(min(r.min() for r in residual)),
-        PLASTIC_WORK: look.outcome.tally.plastic_work,
+        PLASTIC_WORK: run.outcome.tally.plastic_work,
     }
 
 
-def cost(look: Look) -> Values:
+def cost(run: FinishedRun) -> Values:
     """Return the cost of the run."""
-    tally = look.outcome.tally
+    tally = run.outcome.tally
     return {
         INCREMENTS: len(tally.iterations),
         CUT_INCREMENTS: tally.cuts,
@@ -66,5 +66,5 @@ def cost(look: Look) -> Values:
         INNER_FALLBACKS: tally.pivoted,
         BLENDED_TANGENTS: tally.blended,
         CPU_SECONDS: tally.seconds,
-        DEGREES_OF_FREEDOM: float(look.system.n_unknowns),
+        DEGREES_OF_FREEDOM: float(run.system.n_unknowns),
     }

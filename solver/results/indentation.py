@@ -1,4 +1,4 @@
-"""What a ball does: force, approach, contact radius, and the crater that it leaves."""
+"""What a ball does: force, approach, and the crater that it leaves."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from solver.results.contact_result import contact_patches
+from solver.results.increments import INCREMENT
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.results.look import Look, Values
-    from solver.results.samples import Bodies, Samples, Solved
+    from solver.results.fields import Bodies, Solved
+    from solver.results.run import FinishedRun, Values
+    from solver.results.samples import Samples
 
     Array = NDArray[np.float64]
 
 FORCE = declare("force", "force on the ball under load", "N")
 APPROACH = declare("approach", "displacement of the ball's centre under load", "mm")
-CONTACT_RADIUS = declare("contact_radius", "radius of the contact under load", "mm")
 MEAN_CONTACT_PRESSURE = declare(
     "mean_contact_pressure", "force / area of the contact under load", "MPa"
 )
@@ -31,10 +33,6 @@ SURFACE_DISPLACEMENT = declare(
     "surface_displacement",
     "vertical displacement of the surface of the body that yields, from the centre of a ball", "mm",
     dims=("stage", "s"),
-)  # fmt: skip
-INCREMENT = declare(
-    "increment", "number of the increment; 0 is the state before loading", dims=("increment",),
-    count=True,
 )  # fmt: skip
 _EACH = ("increment",)
 INCREMENT_FORCE = declare("increment_force", "force after each increment", "N", dims=_EACH)
@@ -56,10 +54,16 @@ class Followed(NamedTuple):
 
 def follow(samples: Samples, converged: Any) -> Followed:
     """Return what is kept of an increment."""
-    system = samples.system
+    system: Any = samples.system
     contact = converged.state.contacts[0]
     force = float(contact.normal.sum())
-    return Followed(force, _approach(system, converged), _radius(system, converged))
+    interface = system.interfaces[0]
+    chain = interface.slave_surface
+    x = chain.X[0, chain.vertices]
+    order = np.argsort(x)
+    gap = interface.pairing(converged.state.u, finite=contact.finite).gap
+    patches = contact_patches(x[order], gap[order], contact.normal[order] > 0)
+    return Followed(force, _approach(system, converged), patches[-1][1] if patches else 0.0)
 
 
 def _approach(system: Bodies, converged: Solved) -> float:
@@ -80,64 +84,38 @@ def _ball_radius(X: Array) -> float:
     return float((X[:, far] ** 2).sum() / (2 * abs(X[1, far])))
 
 
-def _radius(system: Any, converged: Any) -> float:
-    """Return the radius of the contact [mm], 0 without contact.
-
-    Beyond the edge of a contact the gap opens as the distance to the power 3/2. Its power 2/3 at
-    the two points next to the edge lies on a line that ends there.
-    """
-    interface, state = system.interfaces[0], converged.state
-    chain = interface.slave_surface
-    x = chain.X[0, chain.vertices]
-    order = np.argsort(x)
-    x, closed = x[order], np.flatnonzero(state.contacts[0].normal[order] > 0)
-    if not len(closed):
-        return 0.0
-    last = int(closed[-1])
-    # the hat of the first open vertex reaches into the contact
-    here = slice(last + 2, last + 4)
-    gap = interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap[order][here]
-    if len(gap) < 2 or not (np.isfinite(gap).all() and 0 < gap[0] < gap[1]):
-        return float(x[last])
-    near, far = gap ** (2 / 3)
-    edge = x[here][0] - near * np.diff(x[here])[0] / (far - near)
-    return float(np.clip(edge, x[max(last - 1, 0)], x[last + 1]))
-
-
-def indentation(look: Look) -> Values:
-    """Return force, approach, contact radius and mean pressure under load."""
-    force, approach, radius = follow(look.samples, look.loaded)
+def indentation(run: FinishedRun) -> Values:
+    """Return force, approach and mean pressure under load."""
+    force, approach, radius = follow(run.samples, run.loaded)
     mean = force / (np.pi * radius**2) if radius else np.nan
-    return {
-        FORCE: force, APPROACH: approach, CONTACT_RADIUS: radius, MEAN_CONTACT_PRESSURE: mean
-    }  # fmt: skip
+    return {FORCE: force, APPROACH: approach, MEAN_CONTACT_PRESSURE: mean}
 
 
-def crater(look: Look) -> Values:
+def crater(run: FinishedRun) -> Values:
     """Return how the surface of the body that yields has moved, and what is left of it."""
-    s, name = look.view.s, look.view.profile_body
-    body = look.system.full(name)
-    nodes = body.boundary_nodes(look.view.surfaces[name])
+    s, name = run.view.s, run.view.profile_body
+    body = run.system.full(name)
+    nodes = body.boundary_nodes(run.view.surfaces[name])
     nodes = nodes[np.argsort(body.X[0, nodes])]
 
     def moved(converged: Solved) -> Array:
-        u = look.system.displacement(name, converged.state)[2 * nodes + 1]
-        centre = _approach(look.system, converged) if name == "ball" else 0.0
+        u = run.system.displacement(name, converged.state)[2 * nodes + 1]
+        centre = _approach(run.system, converged) if name == "ball" else 0.0
         return np.asarray(np.interp(s, body.X[0, nodes], u) - centre)
 
-    left = moved(look.unloaded)
+    left = moved(run.unloaded)
     highest = int(left.argmax())
     return {
-        SURFACE_DISPLACEMENT: np.stack([moved(look.loaded), left]),
+        SURFACE_DISPLACEMENT: np.stack([moved(run.loaded), left]),
         CRATER_DEPTH: -float(left[0]),
         PILE_UP: float(left[highest]),
         PILE_UP_RADIUS: float(s[highest]) if left[highest] > 0 else np.nan,
     }
 
 
-def history(look: Look) -> Values:
+def history(run: FinishedRun) -> Values:
     """Return force, approach and contact radius of every increment."""
-    force, approach, radius = np.array(look.outcome.history).T
+    force, approach, radius = np.array(run.outcome.history).T
     return {
         INCREMENT: np.arange(len(force)),
         INCREMENT_FORCE: force,

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.results.samples import Bodies, Solved
+    from solver.results.fields import Bodies, Solved
 
     Array = NDArray[np.float64]
     Nodes = NDArray[np.int64]
@@ -40,7 +40,7 @@ class MeshFields:
     bodies : body -> its element, the nodes of its cells (n_cells, k) counterclockwise: corners,
         mid-sides, middle
     stages : stage -> displacement (2, n_nodes), stress (4, n_nodes) with components xx, yy, zz,
-        xy, von_mises (n_nodes,) and plastic_strain (n_nodes,)
+        xy, mises (n_nodes,) and plastic_strain (n_nodes,)
     """
 
     X: Array
@@ -70,7 +70,9 @@ def mesh_fields(system: Bodies, states: Mapping[str, Solved]) -> MeshFields:
     ----------
     states : the state at each stage
     """
-    from solver.results.nodal import nodal_fields  # only who computes needs scipy
+    from solver.results.fields import SystemFields  # only who computes needs scipy
+
+    fields = SystemFields(system)
 
     wholes = {name: system.full(name) for name in system.names}
     bodies, first = {}, 0
@@ -80,7 +82,7 @@ def mesh_fields(system: Bodies, states: Mapping[str, Solved]) -> MeshFields:
         first += whole.X.shape[1]
     stages = {}
     for stage, at in states.items():
-        each = [nodal_fields(system, name, at) for name in wholes]
+        each = [fields.at_nodes(at, name)._asdict() for name in wholes]
         stages[stage] = {name: np.concatenate([f[name] for f in each], axis=-1) for name in each[0]}
     X = np.hstack([whole.X for whole in wholes.values()])
     return MeshFields(X=X, bodies=bodies, stages=stages)

@@ -64,6 +64,10 @@ class Quantity:
         """Return the quantity with one more dimension, before its own."""
         return replace(self, dims=(dimension, *self.dims))
 
+    def at(self, *dims: str) -> Quantity:
+        """Return the same quantity at places that have other dimensions."""
+        return replace(self, dims=dims)
+
 
 QUANTITIES: dict[str, Quantity] = {}
 

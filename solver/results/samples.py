@@ -1,92 +1,25 @@
-"""Fields of a system, sampled at the positions of a view."""
+"""Fields of bodies, sampled at the positions of a view."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.fields import Sampler
-from solver.tensors import not_below_zero, to_tensor, von_mises
+from solver.results.fields import Bodies, Solved, SystemFields, interpolated
+from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from numpy.typing import NDArray
-    from scipy.sparse import csr_array
 
-    from solver.contact.state import State
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.wheel import Hub
-    from solver.materials.state import Response
     from solver.results.view import View
 
     Array = NDArray[np.float64]
 
 
-class Solved(Protocol):
-    """A state that was found."""
-
-    @property
-    def state(self) -> State:
-        """Its unknowns."""
-
-
-class Bodies(Protocol):
-    """Bodies of which states were found, each body a whole mesh: a `System`, for one."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Names of the bodies."""
-
-    @property
-    def n_unknowns(self) -> int:
-        """Displacement unknowns of all bodies."""
-
-    def full(self, name: str) -> Discretisation:
-        """Return a body."""
-
-    def positions(self, name: str) -> Array:
-        """Return where the points of a body are (2, n_points) [mm]."""
-
-    def recovery(self, name: str) -> csr_array:
-        """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
-
-    def response(self, name: str, converged: Any) -> Response:
-        """Return stress and internal variables at the points of a body."""
-
-    def displacement(self, name: str, state: State) -> Array:
-        """Return the displacements (n,) of a body [mm]."""
-
-    def axle(self, converged: Any) -> Hub | None:
-        """Return the motion of the first wheel, where there is one."""
-
-
-class Nodal:
-    """Fields at the nodes of bodies; the recovery operators are built once."""
-
-    def __init__(self, system: Bodies) -> None:
-        self.system = system
-        self._recovery: dict[str, csr_array] = {}
-
-    def of_points(self, body: str, points: Array) -> Array:
-        """Return recovered nodal values (..., n_nodes) of point values (..., n_points)."""
-        if body not in self._recovery:
-            self._recovery[body] = self.system.recovery(body)
-        return np.asarray((self._recovery[body] @ points.T).T)
-
-    def stress(self, body: str, converged: Solved) -> Array:
-        """Return recovered nodal stress (4, n_nodes), Mandel [MPa]."""
-        return self.of_points(body, self.system.response(body, converged).stress)
-
-    def plastic_strain(self, body: str, converged: Solved) -> Array:
-        """Return recovered equivalent plastic strain (n_nodes,), not below zero."""
-        strain = self.system.response(body, converged).state.accumulated
-        return not_below_zero(self.of_points(body, strain))
-
-
-class Samples(Nodal):
+class Samples:
     """Samples one system; the interpolation is set up once for all its runs.
 
     Raises
@@ -96,8 +29,8 @@ class Samples(Nodal):
     """
 
     def __init__(self, system: Bodies, view: View) -> None:
-        super().__init__(system)
-        self.view = view
+        self.system, self.view = system, view
+        self.fields = SystemFields(system)
         X, Y = np.meshgrid(view.x, view.y)
         S, D = np.meshgrid(view.station, view.depth, indexing="ij")
         grid, lines = view.axis.place(X.ravel(), -Y.ravel()), view.axis.place(S.ravel(), D.ravel())
@@ -111,54 +44,44 @@ class Samples(Nodal):
         self._lines = Sampler(system.full(view.profile_body), lines)
         self._surface = {name: Sampler(whole, surface) for name, whole in wholes.items()}
 
-    def on_map(self, values: Callable[[str], Array]) -> Array:
-        """Return nodal fields of the bodies (..., n_nodes) on the map (..., y, x)."""
+    def on_map(self, name: str, at: Solved) -> Array:
+        """Return a field of the bodies on the map (..., y, x); see `BodyValues` for its name."""
         out: Array | None = None
         for body, sampler in self._map.items():
-            here = sampler(values(body))
+            here = interpolated(sampler, self.fields.at_nodes(at, body), name)
             out = here if out is None else np.where(np.isnan(out), here, out)
         assert out is not None
         return out.reshape(*out.shape[:-1], len(self.view.y), len(self.view.x))
 
-    def on_surface(self, body: str, converged: Solved) -> Array:
-        """Return surface stress (4, n_s) of a body, tensor components [MPa]."""
-        return to_tensor(self._surface[body](self.stress(body, converged)))
+    def on_surface(self, name: str, body: str, at: Solved) -> Array:
+        """Return a field of a body along its surface (..., s)."""
+        return interpolated(self._surface[body], self.fields.at_nodes(at, body), name)
 
     def along_depth(self, nodal: Array) -> Array:
         """Return nodal fields of the profile body along depth (..., station, depth)."""
-        values = self._lines(nodal)
+        return self._over_depth(self._lines(nodal))
+
+    def profile(self, name: str, at: Solved) -> Array:
+        """Return a field of the profile body along depth (..., station, depth)."""
+        values = self.fields.at_nodes(at, self.view.profile_body)
+        return self._over_depth(interpolated(self._lines, values, name))
+
+    def _over_depth(self, values: Array) -> Array:
         return values.reshape(*values.shape[:-1], len(self.view.station), len(self.view.depth))
 
-    def profile(self, converged: Solved) -> tuple[Array, Array]:
-        """Return stress (station, 4, depth) [MPa] and plastic strain (station, depth)."""
+    def flow(self, at: Solved) -> Array:
+        """Return signed plastic strain (4, station, depth), tensor components."""
         body = self.view.profile_body
-        stress = self.along_depth(self.stress(body, converged))
-        strain = not_below_zero(self.along_depth(self.plastic_strain(body, converged)))
-        return to_tensor(stress).swapaxes(0, 1), strain
+        points = self.system.response(body, at).state.plastic_strain
+        return to_tensor(self.along_depth(self.fields.recovered(body, points)))
 
-    def flow(self, converged: Solved) -> Array:
-        """Return signed plastic strain (station, 4, depth), tensor components."""
-        body = self.view.profile_body
-        points = self.system.response(body, converged).state.plastic_strain
-        return to_tensor(self.along_depth(self.of_points(body, points))).swapaxes(0, 1)
-
-    def displacement(self, converged: Solved) -> Array:
-        """Return the displacement (2, station) of the surface [mm]."""
-        u = self.system.displacement(self.view.profile_body, converged.state).reshape(-1, 2).T
-        return np.asarray(self.along_depth(u)[:, :, 0])
-
-    def surface_mises(self, converged: Solved, centre: float) -> Array:
-        """Return von Mises stress along s at the surface of the profile body [MPa].
-
-        Von Mises stress is recovered from the points; that of recovered stress would go far
-        beyond the strength.
-        """
+    def surface_mises(self, at: Solved, centre: float) -> Array:
+        """Return von Mises stress along s at the surface of the profile body [MPa]."""
         name = self.view.profile_body
         body = self.system.full(name)
         nodes = body.boundary_nodes(self.view.surfaces[name])
         nodes = nodes[np.argsort(self.view.axis.reached(body.X[:, nodes]))]
-        points = von_mises(self.system.response(name, converged).stress)
-        stress = np.clip(self.of_points(name, points)[nodes], 0.0, points.max())
+        stress = self.fields.at_nodes(at, name).mises[nodes]
         x = self.view.axis.reached(body.X[:, nodes]) - centre
         beyond = {"left": np.nan, "right": np.nan}
         way = {"period": body.period} if body.period else beyond

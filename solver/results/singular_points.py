@@ -9,7 +9,7 @@ import numpy as np
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
-    from solver.results.look import Look, Values
+    from solver.results.run import FinishedRun, Values
 
 _EACH = ("singular",)
 SINGULAR = declare("singular", "number of the singular point", "", dims=_EACH)
@@ -22,15 +22,15 @@ SINGULAR_S = declare(
 SINGULAR_RADIUS = declare("singular_radius", "how far the singular point reaches", "mm", dims=_EACH)
 
 
-def singular_points(look: Look) -> Values:
+def singular_points(run: FinishedRun) -> Values:
     """Return places and radii of the singular points; nothing where there is none."""
-    if not look.singular:
+    if not run.singular:
         return {}
-    X = np.array([point.at for point in look.singular]).T
+    X = np.array([point.at for point in run.singular]).T
     return {
-        SINGULAR: np.arange(len(look.singular)),
+        SINGULAR: np.arange(len(run.singular)),
         SINGULAR_X: X[0],
         SINGULAR_Y: X[1],
-        SINGULAR_S: look.view.axis.reached(X),
-        SINGULAR_RADIUS: np.array([point.radius for point in look.singular]),
+        SINGULAR_S: run.view.axis.reached(X),
+        SINGULAR_RADIUS: np.array([point.radius for point in run.singular]),
     }

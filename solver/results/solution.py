@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.pressure import contact_pressure
 from solver.contact.system import System
 from solver.errors import ModelError
 from solver.loading.control import Control, PathControl
@@ -22,11 +21,11 @@ from solver.model.loads import InitialStress
 from solver.results import saved
 from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
+from solver.results.contact_result import ContactResult, contact_result
+from solver.results.fields import SystemFields
 from solver.results.history import Observed, observe
 from solver.results.mesh_fields import MeshFields, mesh_fields
-from solver.results.places import Places, SystemFields
-from solver.results.samples import Nodal
-from solver.results.slave import Slave, on_slave
+from solver.results.view import Places
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
@@ -59,6 +58,10 @@ class Solution:
     stages: Mapping[str, Converged]
     tally: Tally
     history: tuple[Observed, ...] = ()
+    _fields: SystemFields = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_fields", SystemFields(self.system))
 
     @property
     def loaded(self) -> Converged:
@@ -88,7 +91,7 @@ class Solution:
 
         Unloaded, this is the residual stress.
         """
-        return to_tensor(Nodal(self.system).stress(body, self._at(stage)))
+        return self._fields.at_nodes(self._at(stage), body).stress
 
     def initial_stress(self, body: str) -> tuple[NDArray[np.float64], ...]:
         """Return positions (2, n) [mm], initial stress as given and in equilibrium (4, n) [MPa].
@@ -107,7 +110,7 @@ class Solution:
 
     def plastic_strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
-        return Nodal(self.system).plastic_strain(body, self._at(stage))
+        return self._fields.at_nodes(self._at(stage), body).plastic_strain
 
     def at(
         self, body: str, places: ArrayLike, stage: str = "unloaded"
@@ -115,37 +118,24 @@ class Solution:
         """Return fields at places (2, n) of a body [mm], NaN outside of it.
 
         They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa], components xx, yy, zz, xy,
-        ``von_mises`` (n,) [MPa] and ``plastic_strain`` (n,).
+        ``mises`` (n,) [MPa] and ``plastic_strain`` (n,).
         """
         X = np.asarray(places, dtype=float)
         if X.ndim != 2 or len(X) != 2:
             raise ModelError("places", X.shape, "must be positions (2, n) [mm]")
         if body not in self.system.names:
             raise ModelError("body", body, f"must be one of {', '.join(self.system.names)}")
-        self._at(stage)
-        return SystemFields(self.system, self.stages).at(Places(body, X), stage)
+        (found,) = self._fields.at_places(Places(body, X), [self._at(stage)])
+        return found._asdict()
 
-    def surface(self, pair: int = 0, stage: str = "loaded") -> Slave:
-        """Return what acts on the slave of a pair: pressure, shear, gap and slip at its vertices.
+    def contact(self, pair: int = 0, stage: str = "loaded") -> ContactResult:
+        """Return what acts at the vertices of the slave of a pair.
 
-        ``s`` is the distance from its start, ``X`` the position before loading, ``length`` the
-        length of contact.
+        Its attributes are ``s``, ``X``, ``pressure``, ``shear``, ``pressure_deformed``, ``gap``,
+        ``slip``, ``closed`` and ``sticking``, see `ContactResult`; ``length`` is the length of
+        contact.
         """
-        return on_slave(self.system, self._at(stage), pair)
-
-    def contact(
-        self, pair: int = 0, stage: str = "loaded", *, deformed: bool = False
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return positions (2, n) [mm], pressure (n,) and shear (n,) [MPa] on the slave.
-
-        Positions and area are those before loading, to which the stress of the body refers. With
-        ``deformed`` the force is over the deformed area, which both surfaces share; under small
-        sliding that is the same.
-        """
-        chain = self.system.interfaces[pair].slave_surface
-        state = self._at(stage).state
-        pressure, shear = contact_pressure(self.system, state, pair, deformed=deformed)
-        return chain.X[:, chain.vertices], pressure, shear
+        return contact_result(self.system, self._at(stage), pair)
 
     def motion(self, body: str, stage: str = "loaded") -> RigidMotion:
         """Return the motion of a rigid body: x, y [mm] and rotation [rad]."""

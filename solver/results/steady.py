@@ -14,6 +14,7 @@ from solver.contact.state import State
 from solver.fem.fields import recovery
 from solver.fem.wheel import Hub
 from solver.materials.state import PlasticState, Response
+from solver.results.contact_result import contact_patches
 from solver.steady import RollingContact
 from solver.steady.fields import of_layers, under_load
 
@@ -149,8 +150,8 @@ class TrackBody:
         return Standing(State(time, (u,), (plastic,), ()), response, touching)
 
 
-class SteadyContact:
-    """Pressure and shear of a wheel; see `solver.results.touch.Touch`.
+class SteadyTractions:
+    """Pressure and shear of a wheel; see `solver.results.tractions.SurfaceTractions`.
 
     Parameters
     ----------
@@ -161,7 +162,7 @@ class SteadyContact:
         self._way = way
 
     def along(self, converged: Standing, x: Array) -> tuple[Array, Array, Array]:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         touching = converged.touching
         if touching is None:
             return np.zeros_like(x), np.zeros_like(x), np.full_like(x, np.nan)
@@ -178,18 +179,24 @@ class SteadyContact:
         )
 
     def extent(self, converged: Standing) -> tuple[float, float]:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         touching = converged.touching
         assert touching is not None
-        closed = touching.normal > 0
-        return float(np.ptp(touching.x[closed]) / 2), float(touching.pressure.max())
+        order = np.argsort(touching.x)
+        closed = touching.normal[order] > 0
+        patches = contact_patches(touching.x[order], touching.gap[order], closed)
+        return (patches[-1][1] - patches[0][0]) / 2, float(touching.pressure.max())
 
     def force(self, converged: Standing) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         assert converged.touching is not None
         return -self._way * float(converged.touching.tangential.sum())
 
     def centre(self, converged: Standing) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         del converged
         return 0.0
+
+    def points(self, converged: Standing) -> None:
+        """See `SurfaceTractions`."""
+        del converged

@@ -9,8 +9,8 @@ import numpy as np
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
-    from solver.results.look import Look, Values
-    from solver.results.touch import ContactPoints
+    from solver.results.contact_result import ContactResult
+    from solver.results.run import FinishedRun, Values
 
 STICK_HALF_WIDTH = declare(
     "stick_half_width", "half-width of the part of the contact that sticks under load", "mm"
@@ -20,19 +20,17 @@ STICK_FRACTION = declare(
 )
 
 
-def stick(look: Look) -> Values:
+def stick(run: FinishedRun) -> Values:
     """Return how much of the contact sticks: nothing without friction, NaN without contact."""
-    from solver.results.touch import contact_points  # only who computes needs the solver
-
-    points = contact_points(look.touch, look.loaded)
+    points = run.tractions.points(run.loaded)
     if points is None:
         return {STICK_HALF_WIDTH: np.nan, STICK_FRACTION: np.nan}
-    stuck = stick_half_width(points, symmetric=look.view.symmetric)
-    whole, _ = look.touch.extent(look.loaded)
+    stuck = stick_half_width(points, symmetric=run.view.symmetric)
+    whole, _ = run.tractions.extent(run.loaded)
     return {STICK_HALF_WIDTH: stuck, STICK_FRACTION: stuck / whole if whole else np.nan}
 
 
-def stick_half_width(points: ContactPoints, *, symmetric: bool) -> float:
+def stick_half_width(points: ContactResult, *, symmetric: bool) -> float:
     """Return the half-width of the part that sticks [mm].
 
     Its ends are half-way between the last point that sticks and the first that slips, so that they
@@ -43,8 +41,8 @@ def stick_half_width(points: ContactPoints, *, symmetric: bool) -> float:
         return 0.0
 
     def end(at: int, beyond: int) -> float:
-        slips = 0 <= beyond < len(points.x) and points.closed[beyond]
-        return float((points.x[at] + points.x[beyond]) / 2 if slips else points.x[at])
+        slips = 0 <= beyond < len(points.s) and points.closed[beyond]
+        return float((points.s[at] + points.s[beyond]) / 2 if slips else points.s[at])
 
     right = end(stuck[-1], stuck[-1] + 1)
     return right if symmetric else (right - end(stuck[0], stuck[0] - 1)) / 2

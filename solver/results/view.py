@@ -35,6 +35,13 @@ STAGE = declare("stage", "stage of loading", "", dims=("stage",))
 BODY = declare("body", "body", "", dims=("body",))
 
 
+class Places(NamedTuple):
+    """Places in a body: (2, n) [mm]."""
+
+    body: str
+    X: Array
+
+
 class Axis(NamedTuple):
     """The straight line along a contact surface before loading.
 

@@ -32,9 +32,9 @@ from solver.model.rigid import RigidBody, line
 from solver.parameters import Accuracy, Length, by_accuracy, described
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
-from solver.results.fields import maps, profiles
 from solver.results.figures import cost, extremes
 from solver.results.indentation import crater, follow, history, indentation
+from solver.results.maps import maps, profiles
 from solver.results.record import Status
 from solver.results.view import View
 from solver.scenes.effort import Effort, lattice

@@ -17,8 +17,8 @@ from solver.results.singularity import (
 )
 
 if TYPE_CHECKING:
-    from solver.results.look import Look, Values
-    from solver.results.touch import ContactPoints
+    from solver.results.contact_result import ContactResult
+    from solver.results.run import FinishedRun, Values
     from solver.scenes.flat_punch import FlatPunch
 
 _NEAREST, _FARTHEST = 10.0, 0.03
@@ -46,7 +46,7 @@ class Cornered(Protocol):
         """Dimensions and elements [mm]."""
 
 
-def corner(look: Look) -> Values:
+def corner(run: FinishedRun) -> Values:
     """Return the power of the singularity with its error, its intensity, and the apparent power.
 
     Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
@@ -57,8 +57,8 @@ def corner(look: Look) -> Values:
     Stress in the half-plane would be a worse measure: a uniform stress along its
     surface, which has no part in the pressure, is a term only 1 - p above the first.
     """
-    parameters, points = look.parameters, _points(look)
-    r = 1 - points.x / parameters.half_width
+    parameters, points = run.parameters, _points(run)
+    r = 1 - points.s / parameters.half_width
     pressure = points.pressure / parameters.mean_pressure
     found, apparent = NOWHERE, np.nan
     if points.closed[-1]:
@@ -77,11 +77,9 @@ def corner(look: Look) -> Values:
     }
 
 
-def _points(look: Look) -> ContactPoints:
+def _points(run: FinishedRun) -> ContactResult:
     """Return the contact points under load."""
-    from solver.results.touch import contact_points  # only who computes needs the solver
-
-    points = contact_points(look.touch, look.loaded)
+    points = run.tractions.points(run.loaded)
     assert points is not None, "the model has a contact pair"
     return points
 
@@ -92,13 +90,13 @@ def _flush(parameters: Cornered) -> bool:
     return groove is not None and groove.distance == 0
 
 
-def _first_term_leads(points: ContactPoints, r: np.ndarray, low: float) -> bool:
+def _first_term_leads(points: ContactResult, r: np.ndarray, low: float) -> bool:
     """Whether shear where the fit begins is more than half that of the first term of a notch."""
     near = int(np.argmin(np.abs(r - low)))
     return bool(points.shear[near] > _NOTCH_SHEAR / 2 * points.pressure[near])
 
 
-def _next_feature(parameters: Cornered, points: ContactPoints, r: np.ndarray) -> float:
+def _next_feature(parameters: Cornered, points: ContactResult, r: np.ndarray) -> float:
     """Return the distance / a from the corner of what else shapes the field."""
     geometry, near = parameters.geometry, [1.0]
     for groove in (geometry.punch_groove, geometry.half_plane_groove):
@@ -108,9 +106,9 @@ def _next_feature(parameters: Cornered, points: ContactPoints, r: np.ndarray) ->
     return float(min([*near, *r[other]]))
 
 
-def lifted(look: Look) -> tuple[str, ...]:
+def lifted(run: FinishedRun) -> tuple[str, ...]:
     """Return a warning where the corner has lifted off."""
-    width, _ = look.touch.extent(look.loaded)
-    if width >= look.parameters.half_width * (1 - 1e-9):
+    width, _ = run.tractions.extent(run.loaded)
+    if width >= run.parameters.half_width * (1 - 1e-9):
         return ()
     return (f"the corner has lifted off: contact ends at {width:.4g} mm, without a singularity",)

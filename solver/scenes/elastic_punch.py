@@ -32,8 +32,8 @@ from solver.loading.program import Program, load_and_release
 from solver.model.model import ContactPair, Model
 from solver.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.results.contact import contact
-from solver.results.fields import isochromatics
 from solver.results.figures import cost
+from solver.results.maps import isochromatics
 from solver.results.record import Status
 from solver.results.stick import stick
 from solver.results.view import View

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.results.fields import PLASTIC_STRAIN_PROFILE, RESIDUAL_PROFILE
+from solver.results.maps import PROFILE_PLASTIC_STRAIN, RESIDUAL_PROFILE
 from solver.results.quantities import declare
 from solver.results.shakedown import Shakedown, ShakedownState, classify
 
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.state import Converged
-    from solver.results.look import Values
-    from solver.results.samples import Bodies, Samples, Solved
+    from solver.results.fields import Bodies, Solved
+    from solver.results.run import Values
+    from solver.results.samples import Samples
     from solver.scenes.rolling_parameters import RollingParameters
 
     Array = NDArray[np.float64]
@@ -78,9 +79,10 @@ class Trace:
         """Take the trace of a pass from its states ``mid_track``, ``loaded`` and ``unloaded``."""
         left = points["unloaded"]
         return cls(
-            *samples.profile(left),
-            samples.flow(left),
-            samples.displacement(left),
+            samples.profile("stress", left).swapaxes(0, 1),
+            samples.profile("plastic_strain", left),
+            samples.flow(left).swapaxes(0, 1),
+            samples.profile("displacement", left)[:, :, 0],
             _creepage(samples.system, points["mid_track"], points["loaded"]),
             float(left.responses[-1].state.accumulated.max()),
         )
@@ -104,7 +106,7 @@ def passes(traces: Sequence[Trace], cycle: int) -> Values:
     return {
         PASS: np.arange(1, len(traces) + 1),
         RESIDUAL_PROFILE.over("pass"): np.stack([t.stress for t in traces]),
-        PLASTIC_STRAIN_PROFILE.over("pass"): np.stack([t.strain for t in traces]),
+        PROFILE_PLASTIC_STRAIN.over("pass"): np.stack([t.strain for t in traces]),
         PLASTIC_FLOW_PROFILE.over("pass"): np.stack([t.flow for t in traces]),
         PASS_CREEPAGE: np.array([t.creepage for t in traces]),
         PASS_MAX_PLASTIC_STRAIN: np.array([t.peak for t in traces]),

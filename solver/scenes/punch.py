@@ -34,11 +34,11 @@ from solver.parameters import (
 )
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
-from solver.results.fields import maps, profiles, surfaces
 from solver.results.figures import cost, extremes
-from solver.results.look import Look, Values
+from solver.results.maps import maps, profiles, surfaces
 from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
+from solver.results.run import FinishedRun, Values
 from solver.results.view import View
 from solver.scenes.effort import Effort
 from solver.scenes.flat_punch import FlatPunch, Growth, HalfPlaneSize, PunchHeight, SmallestElement
@@ -204,15 +204,15 @@ _INSIDE = {"half_plane": _NEAREST, "punch": 0.028}
 """Distance from the corner / a, at which residual stress is read, as in the publication."""
 
 
-def figures(look: Look) -> Values:
+def figures(run: FinishedRun) -> Values:
     """Return the figures of the punch, those of the publication among them."""
     from solver.results.audit.cut import cut_force  # only who computes needs the solver
 
-    samples, system, unloaded = look.samples, look.system, look.unloaded
-    a, s = look.parameters.half_width, look.view.s
+    samples, system, unloaded = run.samples, run.system, run.unloaded
+    a, s = run.parameters.half_width, run.view.s
     out: dict[Quantity, float] = {}
     for body, distance in _INSIDE.items():
-        sigma = samples.on_surface(body, unloaded)[0]
+        sigma = samples.on_surface("stress", body, unloaded)[0]
         at = int(np.argmin(np.abs(s - a * (1 - distance))))
         out[RESIDUAL_X[body]] = float(sigma[at])
     for body, quantity in MAX_PLASTIC_STRAIN.items():
@@ -220,8 +220,8 @@ def figures(look: Look) -> Values:
         out[quantity] = float(strain.max())
     # the free side of the punch carries no sigma_x: what remains is error
     nodes = system.full("punch").boundary_nodes("right")
-    side = samples.stress("punch", unloaded)[0, nodes]
-    out[FREE_SURFACE] = float(np.abs(side).max() / look.parameters.yield_stress)
+    side = samples.fields.at_nodes(unloaded, "punch").stress[0, nodes]
+    out[FREE_SURFACE] = float(np.abs(side).max() / run.parameters.yield_stress)
     # nothing pushes on the half-plane any more: a horizontal cut carries no normal force
     width = float(system.full("half_plane").X[0].max())
     line = np.linspace(0.0, width * (1 - 1e-9), 8000)

@@ -28,11 +28,11 @@ from solver.model.model import ContactPair, Model
 from solver.model.rigid import Pushed, RigidBody, RigidSurface
 from solver.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.results.contact import contact
-from solver.results.fields import isochromatics
 from solver.results.figures import cost
-from solver.results.look import Look, Values
+from solver.results.maps import isochromatics
 from solver.results.quantities import declare
 from solver.results.record import Status
+from solver.results.run import FinishedRun, Values
 from solver.results.stick import stick
 from solver.results.view import View
 from solver.scenes.corner import corner
@@ -151,13 +151,11 @@ def view(parameters: RigidPunchParameters) -> View:
     )
 
 
-def pressure_error(look: Look) -> Values:
+def pressure_error(run: FinishedRun) -> Values:
     """Return the error of the pressure away from the corner; NaN with friction."""
-    from solver.results.touch import contact_points  # only who computes needs the solver
-
-    parameters, points = look.parameters, contact_points(look.touch, look.loaded)
+    parameters, points = run.parameters, run.tractions.points(run.loaded)
     assert points is not None, "the model has a contact pair"
-    x = points.x / parameters.half_width
+    x = points.s / parameters.half_width
     exact = 2 / (np.pi * np.sqrt(1 - np.minimum(x, _AWAY) ** 2))
     miss = points.pressure / parameters.mean_pressure - exact
     at = x <= _AWAY

@@ -21,9 +21,9 @@ import numpy as np
 from solver.loading.refinement import StepRefinement
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
-from solver.results.fields import maps, surfaces
 from solver.results.figures import cost, extremes
 from solver.results.free_surface import FreeSurface
+from solver.results.maps import maps, surfaces
 from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.loading.program import Program
-    from solver.results.look import Look, Values
     from solver.results.quantities import Quantity
+    from solver.results.run import FinishedRun, Values
 
 CREEPAGE = declare("creepage", "creepage of the last pass")
 TRAVEL = declare("travel", "length rolled in the last pass", "mm")
@@ -147,23 +147,23 @@ def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
     return trace.stress[len(trace.stress) // 2, [0, 2]]
 
 
-def progress(look: Look) -> Values:
+def progress(run: FinishedRun) -> Values:
     """Return the length rolled in the last pass, and the advance of its increments."""
-    if look.parameters.endless:
+    if run.parameters.endless:
         return {}
-    schedule, settled = look.parameters.schedule, look.outcome.settled
+    schedule, settled = run.parameters.schedule, run.outcome.settled
     return {
-        TRAVEL: schedule.travel(look.outcome.last.state.time),
+        TRAVEL: schedule.travel(run.outcome.last.state.time),
         ADVANCE: schedule.increment / settled.times,
         ADVANCE_ERROR: settled.error,
     }
 
 
-def profile_figures(look: Look) -> Values:
+def profile_figures(run: FinishedRun) -> Values:
     """Return the figures of the last pass under mid-track."""
-    trace: Trace = look.outcome.traces[-1]
+    trace: Trace = run.outcome.traces[-1]
     stress, strain = trace.stress, trace.strain
-    depth = look.view.depth
+    depth = run.view.depth
     middle = len(stress) // 2
     out: dict[Quantity, float] = {CREEPAGE: trace.creepage}
     for axis, component in (("x", 0), ("z", 2)):
@@ -179,19 +179,19 @@ def profile_figures(look: Look) -> Values:
     return out
 
 
-def wheel(look: Look) -> Values:
+def wheel(run: FinishedRun) -> Values:
     """Return the longitudinal force at mid-track, and height and rotation of the wheel if any."""
-    out: dict[Quantity, float] = {LONGITUDINAL_FORCE: look.touch.force(look.loaded)}
-    if (hub := look.system.axle(look.loaded)) is not None:
+    out: dict[Quantity, float] = {LONGITUDINAL_FORCE: run.tractions.force(run.loaded)}
+    if (hub := run.system.axle(run.loaded)) is not None:
         out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
     return out
 
 
-def surface(look: Look) -> Values:
+def surface(run: FinishedRun) -> Values:
     """Return residual stress at and near the surface at mid-track, without extrapolation."""
-    found = FreeSurface.of(look.system.full("half_space"), "top")
-    response = look.system.response("half_space", look.unloaded)
-    u = look.system.displacement("half_space", look.unloaded.state)
+    found = FreeSurface.of(run.system.full("half_space"), "top")
+    response = run.system.response("half_space", run.unloaded)
+    u = run.system.displacement("half_space", run.unloaded.state)
     free = found.at(0.0, found.stress(u, response.state.plastic_strain))
     row = found.at(0.0, found.first_row(response.stress))
     return {
@@ -201,24 +201,24 @@ def surface(look: Look) -> Values:
     }
 
 
-def cycles(look: Look) -> Values:
+def cycles(run: FinishedRun) -> Values:
     """Return the results of every pass, and the shakedown state that the cycles tend to."""
-    parameters = look.parameters
-    found = shakedown_of(parameters, look.outcome.traces)
+    parameters = run.parameters
+    found = shakedown_of(parameters, run.outcome.traces)
     return {
-        **passes(look.outcome.traces, parameters.cycle),
+        **passes(run.outcome.traces, parameters.cycle),
         SHAKEDOWN_STATE: found.state,
         STEADY_PLASTIC_INCREMENT: found.accumulated,
         STEADY_NET_INCREMENT: found.net,
     }
 
 
-def warnings(look: Look) -> tuple[str, ...]:
+def warnings(run: FinishedRun) -> tuple[str, ...]:
     """Return a warning where the error by the advance is above its tolerance, or unknown."""
-    settled, tolerance = look.outcome.settled, refinement(look.parameters)
-    if look.parameters.endless or tolerance is None or settled.error <= tolerance.tolerance:
+    settled, tolerance = run.outcome.settled, refinement(run.parameters)
+    if run.parameters.endless or tolerance is None or settled.error <= tolerance.tolerance:
         return ()
-    advance = look.parameters.schedule.increment
+    advance = run.parameters.schedule.increment
     known = not np.isnan(settled.error)
     error = f"an error of {settled.error:.3g} MPa" if known else "an unknown error"
     failed = f"; one of {advance / settled.failed:.3g} mm failed" if settled.failed else ""

@@ -14,11 +14,11 @@ from solver.errors import LimitLoad, ModelError, NotConverged, Spins, WindowTooS
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.results.audit.steady import OfPass, audit_pass
-from solver.results.look import Look
+from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.steady import SteadyContact, TrackBody
-from solver.results.touch import Prescribed
+from solver.results.steady import SteadyTractions, TrackBody
+from solver.results.tractions import PrescribedTractions
 from solver.scenes.passes import Trace, shakedown_of
 from solver.scenes.rolling_steady import steady_passes, track_for
 from solver.scenes.scene import by_increments
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from solver.model.motion import TravellingPressure
     from solver.results.audit.report import Audit
     from solver.results.steady import Standing
-    from solver.results.touch import Touch
+    from solver.results.tractions import SurfaceTractions
     from solver.results.view import View
     from solver.scenes.rolling_parameters import RollingParameters
     from solver.scenes.scene import Monitor, Scene
@@ -52,7 +52,7 @@ _MOST_BY_INCREMENTS = 4
 
 def without_ends(
     scene: Scene, runs: Sequence[RollingParameters], monitor: Monitor
-) -> Iterator[Look]:
+) -> Iterator[FinishedRun]:
     """Roll pass after pass; yield each of the runs, which differ in the number of passes.
 
     Where a pass yields or touches beyond the window of its mesh, all begins again with a larger
@@ -63,9 +63,9 @@ def without_ends(
     waiting = list(runs)
     rolled = _Rolled(scene, runs[-1])
     for reach in _REACHES:
-        for look in rolled.looks(waiting, monitor, reach):
+        for run in rolled.runs(waiting, monitor, reach):
             waiting.pop(0)
-            yield look
+            yield run
         if not isinstance(rolled.error, WindowTooSmall):
             break
     none = LimitLoad if runs[-1].load == "hertz" else Spins
@@ -73,10 +73,10 @@ def without_ends(
         length, side = others[0].length, others[0].element_size
         note = f"{rolled.error}: rolled by increments instead, over {length:.4g} mm"
         note += f" with elements of {side:.3g} mm"
-        for look in by_increments(scene, others, monitor):
-            yield replace(look, notes=(*look.notes, note))
+        for run in by_increments(scene, others, monitor):
+            yield replace(run, notes=(*run.notes, note))
         return
-    yield from map(rolled.look, waiting)
+    yield from map(rolled.finished, waiting)
 
 
 def _stepped(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
@@ -114,9 +114,9 @@ class _Rolled:
         self._found: Pass | None = None
         self._previous: Pass | None = None
 
-    def looks(
+    def runs(
         self, runs: Sequence[RollingParameters], monitor: Monitor, reach: float
-    ) -> Iterator[Look]:
+    ) -> Iterator[FinishedRun]:
         """Yield these runs, as many as there are passes for; ``error`` tells why not all."""
         last, waiting = self._last, list(runs)
         try:
@@ -134,16 +134,16 @@ class _Rolled:
                 monitor(min(number / last.passes, 0.99))
                 decided = last.until == "decided" and _decided(last, self._traces)
                 while waiting and (decided or waiting[0].passes == number):
-                    look = self.look(waiting.pop(0))
+                    run = self.finished(waiting.pop(0))
                     paused = time.process_time()
-                    yield look
+                    yield run
                     self._elsewhere += time.process_time() - paused
                 if not waiting:
                     return
         except NotConverged as failure:
             self.error = failure
 
-    def look(self, run: RollingParameters) -> Look:
+    def finished(self, run: RollingParameters) -> FinishedRun:
         """Return a run after the last pass found."""
         found = self._found
         side = self._sides[found.direction if found else self._last.directions[0]]
@@ -167,10 +167,10 @@ class _Rolled:
 
         own = run.of_pass(max(len(self._steps) - 1, 0))
         moving = _moving(own, found.direction) if found and own.load != "contact" else None
-        return Look(
+        return FinishedRun(
             parameters=run,
             samples=side.samples,
-            touch=_touch(own, side.half_plane.way),
+            tractions=_tractions(own, side.half_plane.way),
             outcome=outcome,
             check=check,
             notes=doubts({side.samples.view.profile_body: run.linear_material()}),
@@ -193,7 +193,7 @@ class _Side:
         each = np.zeros((1 + len(rows.every), n + len(rows.highest)))
         each[0, n:] = 1.0
         np.put_along_axis(each[1:], rows.every, 1.0, axis=1)
-        return self.samples.along_depth(self.samples.of_points(body, each))[:, 0].T
+        return self.samples.along_depth(self.samples.fields.recovered(body, each))[:, 0].T
 
     def trace(self, found: Pass) -> Trace:
         """Return what is kept of a pass."""
@@ -226,11 +226,11 @@ def _decided(parameters: RollingParameters, traces: Sequence[Trace]) -> bool:
     return state is not ShakedownState.UNDECIDED
 
 
-def _touch(parameters: RollingParameters, way: int) -> Touch:
+def _tractions(parameters: RollingParameters, way: int) -> SurfaceTractions:
     """Return what acts on the half-space."""
     if parameters.load == "contact":
-        return SteadyContact(way)
-    return Prescribed(_moving(parameters, way), 0.0)
+        return SteadyTractions(way)
+    return PrescribedTractions(_moving(parameters, way), 0.0)
 
 
 def _moving(parameters: RollingParameters, way: int) -> TravellingPressure:

@@ -14,17 +14,17 @@ from solver.loading.program import Program, walked
 from solver.loading.refinement import StepRefinement
 from solver.model.model import Model
 from solver.results.audit.figures import AUDIT
-from solver.results.look import Look, Output, Values
 from solver.results.mesh_fields import mesh_fields
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
+from solver.results.run import FinishedRun, Output, Values
 from solver.results.singular_points import singular_points
 from solver.results.view import View
 from solver.scenes.effort import Effort
 
 if TYPE_CHECKING:
-    from solver.results.asked import Looked
     from solver.results.audit.report import Audit
+    from solver.results.named_places import NamedPlaces
     from solver.results.samples import Samples
 
 Monitor = Callable[[float], None]
@@ -32,7 +32,7 @@ Monitor = Callable[[float], None]
 An exception it raises stops the work and reaches the caller unchanged."""
 
 
-Method = Callable[["Scene", Sequence[Any], Monitor], Iterator[Look]]
+Method = Callable[["Scene", Sequence[Any], Monitor], Iterator[FinishedRun]]
 """Computes runs of a scene, given by their parameters in increasing order."""
 
 
@@ -52,7 +52,7 @@ class Scene:
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
     view : (parameters) -> where results are taken
-    looked : (parameters) -> places that have names, and numbers asked for at them, where there are
+    places : (parameters) -> places that have names, and numbers requested at them, where there are
     outputs : functions that compute quantities of a complete run
     costs : functions that compute quantities of every run, also of one that failed
     method : (parameters) -> how runs that differ in ``branch`` are computed; `by_increments`
@@ -79,13 +79,13 @@ class Scene:
     view: Callable[[Any], View]
     outputs: tuple[Output, ...]
     costs: tuple[Output, ...]
-    looked: Callable[[Any], Looked] | None = None
+    places: Callable[[Any], NamedPlaces] | None = None
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
     watch: Callable[[Samples, Any], Any] | None = None
     refinement: Callable[[Any], StepRefinement | None] | None = None
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
-    warnings: Callable[[Look], tuple[str, ...]] | None = None
+    warnings: Callable[[FinishedRun], tuple[str, ...]] | None = None
     advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
     quantities: tuple[Quantity, ...] = ()
     source: str = ""
@@ -103,39 +103,39 @@ class Scene:
             kind = type(getattr(self.parameters(), self.branch))
             runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
         method = self.method(runs[-1]) if self.method else by_increments
-        for run, look in zip(runs, method(self, runs, monitor), strict=True):
-            yield replace(self.record(look), parameters=run)
+        for each, run in zip(runs, method(self, runs, monitor), strict=True):
+            yield replace(self.record(run), parameters=each)
         monitor(1.0)
 
-    def record(self, look: Look) -> Record:
+    def record(self, run: FinishedRun) -> Record:
         """Return the record of a run."""
-        cost = _merged(look, self.costs)
-        if not look.complete:
-            limit = isinstance(look.outcome.error, LimitLoad)
+        cost = _merged(run, self.costs)
+        if not run.complete:
+            limit = isinstance(run.outcome.error, LimitLoad)
             status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
-            messages = (*look.notes, str(look.outcome.error))
-            return self._labelled(look, status, messages, cost)
+            messages = (*run.notes, str(run.outcome.error))
+            return self._labelled(run, status, messages, cost)
         from solver.results.audit.stored import stored  # only who computes needs the solver
 
-        check = look.check()
+        check = run.check()
         status = Status.OUTSIDE_THEORY if check.outside else Status.OK
-        states = {stage: look.outcome.points[stage] for stage in look.view.stages}
-        own = self.warnings(look) if self.warnings else ()
+        states = {stage: run.outcome.points[stage] for stage in run.view.stages}
+        own = self.warnings(run) if self.warnings else ()
         figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
-        values = {**cost, **figures, **_merged(look, (singular_points, *self.outputs))}
-        written = self._labelled(look, Status.OK, (), values)
-        looked = self.looked(look.parameters) if self.looked else None
-        last = stored(look, written, self.view(look.parameters), looked)
+        values = {**cost, **figures, **_merged(run, (singular_points, *self.outputs))}
+        written = self._labelled(run, Status.OK, (), values)
+        places = self.places(run.parameters) if self.places else None
+        last = stored(run, written, self.view(run.parameters), places)
         violations = check.violations + last.violations
         if violations:
             status = Status.AUDIT_FAILED
-        messages = violations + check.outside + look.notes + check.warnings + own
+        messages = violations + check.outside + run.notes + check.warnings + own
         return replace(
             written,
             status=status,
             message=self._told(status, messages),
             scalars={**written.scalars, "audit_stored": last.figure},
-            mesh=partial(mesh_fields, look.system, states),
+            mesh=partial(mesh_fields, run.system, states),
         )
 
     def _told(self, status: Status, messages: tuple[str, ...]) -> str:
@@ -143,29 +143,29 @@ class Scene:
         return "; ".join((*messages, advice) if advice else messages)
 
     def _labelled(
-        self, look: Look, status: Status, messages: tuple[str, ...], values: Values
+        self, run: FinishedRun, status: Status, messages: tuple[str, ...], values: Values
     ) -> Record:
         own = {q.name: value for q, value in values.items() if q.coordinate}
         return Record(
-            parameters=look.parameters,
+            parameters=run.parameters,
             status=status,
             message=self._told(status, messages),
-            coordinates={**look.view.coordinates, **own},
+            coordinates={**run.view.coordinates, **own},
             fields={
                 q.name: (q.dims, value)
                 for q, value in values.items()
                 if q.dims and not q.coordinate
             },
             scalars={q.name: value for q, value in values.items() if not q.dims},
-            symmetric=look.view.symmetric,
+            symmetric=run.view.symmetric,
         )
 
 
-def _merged(look: Look, outputs: Sequence[Output]) -> Values:
+def _merged(run: FinishedRun, outputs: Sequence[Output]) -> Values:
     values: dict[Quantity, Any] = {}
     names: set[str] = set()
     for output in outputs:
-        for quantity, value in output(look).items():
+        for quantity, value in output(run).items():
             if quantity.name in names:
                 raise ValueError(f"two outputs of the scene give {quantity.name}")
             names.add(quantity.name)
@@ -173,7 +173,7 @@ def _merged(look: Look, outputs: Sequence[Output]) -> Values:
     return values
 
 
-def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterator[Look]:
+def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterator[FinishedRun]:
     """Walk the programs of runs that differ in the branch parameter; yield each when known."""
     # only who computes needs the solver, which takes half a second to import
     from solver.contact.system import System
@@ -181,12 +181,12 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     from solver.results.audit.pairs import untouched
     from solver.results.audit.report import audit
     from solver.results.samples import Samples
-    from solver.results.touch import touch_of
+    from solver.results.tractions import tractions_of
 
     last = runs[-1]
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
-    touch = touch_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
+    tractions = tractions_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
     programs = [scene.program(run) for run in runs]
     walker = Walker(
         system,
@@ -206,10 +206,10 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
 
         # of a run that stopped nobody knows which pairs would have touched
         never = () if outcome.error else untouched(system, outcome.points.values())
-        yield Look(
+        yield FinishedRun(
             parameters=run,
             samples=samples,
-            touch=touch,
+            tractions=tractions,
             outcome=outcome,
             check=check,
             singular=system.model.singular,

@@ -33,11 +33,11 @@ from solver.model.body import Body
 from solver.model.model import ContactPair, Model
 from solver.parameters import Accuracy, Friction, Length, Stress, by_accuracy, described
 from solver.results.contact import contact
-from solver.results.fields import isochromatics
 from solver.results.figures import cost
-from solver.results.look import Look, Values
+from solver.results.maps import isochromatics
 from solver.results.quantities import declare
 from solver.results.record import Status
+from solver.results.run import FinishedRun, Values
 from solver.results.stick import stick
 from solver.results.view import Axis, View
 from solver.scenes.corner import corner, lifted
@@ -254,9 +254,9 @@ def view(parameters: ShaftHubParameters) -> View:
     )
 
 
-def hoop(look: Look) -> Values:
+def hoop(run: FinishedRun) -> Values:
     """Return the hoop stress along the contact, on either side of it."""
-    sides = [look.samples.on_surface(body, look.loaded)[2] for body in look.view.surfaces]
+    sides = [run.samples.on_surface("stress", body, run.loaded)[2] for body in run.view.surfaces]
     return {HOOP_STRESS: np.stack(sides)}
 
 

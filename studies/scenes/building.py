@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 _BESIDE = (
-    "name", "summary", "parameters.", "derived.", "stages", "loading", "look.", "outputs.",
+    "name", "summary", "parameters.", "derived.", "stages", "loading", "results.", "outputs.",
     "singular", "allow",
 )  # fmt: skip
 """Entries of which the bodies and how they are held do not depend."""

@@ -31,7 +31,7 @@ def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[S
     yield from _loads(scene)
     yield from _contacts(scene)
     yield from _stages(scene)
-    yield from _look(scene)
+    yield from _results(scene)
     yield from _outputs(scene)
     yield from _names(scene)
 
@@ -132,19 +132,19 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield StudyError("stages", given, "must be given, or loading: one of the two")
 
 
-def _look(scene: tables.SceneFile) -> Iterator[StudyError]:
-    for axis in ("x", "y") if scene.look.map else ():
-        yield from _map(f"look.map.{axis}", getattr(scene.look.map, axis))
-    for name, line in scene.look.lines.items():
-        where = f"look.lines.{name}"
+def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
+    for axis in ("x", "y") if scene.results.map else ():
+        yield from _map(f"results.map.{axis}", getattr(scene.results.map, axis))
+    for name, line in scene.results.lines.items():
+        where = f"results.lines.{name}"
         yield from _one_of(f"{where}.body", line.body, scene.bodies)
         straight = (line.start is not None, line.end is not None)
         arc = tuple(each is not None for each in (line.centre, line.radius, line.angles))
         if not (all(straight) and not any(arc)) and not (all(arc) and not any(straight)):
             allowed = "must have start and end, or centre, radius and angles"
             yield StudyError(where, line.model_dump(exclude_none=True), allowed)
-    for name, point in scene.look.points.items():
-        yield from _one_of(f"look.points.{name}.body", point.body, scene.bodies)
+    for name, point in scene.results.points.items():
+        yield from _one_of(f"results.points.{name}.body", point.body, scene.bodies)
 
 
 def _map(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
@@ -169,7 +169,7 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield from _one_of(f"{where}.stage", output.stage, scene.stage_names)
         places: dict[str, list[str]] = {
             "body": list(scene.bodies),
-            "line": list(scene.look.lines),
+            "line": list(scene.results.lines),
             "contact": [contact.name for contact in scene.contacts],
         }
         fitting = ("body", "line") if output.of in _NODAL else ("contact",)

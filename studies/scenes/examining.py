@@ -10,9 +10,9 @@ from studies.scenes import tables
 from studies.scenes.building import Builder
 from studies.scenes.checking import clashes, declarations
 from studies.scenes.description import Description
-from studies.scenes.looking import view_of
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
+from studies.scenes.results import view_of
 
 if TYPE_CHECKING:
     from solver.contact.system import System
@@ -76,7 +76,7 @@ def _build(builder: Builder, scene: tables.SceneFile) -> None:
         system = builder.tried("", lambda: System(model))
         if system:
             builder.mistakes += _apart(system)
-            builder.tried("look", lambda: Samples(system, view_of(scene)))
+            builder.tried("results", lambda: Samples(system, view_of(scene)))
 
 
 def _apart(system: System) -> Iterator[StudyError]:

@@ -32,8 +32,8 @@ _STAND_INS: dict[Where, _StandIn] = {
     ),
     ("singular",): _stand_in("", at=[0, 0], radius=1.0),
     ("stages",): _stand_in("name", name="stage"),
-    ("look", "lines"): _stand_in("body", body=""),
-    ("look", "points"): _stand_in("body", body="", at=[0, 0]),
+    ("results", "lines"): _stand_in("body", body=""),
+    ("results", "points"): _stand_in("body", body="", at=[0, 0]),
     ("outputs",): _stand_in("of stage body line contact", of="mises", stage=""),
     ("parameters",): _stand_in("", default=0),
 }
@@ -42,7 +42,7 @@ _STAND_INS: dict[Where, _StandIn] = {
 _LONE: dict[Where, Any] = {("name",): "scene", ("loading",): {"factor": 1.0, "step": 1.0}}
 """Stand-ins for entries that a file has once; all others may be left out."""
 
-_WITHOUT = (("derived",), ("look",))
+_WITHOUT = (("derived",), ("results",))
 """Tables whose entries may be left out, one by one."""
 
 

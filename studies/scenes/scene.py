@@ -1,4 +1,4 @@
-"""A scene made of a scene file: parameters, model, loading and looks are read from its tables."""
+"""A scene made of a scene file: parameters, model, loading and results are read from its tables."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
 from solver.parameters import check, described
-from solver.results.fields import maps, stress_maps
 from solver.results.figures import cost
-from solver.results.look import Look, Values
+from solver.results.maps import maps
+from solver.results.named_places import NamedPlaces, at_named_places
+from solver.results.run import FinishedRun, Values
 from solver.scenes.effort import Effort
 from solver.scenes.scene import Scene
 from studies.errors import SceneError
@@ -25,12 +26,11 @@ from studies.scenes.checking import clashes
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of
 from studies.scenes.examining import examined
-from studies.scenes.looking import asked, looked, places_of, view_of
+from studies.scenes.results import numbers_of, places_of, view_of
 
 if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.model.model import Model
-    from solver.results.asked import Looked
     from solver.results.samples import Samples
     from solver.results.view import View
 
@@ -93,12 +93,12 @@ def _made(description: Description, scene: tables.SceneFile) -> FileScene:
         model=partial(_model, description),
         program=partial(_program, description),
         view=partial(_view, description),
-        looked=partial(_places, description),
-        outputs=(*((_maps,) if scene.look.map else ()), partial(_looked, description)),
+        places=partial(_places, description),
+        outputs=(*((maps,) if scene.results.map else ()), partial(_at_places, description)),
         costs=(cost,),
         watch=_watched,
         effort=partial(_effort, description),
-        quantities=tuple(q for number in asked(scene) for q in number.quantities),
+        quantities=tuple(q for number in numbers_of(scene) for q in number.quantities),
         source=description.digest,
         allow=scene.allow,
         description=description,
@@ -144,19 +144,14 @@ def _view(description: Description, parameters: Any) -> View:
     return view_of(_tables(description, parameters))
 
 
-def _places(description: Description, parameters: Any) -> Looked:
+def _places(description: Description, parameters: Any) -> NamedPlaces:
     return places_of(_tables(description, parameters))
 
 
-def _looked(description: Description, look: Look) -> Values:
-    return looked(
-        _tables(description, look.parameters), _program(description, look.parameters), look
-    )
-
-
-def _maps(look: Look) -> Values:
-    """Return residual stress where the bodies are released, else stress in all stages."""
-    return maps(look) if look.view.unloaded else stress_maps(look)
+def _at_places(description: Description, run: FinishedRun) -> Values:
+    program = _program(description, run.parameters)
+    times = [0.0, *(target.time for target in program.targets)]
+    return at_named_places(run, _places(description, run.parameters), times)
 
 
 def _watched(samples: Samples, converged: Converged) -> Any:

@@ -189,7 +189,7 @@ class LoadingTable(SceneTable):
     release_increments: Count = 5
 
 
-# -- where to look -------------------------------------------------------------------------------
+# -- where results are taken ---------------------------------------------------------------------
 
 
 class SpacedTable(SceneTable):
@@ -215,7 +215,7 @@ class MapTable(SceneTable):
     y: SpacedTable
 
 
-class LookLineTable(SceneTable):
+class LineResultTable(SceneTable):
     """A straight line from one place to another, or an arc [degrees], in a body."""
 
     body: str
@@ -226,20 +226,20 @@ class LookLineTable(SceneTable):
     angles: Span | None = None
 
 
-class LookPointTable(SceneTable):
+class PointResultTable(SceneTable):
     """A place in a body."""
 
     body: str
     at: Place
 
 
-class LookTable(SceneTable):
+class ResultsTable(SceneTable):
     """Where results are stored; ``samples`` is their number along lines and contact surfaces."""
 
     samples: Annotated[int, Interval(ge=2, le=5000)] = 201
     map: MapTable | None = None
-    lines: dict[Label, LookLineTable] = Field(default_factory=dict)
-    points: dict[Label, LookPointTable] = Field(default_factory=dict)
+    lines: dict[Label, LineResultTable] = Field(default_factory=dict)
+    points: dict[Label, PointResultTable] = Field(default_factory=dict)
 
 
 class OutputTable(SceneTable):
@@ -298,7 +298,7 @@ class SceneFile(SceneTable):
     loads: tuple[Load, ...] = ()
     stages: tuple[StageTable, ...] = ()
     loading: LoadingTable | None = None
-    look: LookTable = LookTable()
+    results: ResultsTable = ResultsTable()
     outputs: dict[Label, OutputTable] = Field(default_factory=dict)
 
     @property

@@ -178,7 +178,7 @@ def _meant_mesh(fields: MeshFields) -> Iterator[tuple[str, _Meant]]:
              for k, a in enumerate("xy")}  # fmt: skip
     parts |= {f"stress_{c}": ("MPa", [s["stress"][k] for s in at])
               for k, c in enumerate(COMPONENTS)}  # fmt: skip
-    parts |= {"von_mises": ("MPa", [s["von_mises"] for s in at]),
+    parts |= {"mises": ("MPa", [s["mises"] for s in at]),
               "plastic_strain": ("1", [s["plastic_strain"] for s in at])}  # fmt: skip
     for name, (units, values) in parts.items():
         yield f"mesh_{name}", _Meant(("time", "mesh_node"), np.stack(values), {"units": units})

@@ -110,7 +110,7 @@ def read(run: xr.Dataset) -> MeshFields:
         {
             "displacement": np.stack([_at(run, f"displacement_{a}", k) for a in _AXES]),
             "stress": np.stack([_at(run, f"stress_{c}", k) for c in COMPONENTS]),
-            "von_mises": _at(run, "von_mises", k),
+            "mises": _at(run, "mises", k),
             "plastic_strain": _at(run, "plastic_strain", k),
         }
         for k in range(run.sizes[_TIME])

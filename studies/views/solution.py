@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 _DIMS = {
     "displacement": ("axis", "node"),
     "stress": ("component", "node"),
-    "von_mises": ("node",),
+    "mises": ("node",),
     "plastic_strain": ("node",),
 }
-_UNITS = {"displacement": "mm", "stress": "MPa", "von_mises": "MPa", "plastic_strain": "1"}
+_UNITS = {"displacement": "mm", "stress": "MPa", "mises": "MPa", "plastic_strain": "1"}
 
 
 def to_xarray(solution: Solution) -> xr.Dataset:
     """Return fields at all nodes over stages, with the body and the position of each node.
 
     Variables: ``displacement`` (stage, axis, node) [mm], ``stress`` (stage, component, node) [MPa],
-    ``von_mises`` [MPa] and ``plastic_strain`` (stage, node).
+    ``mises`` [MPa] and ``plastic_strain`` (stage, node).
     """
     fields = solution.mesh_fields()
     names = list(fields.bodies)

@@ -50,7 +50,8 @@ def measure(elements: Sequence[str], meshes: Sequence[int], repeats: int) -> lis
 
 
 def _errors(solution: Solution) -> dict[str, dict[str, float]]:
-    position, pressure, _ = solution.contact()
+    acting = solution.contact()
+    position, pressure = acting.X, acting.pressure
     order = np.argsort(position[0])
     x, p = position[0, order], pressure[order]
     at = np.linspace(0.0, 1.0, 2001)

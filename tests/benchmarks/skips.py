@@ -76,7 +76,7 @@ def _punch(*, condense: bool = True, yield_stress: float = np.inf, **changes: fl
     material = replace(punch.material, yield_stress=yield_stress)
     bodies = (replace(punch, condense=condense, material=material), below)
     solution = solve(replace(whole, bodies=bodies), load=0.5, control=CONTROL)
-    return np.asarray(solution.contact()[1])
+    return np.asarray(solution.contact().pressure)
 
 
 def _all_candidates() -> Array:

@@ -111,6 +111,6 @@ def test_a_pair_that_never_touches_is_told_and_passes_its_audit(gap: float) -> N
 
 def test_a_pair_that_touches_under_load_alone_is_not_told() -> None:
     solution = solve(blocks(STEEL, 0.005))
-    assert solution.surface(0, "loaded").pressure.max() > 0.0
-    assert solution.surface(0, "unloaded").pressure.max() == 0.0
+    assert solution.contact(0, "loaded").pressure.max() > 0.0
+    assert solution.contact(0, "unloaded").pressure.max() == 0.0
     assert solution.audit().warnings == ()

@@ -49,7 +49,8 @@ def pressed(body: Body, rigid: RigidBody, surface: str = "base", **own: Any) -> 
 def test_a_flat_punch_has_the_pressure_of_the_closed_form() -> None:
     force = 100.0
     found = pressed(half_plane(), punch(y=Pushed(value=-force)))
-    x, pressure, _ = found.contact()
+    acting = found.contact()
+    x, pressure = acting.X, acting.pressure
     inside = np.abs(x[0]) < 0.9
     exact = force / (np.pi * np.sqrt(1 - x[0][inside] ** 2))
     assert pressure[inside] == pytest.approx(exact, rel=0.01)
@@ -63,7 +64,8 @@ def test_an_eccentric_force_turns_the_punch_as_the_closed_form() -> None:
     found = pressed(half_plane(), punch(y=Pushed(value=-force), rotation=Pushed(value=moment)))
     turned = found.motion("punch", "loaded").rotation
     assert turned == pytest.approx(4 * moment / (np.pi * MODULUS), rel=0.01)
-    x, pressure, _ = found.contact()
+    acting = found.contact()
+    x, pressure = acting.X, acting.pressure
     inside = np.abs(x[0]) < 0.9
     at = x[0][inside]
     exact = (force - 2 * moment * at) / (np.pi * np.sqrt(1 - at**2))
@@ -138,7 +140,8 @@ def test_a_rigid_ball_on_a_half_space_is_the_contact_of_hertz(rigid_is_slave: bo
     pair = ContactPair(slave=slave, master=master, sliding="finite")
     found = solve(Model(bodies=(body,), rigid=(ball,), contacts=(pair,)),
                   control=PathControl(load_step=0.5))  # fmt: skip
-    x, pressure, _ = found.contact()
+    acting = found.contact()
+    x, pressure = acting.X, acting.pressure
     touching = found.loaded.state.contacts[0].normal > 0
     assert pressure.max() == pytest.approx(3 * force / (2 * np.pi * a**2), rel=0.01)
     assert x[0][touching].max() == pytest.approx(a, abs=0.12)  # an edge

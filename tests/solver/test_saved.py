@@ -23,7 +23,7 @@ def test_a_loaded_solution_answers_as_the_saved_one(tmp_path: Path) -> None:
     for stage in after.stages:
         for body in ("upper", "lower"):
             np.testing.assert_array_equal(after.stress(body, stage), before.stress(body, stage))
-        ours, theirs = after.surface(stage=stage), before.surface(stage=stage)
+        ours, theirs = after.contact(stage=stage), before.contact(stage=stage)
         for one, other in zip(ours, theirs, strict=True):
             np.testing.assert_array_equal(one, other)
     at = [[0.5, 1.0], [-0.5, 0.5]]

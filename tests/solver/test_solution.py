@@ -49,7 +49,7 @@ def test_fields_at_places_are_those_of_uniaxial_pressure(solution: Solution) -> 
 
 
 def test_what_acts_on_a_surface(solution: Solution) -> None:
-    face = solution.surface()
+    face = solution.contact()
     assert face.pressure == pytest.approx(PRESSURE)
     assert np.abs(face.shear).max() < 1e-9
     assert np.abs(face.gap).max() < 1e-9

@@ -7,15 +7,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver.results.contact_result import ContactResult
 from solver.results.stick import STICK_FRACTION, STICK_HALF_WIDTH, stick, stick_half_width
-from solver.results.touch import ContactPoints, Nothing
+from solver.results.tractions import NoTractions
 
 
 def points(x, closed, sticking):
-    return ContactPoints(
-        x=np.array(x, dtype=float),
+    s, none = np.array(x, dtype=float), np.zeros(len(x))
+    return ContactResult(
+        s=s,
+        X=np.stack([s, none]),
         pressure=np.array(closed, dtype=float),
-        shear=np.zeros(len(x)),
+        shear=none,
+        pressure_deformed=none,
+        gap=none,
+        slip=none,
         closed=np.array(closed, dtype=bool),
         sticking=np.array(sticking, dtype=bool),
     )
@@ -40,6 +46,6 @@ def test_the_end_of_the_part_that_sticks(closed, sticking, half, whole):
 
 
 def test_without_contact_nothing_is_known() -> None:
-    look = SimpleNamespace(touch=Nothing(), loaded=None)
-    found = stick(look)
+    run = SimpleNamespace(tractions=NoTractions(), loaded=None)
+    found = stick(run)
     assert np.isnan([found[STICK_HALF_WIDTH], found[STICK_FRACTION]]).all()

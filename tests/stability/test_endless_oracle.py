@@ -29,7 +29,7 @@ def _points(which: str, **change: Callable[[np.ndarray], np.ndarray]) -> Callabl
     """Change stress, plastic_strain or accumulated of a state."""
 
     def tamper(passed: Passed) -> Passed:
-        outcome = passed.look.outcome
+        outcome = passed.run.outcome
         standing = outcome.points[which]
         response, state = standing.response, standing.response.state
         if "stress" in change:
@@ -37,8 +37,8 @@ def _points(which: str, **change: Callable[[np.ndarray], np.ndarray]) -> Callabl
         own = {n: f(getattr(state, n).copy()) for n, f in change.items() if n != "stress"}
         response = response._replace(state=replace(state, **own))
         points = dict(outcome.points) | {which: replace(standing, response=response)}
-        look = replace(passed.look, outcome=replace(outcome, points=points))
-        return replace(passed, look=look)
+        run = replace(passed.run, outcome=replace(outcome, points=points))
+        return replace(passed, run=run)
 
     return tamper
 

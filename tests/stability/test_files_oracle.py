@@ -18,9 +18,9 @@ WRONG = [
     ("columns", "reaction_y", 1.001),
     ("hertz", "contact_normal_force", 1.02),
     ("hertz", "top", 1.07),
-    ("hertz", "pair_pressure", -1.0),
+    ("hertz", "contact_pressure", -1.0),
     ("dragged", "contact_tangential_force", 1.02),
-    ("dragged", "pair_shear", 1.02),
+    ("dragged", "contact_shear", 1.02),
     ("dragged", "reaction_x", -1.0),
 ]
 

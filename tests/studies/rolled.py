@@ -61,7 +61,7 @@ def data_set(
             "status": (sweep, np.full(shape, OK, dtype=object)),
             "message": (sweep, np.full(shape, "", dtype=object)),
             "residual_profile": ((*sweep, "pass", "station", "component", "depth"), stress),
-            "plastic_strain_profile": ((*sweep, "pass", "station", "depth"), strain),
+            "profile_plastic_strain": ((*sweep, "pass", "station", "depth"), strain),
         },
         coords={
             "load_ratio": [2.7],

@@ -128,9 +128,11 @@ def test_counts_are_integers_with_a_fill_value_and_other_readers_agree(
 def test_a_dimension_without_coordinate_is_refused() -> None:
     case = next(fake_study().cases())
     lost = Record(
-        parameters=case.parameters, status=Status.OK, fields={"mises_loaded": (("x",), np.ones(3))}
+        parameters=case.parameters,
+        status=Status.OK,
+        fields={"plastic_strain": (("x",), np.ones(3))},
     )
-    with pytest.raises(ValueError, match="mises_loaded"):
+    with pytest.raises(ValueError, match="plastic_strain"):
         run_dataset(FAKE, case, lost)
 
 

@@ -86,7 +86,7 @@ def test_faces_cover_the_bodies_once(kept: tuple[Study, Store]) -> None:
         assert area == pytest.approx(np.pi / 2 * (9.98**2 - 0.5**2), rel=0.01)
         used = np.unique(corners(run))
         np.testing.assert_array_equal(used, np.arange(run.sizes["mesh_node"]))
-        for name in ("mesh_von_mises", "mesh_stress_xx", "mesh_displacement_y"):
+        for name in ("mesh_mises", "mesh_stress_xx", "mesh_displacement_y"):
             each = run[name]
             assert (each.attrs["mesh"], each.attrs["location"]) == ("mesh", "node")
             assert each.dims == ("time", "mesh_node")
@@ -126,9 +126,7 @@ def test_a_run_of_a_study_is_found_by_its_place(kept: tuple[Study, Store], tmp_p
         assert main(["export", where, "--select", f"load_ratio={load}", "--vtu", str(folder)]) == 0
         mesh = meshio.read(folder / "0-loaded.vtu")
         with open_netcdf(run_of(kept, k)) as run:
-            np.testing.assert_array_equal(
-                mesh.point_data["von_mises"], run["mesh_von_mises"].isel(time=0)
-            )
+            np.testing.assert_array_equal(mesh.point_data["mises"], run["mesh_mises"].isel(time=0))
 
 
 def test_a_run_without_fields_is_refused(

@@ -66,7 +66,8 @@ def press(
     pair = ContactPair(slave=sides[0], master=sides[1], friction=friction)
     model = Model(bodies=(punch, plane), contacts=(pair,))
     solution = solve(model, control=PathControl(load_step=1 / steps, unload_steps=1))
-    x, pressure, shear = solution.contact()
+    acting = solution.contact()
+    x, pressure, shear = acting.X, acting.pressure, -acting.shear  # on the slave
     inside = x[0] <= 0
     order = np.argsort(-x[0, inside])
     status = solution.loaded.state.contacts[0].status

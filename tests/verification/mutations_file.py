@@ -109,7 +109,9 @@ FILE_FAULTS: dict[str, FileFault] = {
     # values
     "a map times 1e-3": FileFault(fault=values(MAP, lambda v: 1e-3 * v), told=MAP),
     "a map transposed": FileFault(fault=values(MAP, turned), told=MAP),
-    "maps swapped": FileFault(fault=swapped("residual_mises", "mises_loaded"), told="mises_loaded"),
+    "extremes swapped": FileFault(
+        fault=swapped("surface_residual_max", "residual_max"), told="surface_residual_max"
+    ),
     "numbers swapped": FileFault(
         fault=swapped("max_plastic_strain_punch", "max_plastic_strain_half_plane"),
         told="max_plastic_strain_punch",
@@ -189,7 +191,7 @@ FILE_FAULTS: dict[str, FileFault] = {
         told="contact_pressure has the fill value 0.0",
     ),
     "a range of what is valid": FileFault(
-        fault=attribute("mises_loaded", valid_max=100.0), told="the valid_max 100.0"
+        fault=attribute("map_mises", valid_max=100.0), told="the valid_max 100.0"
     ),
     "cut short": FileFault(fault=cut_short, told="it cannot be read: OSError"),
     # the mesh

@@ -20,17 +20,17 @@ import solver.contact.system
 import solver.fem.discretisation
 import solver.fem.fields
 import solver.loading.walker
+import solver.results.contact_result
 import solver.results.extremes
 import solver.results.fields
 import solver.results.history
-import solver.results.nodal
+import solver.results.increments
 import solver.results.places
 import solver.results.samples
 import solver.results.shakedown
 import solver.results.singularity
-import solver.results.slave
 import solver.results.steady
-import solver.results.touch
+import solver.results.tractions
 import solver.scenes.rolling
 import solver.scenes.rolling_steady
 from solver.contact.candidates import Candidates
@@ -40,15 +40,15 @@ from solver.fem.heat import Heat
 from solver.fem.loads import Superposed
 from solver.model.loads import InitialStress, Load, Temperature
 from solver.model.model import ContactPair
-from solver.results.asked import Asked
-from solver.results.look import Look
-from solver.results.places import Places, SystemFields
-from solver.results.samples import Nodal, Samples
+from solver.results.contact_result import ContactResult
+from solver.results.fields import SystemFields
+from solver.results.requested import RequestedNumber
+from solver.results.run import FinishedRun
+from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.slave import Slave
-from solver.results.steady import SteadyContact
-from solver.results.touch import SceneContact
-from solver.results.view import Axis, View
+from solver.results.steady import SteadyTractions
+from solver.results.tractions import PairTractions
+from solver.results.view import Axis, Places, View
 from solver.scenes.scene import Scene
 from solver.steady.layers import Layers
 from solver.steady.track import Track
@@ -118,14 +118,14 @@ increments = 2
 name = "again"
 increments = 3
 
-[look]
+[results]
 samples = 11
 map = { x = { start = -0.9, stop = 4.9, num = 9 }, y = { start = -2.9, stop = 3.0, num = 9 } }
-[look.lines.down]
+[results.lines.down]
 body = "lower"
 start = [1.1, 0.0]
 end = [1.6, -2.9]
-[look.points.inside]
+[results.points.inside]
 body = "lower"
 at = [1.3, -0.7]
 
@@ -293,7 +293,7 @@ def first_pass_last(old: Any) -> Any:
     return lambda traces, cycle: old([traces[0]] * len(traces), cycle)
 
 
-# -- looks ----------------------------------------------------------------------------------------
+# -- places ---------------------------------------------------------------------------------------
 
 
 def one_element_aside(old: Any) -> Any:
@@ -334,7 +334,7 @@ def next_node(old: Any) -> Any:
 
 
 def loaded_for_unloaded(patch: Patch) -> None:
-    patch.setattr(Look, "unloaded", Look.loaded)
+    patch.setattr(FinishedRun, "unloaded", FinishedRun.loaded)
 
 
 def other_coordinates(name: str, factor: float) -> Fault:
@@ -351,22 +351,24 @@ def other_coordinates(name: str, factor: float) -> Fault:
 
 
 def aside(old: Any) -> Any:
-    return lambda self, places, stage: old(self, Places(places.body, places.X - 0.05), stage)
+    return lambda self, places, states: old(self, Places(places.body, places.X - 0.05), states)
 
 
 def other_stages(old: Any) -> Any:
-    def reversed_(self: Any, system: Any, stages: Any) -> None:
-        old(self, system, dict(zip(stages, reversed(stages.values()), strict=True)))
-
-    return reversed_
+    return lambda self, places, states: old(self, places, states)[::-1]
 
 
-def back_to_front(old: Any) -> Any:
-    def moved(*args: Any) -> Any:
-        found = old(*args)
-        return found | {"displacement": -found["displacement"]}
+def at_nodes_times(name: str, factor: float) -> Fault:
+    """Return the fault of a field at the nodes that is multiplied."""
 
-    return moved
+    def make(old: Any) -> Any:
+        def other(*args: Any) -> Any:
+            found = old(*args)
+            return found._replace(**{name: factor * getattr(found, name)})
+
+        return other
+
+    return instead(SystemFields, "_at_nodes", make)
 
 
 # -- contact --------------------------------------------------------------------------------------
@@ -376,10 +378,7 @@ def pressure_times(factor: float) -> Fault:
     def make(old: Any) -> Any:
         return lambda *a, **k: tuple(factor * each for each in old(*a, **k))
 
-    return all_of(
-        instead(solver.results.touch, "contact_pressure", make),
-        instead(solver.results.slave, "contact_pressure", make),
-    )
+    return instead(solver.results.contact_result, "contact_pressure", make)
 
 
 def part_times(position: int, factor: float) -> Callable[[Any], Any]:
@@ -433,7 +432,7 @@ def place_turned(old: Any) -> Any:
 
 
 def other_component(patch: Patch) -> None:
-    patch.setitem(solver.results.asked._COMPONENTS, "yy", 0)
+    patch.setitem(solver.results.requested._COMPONENTS, "yy", 0)
 
 
 def largest_of_all(old: Any) -> Any:
@@ -521,26 +520,23 @@ MUTATIONS: dict[str, Mutation] = {
         instead(solver.scenes.rolling, "passes", first_pass_last), "stored"
     ),
     "shear of a wheel against its way": _passed(
-        instead(SteadyContact, "along", part_times(1, -1.0)),
+        instead(SteadyTractions, "along", part_times(1, -1.0)),
         "stored",
         load="contact",
     ),
-    # looks
+    # places
     "sampler one element aside": _pressed(
         instead(solver.fem.fields, "_locate", one_element_aside), "stored"
     ),
     "depth scaled": _pressed(instead(Axis, "place", deeper), "stored"),
-    "shear of Mandel vectors on maps": _pressed(
+    "shear of Mandel vectors": _pressed(
         instead(solver.results.fields, "to_tensor", shear_of_mandel), "stored"
-    ),
-    "shear of Mandel vectors on surfaces": _pressed(
-        instead(solver.results.samples, "to_tensor", shear_of_mandel), "stored"
     ),
     "von Mises stress without shear": _pressed(
         instead(solver.results.fields, "von_mises", without_shear), "stored"
     ),
-    "stress in GPa": _pressed(times(Nodal, "stress", 1e-3), "stored"),
-    "plastic strain in percent": _pressed(times(Nodal, "plastic_strain", 100.0), "stored"),
+    "stress in GPa": _pressed(at_nodes_times("stress", 1e-3), "stored"),
+    "plastic strain in percent": _pressed(at_nodes_times("plastic_strain", 100.0), "stored"),
     "nodal values of the next node": _pressed(
         instead(solver.contact.system, "recovery", next_node), "stored"
     ),
@@ -549,36 +545,36 @@ MUTATIONS: dict[str, Mutation] = {
     "the state under load for the released one": _pressed(loaded_for_unloaded, "stored"),
     "depth told in m": _pressed(other_coordinates("depth", 1e-3), "stored"),
     "x told from the corner": _pressed(other_coordinates("x", -1.0), "stored"),
-    "lines beside their places": _file(instead(SystemFields, "at", aside), "stored"),
-    "stages in another order": _file(instead(SystemFields, "__init__", other_stages), "stored"),
-    "displacement against its way": _file(
-        instead(solver.results.nodal, "nodal_fields", back_to_front), "stored"
-    ),
+    "lines beside their places": _file(instead(SystemFields, "at_places", aside), "stored"),
+    "stages in another order": _file(instead(SystemFields, "at_places", other_stages), "stored"),
+    "displacement against its way": _file(at_nodes_times("displacement", -1.0), "stored"),
     # contact
     "pressure on half the circumference": _fitted(pressure_times(2.0), "stored"),
     "pressure of a unit of thickness": _file(pressure_times(2.0), "stored"),
     "shear on the other body": _fitted(
-        instead(SceneContact, "along", part_times(1, -1.0)), "stored"
+        instead(PairTractions, "along", part_times(1, -1.0)), "stored"
     ),
     "gap opened": _fitted(
-        instead(SceneContact, "along", lambda old: lambda *a: (*old(*a)[:2], old(*a)[2] + 1e-3)),
+        instead(PairTractions, "along", lambda old: lambda *a: (*old(*a)[:2], old(*a)[2] + 1e-3)),
         "stored",
     ),
-    "width for half-width": _pressed(instead(SceneContact, "extent", part_times(0, 2.0)), "stored"),
+    "width for half-width": _pressed(
+        instead(PairTractions, "extent", part_times(0, 2.0)), "stored"
+    ),
     "peak pressure too high": _pressed(
-        instead(SceneContact, "extent", part_times(1, 1.01)), "stored"
+        instead(PairTractions, "extent", part_times(1, 1.01)), "stored"
     ),
     "forces told an increment later": _file(
-        instead(solver.results.places, "_in_order", later), "stored"
+        instead(solver.results.increments, "_in_order", later), "stored"
     ),
     "reactions as actions": _file(instead(solver.results.history, "observe", other_way), "stored"),
     # numbers
     "integral times 1e-3": _file(
-        instead(Asked, "_found", number_times("integral", 1e-3)), "stored"
+        instead(RequestedNumber, "_found", number_times("integral", 1e-3)), "stored"
     ),
-    "length of contact times 1.05": _file(instead(Slave, "length", longer), "stored"),
+    "length of contact times 1.05": _file(instead(ContactResult, "length", longer), "stored"),
     "another component sought": _file(other_component, "stored"),
-    "place of an extreme turned": _file(instead(Asked, "_found", place_turned), "stored"),
+    "place of an extreme turned": _file(instead(RequestedNumber, "_found", place_turned), "stored"),
     "largest in size for largest": _pressed(
         instead(solver.results.extremes, "_most", largest_of_all), "stored"
     ),

@@ -96,7 +96,7 @@ def strain(case, number=1):
     """Equivalent plastic strain below mid-track, after a pass."""
     record = after(case, number)
     return Profile(
-        record.coordinates["depth"], record.fields["plastic_strain_profile"][1][number - 1, 1]
+        record.coordinates["depth"], record.fields["profile_plastic_strain"][1][number - 1, 1]
     )
 
 

@@ -33,11 +33,11 @@ def fretting(element: float, folder: Path = FOLDER) -> Record:
 
 def forces(record: Record, stage: str) -> tuple[float, float]:
     """Return normal force, and tangential force on the half-plane, at the end of a stage [N]."""
-    at = np.argmin(np.abs(record.fields["moment_time"][1] - STAGES.index(stage) - 1))
+    at = np.argmin(np.abs(record.fields["increment_time"][1] - STAGES.index(stage) - 1))
     normal, tangential = (
         float(record.fields[f"contact_{kind}_force"][1][0, at]) for kind in ("normal", "tangential")
     )
-    return normal, -tangential
+    return normal, tangential
 
 
 def cattaneo(record: Record, stage: str) -> SlidingCylinders:
@@ -49,8 +49,8 @@ def cattaneo(record: Record, stage: str) -> SlidingCylinders:
 
 def shear(record: Record, stage: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return places, and the shear on the half-plane there: that found, that of the closed form."""
-    x = record.fields["pair_x"][1][0]
-    found = -record.fields["pair_shear"][1][0, STAGES.index(stage)]
+    x = record.fields["contact_x"][1][0]
+    found = record.fields["contact_shear"][1][0, STAGES.index(stage)]
     (_, push), (_, now) = forces(record, "pushed"), forces(record, stage)
     curve = cattaneo(record, stage)
     return x, found, curve.reversed_shear(x, now, push) if stage == "back" else curve.shear(x, now)

@@ -35,7 +35,7 @@ def test_an_elastic_ball_is_the_contact_of_hertz(yielding: str, stiffness: float
     assert found["force"] == pytest.approx(force, rel=1e-4)
     assert found["peak_contact_pressure"] == pytest.approx(1.4 * RE, rel=0.01)
     assert found["approach"] == pytest.approx(a**2 / R, rel=0.01)
-    assert found["contact_radius"] == pytest.approx(a, rel=0.01)
+    assert found["contact_half_width"] == pytest.approx(a, rel=0.01)
     assert HertzBall(interference=a**2 / R, radius=R, modulus=modulus).force == pytest.approx(force)
 
 
@@ -73,7 +73,7 @@ def test_without_hardening_the_crater_is_deepest_and_its_pile_up_highest() -> No
     for name in ("pile_up", "crater_depth"):
         assert none[name] > 1.05 * max(isotropic[name], kinematic[name])
     for found in (none, isotropic, kinematic):
-        assert 1.0 < found["pile_up_radius"] / found["contact_radius"] < 1.3
+        assert 1.0 < found["pile_up_radius"] / found["contact_half_width"] < 1.3
         assert found["crater_depth"] > 5 * found["pile_up"] > 0
 
 
@@ -82,7 +82,7 @@ def test_loaded_again_it_returns_to_the_same_point() -> None:
     cycles = 5
     once, often = pressed(), pressed(cycles=cycles)
     # what is left is the tolerance of the increments
-    for name, share in (("approach", 1e-4), ("contact_radius", 1e-4), ("crater_depth", 1e-3)):
+    for name, share in (("approach", 1e-4), ("contact_half_width", 1e-4), ("crater_depth", 1e-3)):
         assert often.scalars[name] == pytest.approx(once.scalars[name], rel=share)
     force, approach = (often.fields[f"increment_{name}"][1] for name in ("force", "approach"))
     assert len(force) == cycles * (10 + 5) + 1

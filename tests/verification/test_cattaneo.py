@@ -8,7 +8,7 @@ import pytest
 from solver import Amplitude, Body, ContactPair, Displacement, Material, Model, Stage, solve
 from solver.mesh import graded, grid
 from solver.results.stick import stick_half_width
-from solver.results.touch import SceneContact
+from solver.results.tractions import PairTractions
 from tests.reference.cattaneo import SlidingCylinders
 from tests.verification.bodies import NU, E, bent, cells
 from tests.verification.closed_forms import plane_strain_modulus
@@ -68,15 +68,16 @@ def miss(found, wanted, x):
 
 @pytest.mark.parametrize("stage", ["pressed", LITTLE, MUCH, BACK])
 def test_the_push_leaves_the_pressure_of_hertz(solution, stage):
-    (x, _), pressure, _ = solution.contact(0, stage)
+    acting = solution.contact(0, stage)
+    x, pressure = acting.X[0], acting.pressure
     assert miss(pressure, exact(solution, stage).pressure(x), x) < 0.01
     assert solution.audit(stage).passed, solution.audit(stage).violations
 
 
 @pytest.mark.parametrize("stage", [LITTLE, MUCH])
 def test_what_sticks_is_as_wide_as_by_cattaneo_and_mindlin(solution, stage):
-    touch = SceneContact(solution.system, symmetric=False)
-    found = stick_half_width(touch.points(solution.stages[stage]), symmetric=False)
+    tractions = PairTractions(solution.system, symmetric=False)
+    found = stick_half_width(tractions.points(solution.stages[stage]), symmetric=False)
     _, push = forces(solution, stage)
     assert found == pytest.approx(exact(solution, stage).stick_width(push), rel=0.02)
 
@@ -84,7 +85,8 @@ def test_what_sticks_is_as_wide_as_by_cattaneo_and_mindlin(solution, stage):
 def test_shear_is_that_of_cattaneo_forth_and_of_mindlin_back(solution):
     (_, much), (_, back) = forces(solution, MUCH), forces(solution, BACK)
     for stage in (LITTLE, MUCH, BACK):
-        (x, _), _, found = solution.contact(0, stage)
+        acting = solution.contact(0, stage)
+        x, found = acting.X[0], -acting.shear  # on the slave
         curve, (_, push) = exact(solution, stage), forces(solution, stage)
         wanted = curve.shear(x, push) if stage != BACK else curve.reversed_shear(x, back, much)
         assert miss(found, wanted, x) < 0.03, stage

@@ -58,7 +58,7 @@ def pressed_pad(folder: Path, steps: int, sides: int) -> tuple[Record, Errors]:
     errors = {}
     for number, stage in enumerate(STAGES):
         curve = cattaneo(record, stage)
-        pressure = record.fields["pair_pressure"][1][0, number]
+        pressure = record.fields["contact_pressure"][1][0, number]
         errors[f"pressure {stage}"] = off(pressure.max(), curve.peak_pressure)
         if stage != "pressed":
             x, found, wanted = shear(record, stage)

@@ -40,7 +40,8 @@ def pressed(
 
 def from_left(solution: Solution) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return x, pressure and shear along the contact."""
-    x, pressure, shear = solution.contact()
+    acting = solution.contact()
+    x, pressure, shear = acting.X, acting.pressure, acting.shear
     order = np.argsort(x[0])
     return x[0][order], pressure[order], shear[order]
 

@@ -27,7 +27,7 @@ def miss(found: np.ndarray, wanted: np.ndarray, x: np.ndarray) -> float:
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_the_pressure_is_that_of_hertz(record: Record, stage: str) -> None:
-    x, pressure = field(record, "pair_x")[0], field(record, "pair_pressure")
+    x, pressure = field(record, "contact_x")[0], field(record, "contact_pressure")
     found = pressure[0, STAGES.index(stage)]
     curve = cattaneo(record, stage)
     assert miss(found, curve.pressure(x), x) < 0.02
@@ -58,10 +58,10 @@ def test_tension_is_behind_the_contact(record: Record) -> None:
 
 
 def test_slip_is_at_the_edges_alone(record: Record) -> None:
-    x, slip = field(record, "pair_x")[0], np.abs(field(record, "pair_slip")[0, 1])
+    x, slip = field(record, "contact_x")[0], np.abs(field(record, "contact_slip")[0, 1])
     curve = cattaneo(record, "pushed")
     _, push = forces(record, "pushed")
     stick, width = curve.stick_width(push), curve.half_width
-    before = np.abs(field(record, "pair_slip")[0, 0])
+    before = np.abs(field(record, "contact_slip")[0, 0])
     gone = np.abs(slip - before)
     assert gone[np.abs(x) < 0.9 * stick].max() < 0.02 * gone[np.abs(x) < width].max()

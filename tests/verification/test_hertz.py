@@ -76,7 +76,8 @@ def press(per_half_width, element="quad8", slave="cylinder", sliding="small", lo
     master = sides["plane" if slave == "cylinder" else "cylinder"]
     pair = ContactPair(slave=sides[slave], master=master, sliding=sliding)
     solution = solve(Model(bodies=(cylinder, plane), contacts=(pair,)), load=load)
-    position, pressure, _ = solution.contact()
+    acting = solution.contact()
+    position, pressure = acting.X, acting.pressure
     order = np.argsort(position[0])
     return Contact(position[0, order], pressure[order], solution)
 

@@ -53,7 +53,8 @@ def press(slave: str, radius: float, sliding: str = "auto") -> Solution:
 
 def peak_over_hertz(solution: Solution, radius: float) -> float:
     """Return the pressure at the axis / Hertz's, 2 E* a / (pi R): Johnson, eq. 4.24."""
-    x, pressure, _ = solution.contact(deformed=True)
+    acting = solution.contact()
+    x, pressure = acting.X, acting.pressure_deformed
     return float(pressure[x[0].argmin()]) / (2 * MODULUS * radius / (np.pi * RADIUS))
 
 
@@ -70,7 +71,7 @@ def test_the_pressure_of_a_deep_contact_does_not_depend_on_which_body_is_the_sla
     for solution in found.values():
         assert solution.audit().passed, solution.audit().violations
     (soft,) = found["space"].system.interfaces
-    at = found["space"].contact()[0][0].argmin()
+    at = found["space"].contact().X[0].argmin()
     pairing = soft.pairing(found["space"].loaded.state.u)
     assert pairing.deformed[at] / pairing.area[at] < 0.96  # the areas do differ
 
@@ -93,7 +94,7 @@ def test_small_sliding_keeps_the_area_before_loading() -> None:
 def test_the_resultant_of_the_pressure_is_the_force_on_the_deformed_area() -> None:
     solution = press("space", 1.0)
     (interface,) = solution.system.interfaces
-    _, pressure, _ = solution.contact(deformed=True)
+    pressure = solution.contact().pressure_deformed
     area = interface.pairing(solution.loaded.state.u).deformed
     force = solution.loaded.state.contacts[0].normal.sum()
     assert pressure @ area == pytest.approx(force, rel=1e-9)
@@ -102,10 +103,11 @@ def test_the_resultant_of_the_pressure_is_the_force_on_the_deformed_area() -> No
 def test_pressure_and_stress_of_a_deep_contact_mean_the_same() -> None:
     """The pressure balances the stress under it, recovered at the pole to 1 %; both are Hertz's."""
     solution = press("space", 1.0)
-    x, pressure, _ = solution.contact()
+    acting = solution.contact()
+    x, pressure = acting.X, acting.pressure
     pole = float(pressure[x[0].argmin()])
     below = solution.at("space", [[0.0], [0.0]], "loaded")["stress"][1, 0]
     assert -below == pytest.approx(pole, rel=0.01)
     assert pole == pytest.approx(2 * MODULUS / (np.pi * RADIUS), rel=0.01)
-    shared = solution.surface().pressure_deformed[x[0].argmin()]
+    shared = solution.contact().pressure_deformed[x[0].argmin()]
     assert shared > 1.04 * pole

@@ -66,7 +66,8 @@ def stress_error(solution, exact):
 @pytest.mark.parametrize("condense", [False, True], ids=["meshed", "condensed"])
 def test_uniform_pressure_passes_non_matching_meshes(element, state, finer, condense):
     solution = solve(two_blocks(element, state, finer=finer, condense=condense))
-    _, pressure, shear = solution.contact()
+    acting = solution.contact()
+    pressure, shear = acting.pressure, acting.shear
     assert pressure == pytest.approx(np.full_like(pressure, P), rel=ROUNDING)
     assert not shear.any()
     lateral = -NU * P if state == "plane_strain" else 0.0
@@ -77,7 +78,8 @@ def test_uniform_pressure_passes_non_matching_meshes(element, state, finer, cond
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_uniform_pressure_passes_when_the_surfaces_are_paired_anew(element, friction):
     solution = solve(two_blocks(element, sliding="finite", friction=friction))
-    _, pressure, shear = solution.contact(deformed=True)
+    acting = solution.contact()
+    pressure, shear = acting.pressure_deformed, acting.shear
     # the load is P on the area before loading, which plane strain stretches
     stretch = 1 + NU * (1 + NU) * P / E
     assert pressure == pytest.approx(np.full_like(pressure, P / stretch), rel=ROUNDING)
@@ -118,7 +120,7 @@ def on_a_slope(element, friction, pressure):
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_equal_pressure_from_all_sides_passes_an_inclined_contact_without_friction(element):
     solution = solve(on_a_slope(element, 0.0, {"top": P, "right": P}))
-    _, pressure, _ = solution.contact()
+    pressure = solution.contact().pressure
     assert pressure == pytest.approx(np.full_like(pressure, P), rel=ROUNDING)
     assert stress_error(solution, [-P, -P, -2 * NU * P, 0.0]) < ROUNDING
 
@@ -127,7 +129,8 @@ def test_equal_pressure_from_all_sides_passes_an_inclined_contact_without_fricti
 def test_uniaxial_stress_passes_an_inclined_contact_that_sticks(element):
     """Stick needs friction above the slope: shear / pressure = tan(angle) = 0.3."""
     solution = solve(on_a_slope(element, 0.31, {"top": P}))
-    _, pressure, shear = solution.contact()
+    acting = solution.contact()
+    pressure, shear = acting.pressure, acting.shear
     cosine2 = 1 / (1 + SLOPE**2)
     assert pressure == pytest.approx(np.full_like(pressure, P * cosine2), rel=ROUNDING)
     assert np.abs(shear) == pytest.approx(np.full_like(shear, P * SLOPE * cosine2), rel=ROUNDING)
@@ -137,6 +140,7 @@ def test_uniaxial_stress_passes_an_inclined_contact_that_sticks(element):
 def test_an_inclined_contact_below_the_slope_of_friction_does_not_stay_uniform():
     """The oracle above can fail: with friction 0.1 the same contact slips."""
     solution = solve(on_a_slope("quad8", 0.1, {"top": P}))
-    _, pressure, shear = solution.contact()
+    acting = solution.contact()
+    pressure, shear = acting.pressure, acting.shear
     assert np.abs(shear).max() <= 0.1 * pressure.max() * (1 + 1e-6)
     assert stress_error(solution, [0.0, -P, -NU * P, 0.0]) > 0.01

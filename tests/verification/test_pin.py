@@ -32,10 +32,10 @@ def test_contact_angle_and_pressure_are_those_of_persson(
     assert record.scalars["contact_length"] / RADIUS == pytest.approx(exact.angle, rel=0.02)
     peak = exact.pressure(np.zeros(1)).item()
     assert record.scalars["peak_pressure"] == pytest.approx(peak, rel=0.005)
-    _, x = record.fields["pair_x"]
-    _, y = record.fields["pair_y"]
+    _, x = record.fields["contact_x"]
+    _, y = record.fields["contact_y"]
     angle = np.arctan2(x[0], -(y[0] + clearance))
-    _, pressure = record.fields["pair_pressure"]
+    _, pressure = record.fields["contact_pressure"]
     wanted = exact.pressure(angle)
     miss = np.trapezoid(np.abs(pressure[0, 0] - wanted), angle) / np.trapezoid(wanted, angle)
     assert abs(miss) < 0.02

@@ -32,7 +32,8 @@ def press(**fields):
         load=parameters.load_ratio,
         control=PathControl(load_step=parameters.load_step, unload_steps=parameters.unload_steps),
     )
-    x, pressure, _ = solution.contact()
+    acting = solution.contact()
+    x, pressure = acting.X, acting.pressure
     order = np.argsort(-x[0])
 
     def residual_x(body, distance):

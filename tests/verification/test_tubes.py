@@ -70,7 +70,7 @@ def test_a_press_fit_of_equal_lengths_has_the_pressure_of_lame() -> None:
         for a, b in ((0.0, 10.0), (10.0, 30.0))
     )
     fit = PressFit(shaft=inner, hub=outer, interference=0.01)
-    _, pressure, _ = found.contact()
+    pressure = found.contact().pressure
     assert pressure == pytest.approx(fit.pressure, rel=2e-3)
     r, stress = principal(found, "hub", "loaded")
     assert stress[1] == pytest.approx(fit.hub_stress(r)[1], rel=5e-3)
@@ -85,7 +85,7 @@ def test_bodies_apart_come_together_by_as_much_as_they_stand_apart() -> None:
         pair = ContactPair(slave=("hub", "left"), master=("shaft", "right"), **own)
         found = solve(Model(bodies=(shaft, hub), contacts=(pair,)))
         assert found.audit().passed, found.audit().violations
-        return float(found.contact()[1].max())
+        return float(found.contact().pressure.max())
 
     half = pressure(interference=0.005)
     assert pressure(interference=0.01, gap=0.005) == pytest.approx(half, rel=1e-9)
@@ -101,7 +101,7 @@ def test_a_fit_that_yields_is_no_limit_load_however_it_comes() -> None:
     pair = ContactPair(slave=("hub", "left"), master=("shaft", "right"), interference=0.06)
     model = Model(bodies=(shaft, hub), contacts=(pair,))
     found = [solve(model, control=PathControl(load_step=1 / n)) for n in (1, 20)]
-    both = [each.contact()[1].max() for each in found]
+    both = [each.contact().pressure.max() for each in found]
     assert found[0].plastic_strain("hub").max() > 1e-3
     assert both[0] == pytest.approx(both[1], rel=2e-3)
     assert found[1].audit().passed, found[1].audit().violations

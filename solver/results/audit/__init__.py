@@ -4,6 +4,6 @@ Taken from the solver without a check: meshes, supports, the chains of edges of 
 the displacements of condensed bodies. `plain` evaluates bodies without the solver's operators,
 `law` repeats an increment in smaller steps, `surfaces` measures contact on the deformed bodies;
 `bodies`, `pairs` and `forces` make figures of these, and `report` compares them with their limits.
-`stored` and `looked` compare what a run stores with values that `values`, `tractions` and `sources`
+`stored` and `named` compare what a run stores with values that `values`, `tractions` and `sources`
 compute anew.
 """

@@ -11,7 +11,7 @@ from solver.fem.fields import Sampler, recovery
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.results.samples import Bodies
+    from solver.results.fields import Bodies
 
 
 def cut_force(

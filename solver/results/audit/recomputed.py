@@ -82,5 +82,5 @@ class Recomputed(Protocol):
     def acting(self, stage: str, x: Array) -> Acting:
         """Return what acts at places (n,) along the axis of the view."""
 
-    def extent(self, stage: str) -> tuple[float, float]:
-        """Return half-width [mm] and peak [MPa] of the contact."""
+    def extent(self, stage: str) -> tuple[float, float, float]:
+        """Return the least and the largest half-width [mm], and the peak [MPa] of the contact."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from solver.model.motion import TravellingPressure
     from solver.results.audit.recomputed import BodyFields
-    from solver.results.look import Look
+    from solver.results.run import FinishedRun
     from solver.results.view import View
 
     Array = NDArray[np.float64]
@@ -38,15 +38,15 @@ def along(view: View, X: Array) -> Array:
 class OfStates:
     """A run of a system of bodies."""
 
-    def __init__(self, look: Look) -> None:
-        self._look = look
-        self.system: Any = look.system  # of a run by increments it is a `System`
-        self.plain = cache(lambda name: PlainBody(look.system.full(name)))
+    def __init__(self, run: FinishedRun) -> None:
+        self._run = run
+        self.system: Any = run.system  # of a run by increments it is a `System`
+        self.plain = cache(lambda name: PlainBody(run.system.full(name)))
         self.fields = cache(self._fields)
         self.tractions = cache(self._tractions)
 
     def _fields(self, name: str, stage: str) -> BodyFields:
-        state, number = self._look.outcome.points[stage].state, self.system.part(name)
+        state, number = self._run.outcome.points[stage].state, self.system.part(name)
         plastic = state.plastic[number] if self.system.parts[number].meshed else None
         u = self.system.displacement(name, state)
         return StateFields(self.plain(name), u, plastic, state.time)
@@ -75,7 +75,7 @@ class OfStates:
         return fields.displacement, declared
 
     def _tractions(self, pair: int, stage: str) -> Tractions:
-        return Tractions(self.system, pair, self._look.outcome.points[stage])
+        return Tractions(self.system, pair, self._run.outcome.points[stage])
 
     @property
     def _travelling(self) -> TravellingPressure | None:
@@ -83,11 +83,11 @@ class OfStates:
         return next((b.travelling for b in bodies if b.travelling is not None), None)
 
     def _time(self, stage: str) -> float:
-        return float(self._look.outcome.points[stage].state.time)
+        return float(self._run.outcome.points[stage].state.time)
 
     def centre(self, stage: str) -> float:
         """See `Recomputed`."""
-        if stage not in self._look.view.following:
+        if stage not in self._run.view.following:
             return 0.0
         if self._travelling is not None:
             return load_factor(self._travelling.position, self._time(stage))
@@ -105,7 +105,7 @@ class OfStates:
             side = body.periodic and body.box[0]
             return Acting(*hertz(self._travelling, self._time(stage), x, side or 0.0), nowhere)
         found = self.tractions(0, stage)
-        at = along(self._look.view, found.X)
+        at = along(self._run.view, found.X)
         order = np.argsort(at)
         if not found.closed.any():
             nothing = between(x, at[order], np.zeros_like(at))
@@ -119,23 +119,23 @@ class OfStates:
             gap = nowhere
         return Acting(pressure, shear, gap, found.way, found.measured)
 
-    def extent(self, stage: str) -> tuple[float, float]:
+    def extent(self, stage: str) -> tuple[float, float, float]:
         """See `Recomputed`."""
         if not self.system.interfaces:
             moving = self._travelling
             if moving is None:
-                return np.nan, 0.0
+                return np.nan, np.nan, 0.0
             share = load_factor(moving.amplitude, self._time(stage))
-            return moving.half_width, share * moving.peak
+            return moving.half_width, moving.half_width, share * moving.peak
         found = self.tractions(0, stage)
-        x = along(self._look.view, found.X[:, found.closed])
-        if not len(x):
-            return np.nan, 0.0
+        if not found.closed.any():
+            return np.nan, np.nan, 0.0
         pressure = found.pressure(moved=False)
         if not found.known[pressure.argmax()]:
-            return np.nan, float(pressure.max())
-        width = x.max() if self._look.view.symmetric else np.ptp(x) / 2
-        return float(width), float(pressure.max())
+            return np.nan, np.nan, float(pressure.max())
+        patches = np.array(found.patches(along(self._run.view, found.X)))
+        width = float(patches.max() if self._run.view.symmetric else np.ptp(patches) / 2)
+        return width, width, float(pressure.max())
 
 
 def hertz(moving: TravellingPressure, time: float, x: Array, period: float) -> tuple[Array, Array]:

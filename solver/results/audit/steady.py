@@ -245,12 +245,13 @@ class OfPass:
         at, pressure, shear = self._vertices
         return Acting(between(x, at, pressure), between(x, at, shear), nowhere)
 
-    def extent(self, stage: str) -> tuple[float, float]:
+    def extent(self, stage: str) -> tuple[float, float, float]:
         """See `Recomputed`."""
         if self._moving is not None:
             share = load_factor(self._moving.amplitude, float(stage == self._released))
-            return self._moving.half_width, share * self._moving.peak
+            return self._moving.half_width, self._moving.half_width, share * self._moving.peak
         if stage == self._released:
-            return np.nan, 0.0
+            return np.nan, np.nan, 0.0
         at, pressure, _ = self._vertices
-        return float(np.ptp(at[pressure > 0]) / 2), float(pressure.max())
+        width, side = np.ptp(at[pressure > 0]) / 2, np.diff(at).max()  # gaps are not known here
+        return float(width - side), float(width + side), float(pressure.max())

@@ -3,7 +3,7 @@
 It begins at the end of the chain. Of each quantity of a record some values are taken, and those
 where it is largest; they are computed again at the places that view and scene file declare, from
 displacements, internal variables, contact forces and declared loads (`sources`). The sampler, the
-recovery, the looks and the outputs that made the record take no part.
+recovery, the samplers and the outputs that made the record take no part.
 
 Quantities that a scene computes by itself are left out: nothing is declared of them.
 """
@@ -18,19 +18,19 @@ import numpy as np
 
 from solver.results.audit.compared import LEAST_STRAIN, LIMIT, MEASURED, STEADY, Compared, some
 from solver.results.audit.figures import AUDIT
-from solver.results.audit.looked import LookedAt
+from solver.results.audit.named import NamedPlacesCheck
 from solver.results.audit.sources import OfStates, along, between
-from solver.results.audit.values import Located, equivalent, flowed
+from solver.results.audit.values import Located, flowed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from solver.results.asked import Looked
     from solver.results.audit.recomputed import BodyFields, Recomputed
-    from solver.results.look import Look
+    from solver.results.named_places import NamedPlaces
     from solver.results.record import Record
+    from solver.results.run import FinishedRun
     from solver.results.view import View
 
     Array = NDArray[np.float64]
@@ -50,20 +50,20 @@ class Stored:
     names: frozenset[str]
 
 
-def stored(look: Look, record: Record, view: View, looked: Looked | None) -> Stored:
+def stored(run: FinishedRun, record: Record, view: View, places: NamedPlaces | None) -> Stored:
     """Compare a record with values computed anew.
 
     Parameters
     ----------
-    look : the run
+    run : the finished run
     record : what is stored of it
-    view, looked : where the scene looks, as its parameters declare it
+    view, places : where its results are taken, as its parameters declare it
     """
-    source = look.source or OfStates(look)
-    viewed = _Viewed(look, record, view, source)
+    source = run.source or OfStates(run)
+    viewed = _Viewed(run, record, view, source)
     found = viewed.compared()
-    if looked is not None and isinstance(source, OfStates):
-        LookedAt(look, record, looked, source, found, viewed.stress_scale).compare()
+    if places is not None and isinstance(source, OfStates):
+        NamedPlacesCheck(run, record, places, source, found, viewed.stress_scale).compare()
     violations: tuple[str, ...] = ()
     if not found.figure <= LIMIT:
         text = f"{_FIGURE} = {found.figure:.2e} exceeds {LIMIT:.2e}"
@@ -74,8 +74,8 @@ def stored(look: Look, record: Record, view: View, looked: Looked | None) -> Sto
 class _Viewed:
     """What a record stores at the places of its view."""
 
-    def __init__(self, look: Look, record: Record, view: View, source: Recomputed) -> None:
-        self._look, self._record, self._view, self._source = look, record, view, source
+    def __init__(self, run: FinishedRun, record: Record, view: View, source: Recomputed) -> None:
+        self._run, self._record, self._view, self._source = run, record, view, source
         self._out = Compared()
 
     def compared(self) -> Compared:
@@ -118,7 +118,7 @@ class _Viewed:
         source = self._source
         if not isinstance(source, OfStates):
             return
-        for name in self._look.system.names:
+        for name in self._run.system.names:
             for stage in self._view.stages:
                 found, declared = source.held(name, stage)
                 self._out.add("displacement", found, declared, float(np.abs(found).max()))
@@ -128,7 +128,7 @@ class _Viewed:
     @cached_property
     def stress_scale(self) -> float:
         """The largest stress under load, or one that is next to nothing [MPa]."""
-        names = self._view.surfaces or dict.fromkeys(self._look.system.names, "")
+        names = self._view.surfaces or dict.fromkeys(self._run.system.names, "")
         each = [self._source.fields(name, self._view.loaded) for name in names]
         most = max(float(np.nanmax(np.abs(fields.stress))) for fields in each)
         E = max(f.plain.body.material.elasticity.youngs_modulus for f in each)
@@ -160,14 +160,11 @@ class _Viewed:
 
     def _maps(self) -> None:
         x, y, view = self._axis("x"), self._axis("y"), self._view
-        states = {"loaded": view.loaded, "unloaded": view.unloaded}
         single = {
-            "residual_stress": ("unloaded", _itself),
-            "residual_mises": ("unloaded", equivalent),
-            "mises_loaded": ("loaded", equivalent),
-            "stress_difference": ("loaded", _difference),
+            "residual_stress": (view.unloaded, _itself),
+            "stress_difference": (view.loaded, _difference),
         }
-        staged = {"map_stress": _itself, "map_mises": equivalent}
+        staged = {"map_stress": _stress, "map_mises": _mises}
         names = [*single, *staged, "plastic_strain", "map_plastic_strain"]
         there = {name: values for name in names if (values := self._stored(name)) is not None}
         if not there:
@@ -189,15 +186,14 @@ class _Viewed:
                 unsure |= ~where.inside & ~where.outside
             return np.asarray(out)
 
-        for name, (state, of) in single.items():
+        for name, (stage, of) in single.items():
             if name in flat:
-                own = of(sampled(_stress, states[state]))
-                self._against(
-                    name, flat[name][..., at], own, bodies, self.stress_scale, states[state]
-                )
-        for name, of in staged.items():
-            for k, stage in enumerate(view.stages if name in flat else ()):
                 own = of(sampled(_stress, stage))
+                self._against(name, flat[name][..., at], own, bodies, self.stress_scale, stage)
+        for name, nodal in staged.items():
+            for k, stage in enumerate(view.stages if name in flat else ()):
+                own = sampled(nodal, stage)
+                own = own if nodal is _stress else np.maximum(own, 0.0)
                 told = flat[name][k][..., at]
                 self._against(name, told, own, bodies, self.stress_scale, stage)
         strains = {"plastic_strain": (view.unloaded,), "map_plastic_strain": view.stages}
@@ -208,7 +204,7 @@ class _Viewed:
                 self._against(name, values[at], own, bodies, self._strain_scale(values))
 
     def _profiles(self) -> None:
-        stress, strain = self._stored("residual_profile"), self._stored("plastic_strain_profile")
+        stress, strain = self._stored("residual_profile"), self._stored("profile_plastic_strain")
         if stress is None or strain is None:
             return
         station, depth, view = self._axis("station"), self._axis("depth"), self._view
@@ -220,10 +216,10 @@ class _Viewed:
         own = places.of(fields.stress)
         self._against("residual_profile", flat[:, at], own, (places,), self.stress_scale)
         # what a steady pass leaves is interpolated as recovered
-        steady = self._look.source is not None
+        steady = self._run.source is not None
         own = np.maximum(places.of(fields.accumulated if steady else flowed(fields)), 0.0)
         scale = self._strain_scale(strain)
-        name = "plastic_strain_profile"
+        name = "profile_plastic_strain"
         self._against(name, strain.ravel()[at], own, (places,), scale)
 
     def _surfaces(self) -> None:
@@ -242,8 +238,7 @@ class _Viewed:
             nodes = fields.plain.part.boundary_nodes(view.surfaces[name])
             reached = along(self._view, fields.plain.part.X[:, nodes])
             order = np.argsort(reached)
-            most = float(np.max(fields.at_points[1]))
-            values = np.clip(fields.mises[nodes][order], 0.0, most)
+            values = _mises(fields)[nodes][order]
             centre = self._source.centre(stage)
             own = between(s + centre, reached[order], values)
             self._out.add("surface_mises", mises[k], own, self.stress_scale)
@@ -252,6 +247,8 @@ class _Viewed:
 
     def _contact(self) -> None:
         """Compare pressure, shear and gap along the surface, half-width and peak."""
+        if not len(self._view.s):
+            return
         lines = [self._stored(f"contact_{name}") for name in ("pressure", "shear", "gap")]
         if any(line is None for line in lines):
             return
@@ -259,7 +256,7 @@ class _Viewed:
         for k, stage in enumerate(self._view.stages):
             x = self._axis("s") + self._source.centre(stage)
             own = self._source.acting(stage, x)
-            width, peak = self._source.extent(stage)
+            least, most, peak = self._source.extent(stage)
             scale = max(peak, LEAST_STRAIN * self.stress_scale)
             self._out.add("contact_pressure", pressure[k], own.pressure, scale)
             self._out.add("contact_shear", shear[k], own.shear, scale)
@@ -270,16 +267,18 @@ class _Viewed:
             self._out.add("contact_gap", gap[k], faced, own.way, share)
             if stage == self._view.loaded:
                 self._number("peak_contact_pressure", peak, peak)
-                self._number("contact_half_width", width, width)
+                # the edge is found by gaps
+                width = np.clip(self._record.scalars["contact_half_width"], least, most)
+                self._number("contact_half_width", width, most, share)
 
-    def _number(self, name: str, own: float, scale: float) -> None:
+    def _number(self, name: str, own: float, scale: float, share: float = 1.0) -> None:
         if name in self._record.scalars:
-            self._out.add(name, self._record.scalars[name], own, scale)
+            self._out.add(name, self._record.scalars[name], own, scale, share)
 
     def _extremes(self) -> None:
         """Compare the largest and smallest residual stresses, and the largest plastic strain."""
         numbers = self._record.scalars
-        bodies = self._look.system.names
+        bodies = self._run.system.names
         if "max_plastic_strain" in numbers:
             each = [self._source.fields(name, self._view.unloaded).at_points for name in bodies]
             y, flow = (np.concatenate([np.atleast_2d(one[k])[-1] for one in each]) for k in (0, 2))
@@ -329,6 +328,10 @@ class _Viewed:
 
 def _stress(fields: BodyFields) -> Array:
     return fields.stress
+
+
+def _mises(fields: BodyFields) -> Array:
+    return fields.mises
 
 
 def _itself(values: Array) -> Array:

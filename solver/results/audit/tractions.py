@@ -144,28 +144,31 @@ class Tractions:
         """Return the shear on the slave along its surface [MPa]."""
         return self.over_area(self._contact.tangential, moved=moved)
 
+    def patches(self, x: Array) -> list[tuple[float, float]]:
+        """Return from where to where the bodies touch along x (n,), growing or falling [mm].
+
+        The power 2/3 of the gap grows linearly from a smooth edge: its line through the second
+        and third open vertex is followed back, no farther than to the next vertex.
+        """
+        opened = np.cbrt(np.where(self.closed, np.nan, self.gap)) ** 2
+        ends = []
+        for way in (-1, 1):
+            beyond = np.roll(self.closed, -way)
+            beyond[-1 if way > 0 else 0] = False
+            for last in np.flatnonzero(self.closed & ~beyond):
+                a, b, c, inner = last + way, last + 2 * way, last + 3 * way, last - way
+                end = x[last]
+                if 0 <= min(a, c) and max(a, c) < len(x) and not self.closed[a]:
+                    steep = (opened[c] - opened[b]) / (x[c] - x[b])
+                    if steep * (x[c] - x[b]) > 0 and opened[b] > 0:
+                        inner = inner if 0 <= inner < len(x) else last
+                        within = sorted((x[a], x[inner]))
+                        end = np.clip(x[b] - opened[b] / steep, *within)
+                ends.append((way, float(end)))
+        starts, stops = ([end for way, end in ends if way == one] for one in (-1, 1))
+        return list(zip(starts, stops, strict=True))
+
     @property
     def length(self) -> float:
-        """Length along which the bodies touch [mm].
-
-        The square of the pressure falls linearly to a smooth edge; that line is drawn through the
-        third, fourth and fifth vertex from the last that touches, within the next edge.
-        """
-        total, n, s = 0.0, len(self.s), self.s
-        square = self.pressure(moved=False) ** 2
-        for way in (1, -1):
-            beyond = np.append(self.closed[1:], False) if way > 0 else np.append(
-                False, self.closed[:-1])  # fmt: skip
-            for last in np.flatnonzero(self.closed & ~beyond):
-                total += way * s[last]
-                inner = last - way * np.array([2, 3, 4])
-                inside = (inner >= 0) & (inner < n)
-                if not (inside.all() and self.closed[inner].all() and 0 <= last + way < n):
-                    continue
-                x = s[inner] - s[last]
-                slope = ((x - x.mean()) * square[inner]).sum() / ((x - x.mean()) ** 2).sum()
-                zero = x.mean() - square[inner].mean() / slope if slope else np.nan
-                edge = abs(s[last + way] - s[last])
-                if slope * way * edge < -_LEVEL * square[inner].max():
-                    total += way * float(np.clip(zero, -edge, edge))
-        return float(total)
+        """Length along which the bodies touch [mm]."""
+        return sum(stop - start for start, stop in self.patches(self.s))

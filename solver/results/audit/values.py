@@ -71,8 +71,9 @@ class StateFields:
 
     @cached_property
     def mises(self) -> Array:
-        """Von Mises stress at the nodes, recovered from the points."""
-        return self.plain.recovered(equivalent(self._points[0]))
+        """Von Mises stress at the nodes, recovered from the points, not above the largest."""
+        points = equivalent(self._points[0])
+        return np.clip(self.plain.recovered(points), 0.0, points.max())
 
     @cached_property
     def accumulated(self) -> Array:
@@ -185,8 +186,10 @@ class PassFields:
 
     @cached_property
     def mises(self) -> Array:
-        """Von Mises stress at the nodes."""
-        return self._with_surface(equivalent(self._points[0]), equivalent(self._surface[0]))
+        """Von Mises stress at the nodes, recovered from the points, not above the largest."""
+        points, surface = equivalent(self._points[0]), equivalent(self._surface[0])
+        most = max(np.nanmax(points), np.nan_to_num(surface).max())
+        return np.clip(self._with_surface(points, surface), 0.0, most)
 
     @cached_property
     def accumulated(self) -> Array:

@@ -15,7 +15,7 @@ Window = Sequence[float]
 
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 MAP = ("y", "x")
-ALONG = ("s", "depth", "increment", "fraction", "moment")
+ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions that one figure of a run runs over: both of a map, or one of these for lines."""
 
 

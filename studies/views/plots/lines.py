@@ -118,7 +118,7 @@ def line_figure(
 
 def _placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
     """Return values along lines or contact surfaces with the distance from their start [mm]."""
-    distance = run.get(f"{str(values.name).partition('_')[0]}_distance")
+    distance = run.get(f"{str(values.name).partition('_')[0]}_s")
     there = distance is not None and set(distance.dims) <= set(values.dims)
     return values.assign_coords({_DISTANCE: distance}) if there else values
 

@@ -135,15 +135,15 @@ def in_units(parameters: RollingParameters) -> RollingParameters:
 
 def roll(parameters: RollingParameters, *, mirror: bool = False, scale: bool = False) -> Passed:
     """Run the passes, or raise what ended them."""
-    look, record = looked_at(ROLLING, parameters)
-    if look.outcome.error is not None:
-        raise look.outcome.error
+    run, record = looked_at(ROLLING, parameters)
+    if run.outcome.error is not None:
+        raise run.outcome.error
     if record.status is Status.AUDIT_FAILED and not bears(parameters):
         raise NotConverged(f"audit: {record.message}")
     return Passed(
         parameters=parameters,
         record=record,
-        look=look,
+        run=run,
         mirrored=looked_at(ROLLING, mirror_of(parameters))[1] if mirror else None,
         scaled=looked_at(ROLLING, in_units(parameters))[1] if scale else None,
         stresses=STRESSES,
@@ -152,13 +152,13 @@ def roll(parameters: RollingParameters, *, mirror: bool = False, scale: bool = F
 
 def judged(passed: Passed) -> dict[str, Figure]:
     """Return the figures; where no steady pass was found, those of a stepped track."""
-    look = passed.look
-    run = {"parameters": look.parameters, "record": passed.record}
-    if look.parameters.endless:
+    run = passed.run
+    given = {"parameters": run.parameters, "record": passed.record}
+    if run.parameters.endless:
         return judge(passed)
-    if look.parameters.load == "hertz":
-        return track.judge(track.Stepped(**run, look=look))
-    rolled = rolling.Rolled(**run, system=look.system, loaded=look.loaded, unloaded=look.unloaded)
+    if run.parameters.load == "hertz":
+        return track.judge(track.Stepped(**given, run=run))
+    rolled = rolling.Rolled(**given, system=run.system, loaded=run.loaded, unloaded=run.unloaded)
     beyond = "small-strain" in passed.record.message  # the wheel leans on what it has pushed up
     return rolling.judge_known(rolled) if beyond else rolling.judge(rolled)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver import Record
-    from solver.results.look import Look
+    from solver.results.run import FinishedRun
     from solver.scenes.rolling_parameters import RollingParameters
 
     Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ class Passed:
 
     parameters: RollingParameters
     record: Record
-    look: Look
+    run: FinishedRun
     mirrored: Record | None = None
     scaled: Record | None = None
     stresses: float = 1.0
@@ -101,8 +101,8 @@ def never_yields(parameters: RollingParameters) -> bool:
 
 def _left(passed: Passed) -> dict[str, float]:
     """Return how far the state after the passes is from one of free layers."""
-    p, look = passed.parameters, passed.look
-    response = look.unloaded.response
+    p, run = passed.parameters, passed.run
+    response = run.unloaded.response
     stress, ep = response.stress / p.yield_stress, response.state.plastic_strain
     nu, E = p.poisson_ratio, p.youngs_modulus / p.yield_stress
     wanted = np.zeros_like(stress)
@@ -126,20 +126,20 @@ def _left(passed: Passed) -> dict[str, float]:
 
 def _positions(passed: Passed) -> np.ndarray:
     """Return where the points are, and those at the surface above the first row (2, n)."""
-    points = passed.look.system.full("half_space").points.reshape(2, -1)
+    points = passed.run.system.full("half_space").points.reshape(2, -1)
     first = points[1] > points[1].max() * (1 + 1e-6)
     return np.concatenate([points, points[:, first] * [[1.0], [0.0]]], axis=1)
 
 
 def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far stress and plastic strain are from the law, where material flows."""
-    p, look = passed.parameters, passed.look
+    p, run = passed.parameters, passed.run
     a, material = p.mesh_width, p.linear_material()
     x, y = _positions(passed)
     x = x * passed.parameters.directions[len(passed.record.coordinates["pass"]) - 1]
     inside = (x < AHEAD * a) & (x > -BEHIND * a) & (y > -DEEP * a)
     found = {}
-    for name, state in (("yield loaded", look.loaded), ("yield left", look.unloaded)):
+    for name, state in (("yield loaded", run.loaded), ("yield left", run.unloaded)):
         stress, plastic = state.response.stress, state.response.state
         ep, total = plastic.plastic_strain, plastic.accumulated
         relative = stress - 2 / 3 * material.kinematic_modulus * ep
@@ -164,9 +164,9 @@ def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
 
 def _balance(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far the stress under load is from what presses on the surface."""
-    look = passed.look
-    part = look.system.full("half_space")
-    stress = look.loaded.response.stress[:, : part.weights.size]
+    run = passed.run
+    part = run.system.full("half_space")
+    stress = run.loaded.response.stress[:, : part.weights.size]
     left = part.internal_force(stress).reshape(-1, 2)
     held = np.ones(part.n, dtype=bool)
     held[part.free] = False

@@ -71,10 +71,10 @@ def _sound(run: Told) -> Figures:
     for pair in pairs:
         name, mu = pair["name"], pair.get("friction", 0.0)
         level = max(abs(run.contact(name, stage)[0]) for stage in run.stages) or 1.0
-        size = max(float(np.nanmax(run.of("pair_pressure", name, s))) for s in run.stages) or 1.0
+        size = max(float(np.nanmax(run.of("contact_pressure", name, s))) for s in run.stages) or 1.0
         for stage in run.stages:
             N, T = run.contact(name, stage)
-            p, q = (run.of(f"pair_{each}", name, stage) for each in ("pressure", "shear"))
+            p, q = (run.of(f"contact_{each}", name, stage) for each in ("pressure", "shear"))
             pull = max(pull, -N / level, -float(np.nanmin(p)) / size)
             beyond = max(beyond, (abs(T) - mu * N) / level,
                          float(np.nanmax(np.abs(q) - mu * p)) / size)  # fmt: skip

@@ -62,7 +62,7 @@ def dragged(number: int, rng: Rng) -> Draw:
         contacts=[{"name": "c", "slave": sides[0], "master": sides[1], "friction": mu,
                    "sliding": str(pick(rng, "auto", "finite"))}],
         stages=stages(*factors, increments=int(pick(rng, 2, 6))),
-        look={"samples": 41},
+        results={"samples": 41},
     )  # fmt: skip
 
     def check(runs: Sequence[Told]) -> Figures:
@@ -107,7 +107,7 @@ def oblique(number: int, rng: Rng) -> Draw:
                 "amplitude": factors}
                for axis, value, factors in (("x", ratio * p, along), ("y", -p, on))],
         stages=stages(*on, increments=int(pick(rng, 1, 4))),
-        look={"samples": 41},
+        results={"samples": 41},
     )  # fmt: skip
 
     def check(runs: Sequence[Told]) -> Figures:
@@ -156,7 +156,7 @@ def caged(number: int, rng: Rng) -> Draw:
         contacts=[{"name": "top", "slave": "disc.n", "master": "high.face", "friction": 0.3},
                   {"name": "bottom", "slave": "disc.s", "master": "low.face", "friction": 0.3}],
         stages=stages("on", increments=int(pick(rng, 1, 4))),
-        look={"samples": 801,
+        results={"samples": 801,
               "points": {"p": {"body": "disc", "at": [0.0, 0.0] if solid else [0.8 * R, 0.0]}}},
         outputs={"most": {"of": "pressure", "contact": "top", "stage": "on"},
                  "least": {"of": "pressure", "contact": "bottom", "stage": "on"}},
@@ -206,7 +206,7 @@ def punched(number: int, rng: Rng) -> Draw:
                    "friction": float(pick(rng, 0.0, 0.3))}],
         singular=[{"at": [side * w, 0.0], "radius": 2 * size} for side in (-1, 1)],
         stages=stages("on", increments=int(pick(rng, 2, 10))),
-        look={"samples": 41},
+        results={"samples": 41},
     )  # fmt: skip
 
     def check(runs: Sequence[Told]) -> Figures:

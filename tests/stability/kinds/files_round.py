@@ -117,7 +117,7 @@ class Pressed(NamedTuple):
             materials={"m": law or self.law}, bodies=bodies, rigid=rigid, loads=loads,
             contacts=[{"name": "c", "slave": slave, "master": master, "friction": self.friction}],
             stages=stages(*names, increments=self.increments * more),
-            look={"samples": 801, "points": {"p": {"body": "block", "at": [a / 2, -a]}}},
+            results={"samples": 801, "points": {"p": {"body": "block", "at": [a / 2, -a]}}},
             outputs={
                 "top": {"of": "pressure", "contact": "c", "stage": names[0]},
                 "across": {"of": "pressure", "take": "extent", "contact": "c", "stage": names[0]},
@@ -229,8 +229,8 @@ def fretting(number: int, rng: Rng) -> Draw:
 
     def check(runs: Sequence[Told]) -> Figures:
         scale = p.friction * p.peak
-        q = [run.of("pair_shear", "c", "to") for run in runs]
-        bears = p.friction * np.mean([run.of("pair_pressure", "c", "to") for run in runs])
+        q = [run.of("contact_shear", "c", "to") for run in runs]
+        bears = p.friction * np.mean([run.of("contact_pressure", "c", "to") for run in runs])
         off = max(float(np.abs(each - q[-1]).mean() / bears) for each in q)
         moved = [run.of("motion_x", "tool", "to") for run in runs]
         return _all(one, runs) | {

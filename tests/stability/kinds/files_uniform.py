@@ -98,7 +98,7 @@ def columns(number: int, rng: Rng) -> Draw:
                    "gap": gap if k == 0 else 0.0, "sliding": sliding} for k in range(count - 1)],
         loads=loads,
         stages=stages("on", "off", "again", increments=increments),
-        look={"samples": 5, "points": {
+        results={"samples": 5, "points": {
             n: {"body": n, "at": [wide / 2, (levels[k] + levels[k + 1]) / 2]}
             for k, n in enumerate(names)}},
     )  # fmt: skip
@@ -162,7 +162,7 @@ def yielding(number: int, rng: Rng) -> Draw:
         loads=[{"body": "high", "kind": "pressure", "boundary": "top", "value": load,
                 "amplitude": {"on": 1.0, "off": 0.0, "again": again}}],
         stages=stages("on", "off", "again", increments=int(pick(rng, 1, 3))),
-        look={"samples": 5, "points": {"p": {"body": "mid", "at": [wide / 3, 3.0]},
+        results={"samples": 5, "points": {"p": {"body": "mid", "at": [wide / 3, 3.0]},
                                        "t": {"body": "high", "at": [wide / 2, 6.0]},
                                        "b": {"body": "mid", "at": [wide / 2, 2.0]}}},
     )  # fmt: skip
@@ -236,7 +236,7 @@ def rings(number: int, rng: Rng) -> Draw:
                 "amplitude": {"fitted": 0, "loaded": 1, "let": 0}}] * (inside > 0)),
         ],
         stages=stages("fitted", "loaded", "let", increments=int(pick(rng, 1, 3))),
-        look={"samples": 11, "points": {
+        results={"samples": 11, "points": {
             name: {"body": name, "at": [m * math.cos(0.6), m * math.sin(0.6)]}
             for name, m in zip(names, mid, strict=True)}},
     )  # fmt: skip

@@ -7,21 +7,21 @@ from typing import Any
 import pytest
 
 from solver import Record, Scene
-from solver.results.look import Look
+from solver.results.run import FinishedRun
 
 
-def looked_at(scene: Scene, parameters: Any) -> tuple[Look, Record]:
+def looked_at(scene: Scene, parameters: Any) -> tuple[FinishedRun, Record]:
     """Run a scene once; return what its outputs looked at, and its record."""
-    seen: list[Look] = []
+    seen: list[FinishedRun] = []
     record_of = Scene.record
 
-    def watched(self: Scene, look: Look) -> Record:
-        seen.append(look)
-        return record_of(self, look)
+    def watched(self: Scene, run: FinishedRun) -> Record:
+        seen.append(run)
+        return record_of(self, run)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Scene, "record", watched)
         value = getattr(parameters, scene.branch)
         (record,) = scene.path(parameters, [value], lambda share: None)
-    (look,) = seen
-    return look, record
+    (run,) = seen
+    return run, record

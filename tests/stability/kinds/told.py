@@ -59,7 +59,7 @@ class Told:
         dims, values = self.record.fields[name]
         names = [str(n) for n in self.record.coordinates[dims[0]]]
         stages = [each["name"] for each in self.tables["stages"]]
-        if dims[1] == "moment":
+        if dims[1] == "increment":
             at = sum(s["increments"] for s in self.tables["stages"][: stages.index(stage) + 1])
             return float(values[names.index(part), at])
         return values[names.index(part), list(self.record.coordinates["stage"]).index(stage)]

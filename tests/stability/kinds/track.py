@@ -21,7 +21,7 @@ from tests.stability.trial import Figure, Scene, tells
 if TYPE_CHECKING:
     from solver import Record
     from solver.contact.state import Converged
-    from solver.results.look import Look
+    from solver.results.run import FinishedRun
 
 COUNT = 3
 SEED = 1968
@@ -35,7 +35,7 @@ class Stepped:
 
     parameters: RollingParameters
     record: Record
-    look: Look
+    run: FinishedRun
 
 
 def parameters_of(number: int, rng: np.random.Generator) -> RollingParameters:
@@ -75,23 +75,23 @@ def parameters_of(number: int, rng: np.random.Generator) -> RollingParameters:
 
 def roll(parameters: RollingParameters) -> Stepped:
     """Run the scene, or raise what ended it."""
-    look, record = looked_at(ROLLING, parameters)
-    if look.outcome.error is not None:
-        raise look.outcome.error
-    return Stepped(parameters=parameters, record=record, look=look)
+    run, record = looked_at(ROLLING, parameters)
+    if run.outcome.error is not None:
+        raise run.outcome.error
+    return Stepped(parameters=parameters, record=record, run=run)
 
 
 def judge(stepped: Stepped) -> dict[str, Figure]:
     """Return the figures: forces and laws from the states under load and after it."""
-    p, record, look = stepped.parameters, stepped.record, stepped.look
+    p, record, run = stepped.parameters, stepped.record, stepped.run
     if not record.status.solved:
         return {"audit": Figure(1.0, 0.0)}
-    loaded, left = look.loaded, look.unloaded
+    loaded, left = run.loaded, run.unloaded
     way = p.directions[-1] * p.friction * p.traction
     pressed, free = _forces(stepped, loaded)
     at_rest, residual = _forces(stepped, left)
-    laws = [law(look.system, "half_space", c) for c in (loaded, left)]
-    totals = [look.system.response("half_space", c).state.accumulated for c in (loaded, left)]
+    laws = [law(run.system, "half_space", c) for c in (loaded, left)]
+    totals = [run.system.response("half_space", c).state.accumulated for c in (loaded, left)]
     yielded = float(totals[1].max())
     return {
         "audit": Figure(0.0, 0.0),
@@ -107,8 +107,8 @@ def judge(stepped: Stepped) -> dict[str, Figure]:
 
 def _forces(stepped: Stepped, converged: Converged) -> tuple[np.ndarray, float]:
     """Return the force (2,) that stress leaves at the surface, and the largest below it [N]."""
-    part = stepped.look.system.full("half_space")
-    stress = stepped.look.system.response("half_space", converged).stress
+    part = stepped.run.system.full("half_space")
+    stress = stepped.run.system.response("half_space", converged).stress
     force = part.internal_force(stress).reshape(-1, 2)
     x, y = part.X
     edge = 1e-9 * float(np.ptp(x))

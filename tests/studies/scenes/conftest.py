@@ -56,9 +56,9 @@ value = 150.0
 name = "pressed"
 increments = 2
 
-[look]
+[results]
 samples = 11
-[look.lines.middle]
+[results.lines.middle]
 body = "lower"
 start = ["$wide/2", 0.0]
 end = ["$wide/2", -2.0]

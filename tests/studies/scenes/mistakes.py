@@ -28,7 +28,7 @@ def rigid(**changes: Any) -> Callable[[Tables], None]:
 
 def seen_on(**x: Any) -> Callable[[Tables], None]:
     along = {"start": -1.0, "stop": 1.0, "num": 9}
-    return put("look", "map", {"x": along | x, "y": along})
+    return put("results", "map", {"x": along | x, "y": along})
 
 
 def without(*path: Any) -> Callable[[Tables], None]:
@@ -215,38 +215,38 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "two have this name",
     ),
     "wrong place of a line": (
-        put("look", "lines", "middle", "radius", 1.0),
-        "look.lines.middle",
+        put("results", "lines", "middle", "radius", 1.0),
+        "results.lines.middle",
         "start and end, or",
     ),
     "map from right to left": (
         seen_on(stop=-1.5),
-        "look.map.x.stop",
+        "results.map.x.stop",
         "must be > start = -1",
     ),
     "map beside the bodies": (
         seen_on(start=20.0, stop=30.0),
-        "look.map",
+        "results.map",
         "must meet a body",
     ),
     "map with half of a grading": (
         seen_on(near=0.0),
-        "look.map.x.size",
+        "results.map.x.size",
         "near and size go together",
     ),
     "map graded to what it has not": (
         seen_on(near=2.0, size=0.1),
-        "look.map.x.near",
+        "results.map.x.near",
         "must be from -1 to 1",
     ),
     "map graded too much": (
         seen_on(near=0.0, size=1e-9),
-        "look.map.x.size",
+        "results.map.x.size",
         "is too small for 9 points",
     ),
     "list of a wrong length": (
-        put("look", "lines", "middle", "end", [1.0]),
-        "look.lines.middle.end[1]",
+        put("results", "lines", "middle", "end", [1.0]),
+        "results.lines.middle.end[1]",
         "must be given",
     ),
     "unknown boundary": (

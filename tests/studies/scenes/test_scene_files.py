@@ -55,13 +55,13 @@ def test_a_block_under_pressure_has_the_stress_of_the_pressure(scene: FileScene)
     assert dims == ("line", "stage", "component", "fraction")
     # free to grow sideways but at the bottom: in the middle of the upper block all is uniaxial
     assert record.scalars["least"] < -150.0
-    _, pressure = record.fields["pair_pressure"]
+    _, pressure = record.fields["contact_pressure"]
     assert pressure[0, 0].mean() == pytest.approx(150.0, rel=0.01)
     _, force = record.fields["contact_normal_force"]
     assert force[0] == pytest.approx([0.0, 300.0, 600.0], abs=1e-6)
     _, reaction = record.fields["reaction_y"]
     assert reaction[1] == pytest.approx([0.0, 300.0, 600.0], abs=1e-6)
-    assert record.fields["moment_time"][1] == pytest.approx([0.0, 0.5, 1.0])
+    assert record.fields["increment_time"][1] == pytest.approx([0.0, 0.5, 1.0])
     assert stress.shape == (1, 1, 4, 11)
 
 
@@ -104,7 +104,7 @@ def test_a_swept_value_that_cannot_be_is_refused_before_it_is_computed() -> None
 def test_a_map_is_fine_where_it_is_asked_to_be() -> None:
     tables = blocks()
     along = {"start": -20.0, "stop": 30.0, "num": 120, "near": 1.0, "size": 0.02}
-    tables["look"]["map"] = {"x": along, "y": along | {"size": 5.0}}
+    tables["results"]["map"] = {"x": along, "y": along | {"size": 5.0}}
     scene = built(tables)
     view = scene.view(scene.parameters())
     assert (view.x[0], view.x[-1], len(view.x)) == (-20.0, 30.0, 120)
@@ -253,11 +253,11 @@ def test_what_a_file_asks_for_is_in_the_table_and_in_pictures(
     np.testing.assert_allclose(y, expected.squeeze())
     assert (x[0], x[-1]) == (0.0, 2.0)  # over the length, not its fraction
     assert lines.axes[0].get_xlabel().endswith("[mm]")
-    lengths = picture(dataset, "pair_pressure", selection={"mu": 0.0}, over="wide").axes[0]
+    lengths = picture(dataset, "contact_pressure", selection={"mu": 0.0}, over="wide").axes[0]
     drawn = [each for each in lengths.lines if len(each.get_xdata()) > 2]
     assert sorted({each.get_xdata()[-1] for each in drawn}) == [2.0, 4.0], "each its own length"
     course = picture(dataset, "contact_normal_force").axes[0]
-    assert course.get_xlabel() == "number of the increment of the program"
+    assert course.get_xlabel() == "number of the increment; 0 is the state before loading"
     with pytest.raises(StudyError, match="lies over fraction, no length: leave it out"):
         picture(dataset, "line_stress", zoom=1.0)
 
@@ -434,7 +434,7 @@ def test_a_map_that_a_swept_value_takes_off_the_bodies_ends_the_run() -> None:
     tables = blocks()
     along = {"start": "$at", "stop": "$at + 1", "num": 5}
     tables["parameters"]["at"] = {"default": 1.0, "unit": "mm", "description": "where one looks"}
-    tables["look"]["map"] = {"x": along, "y": {"start": -1.0, "stop": 0.0, "num": 5}}
+    tables["results"]["map"] = {"x": along, "y": {"start": -1.0, "stop": 0.0, "num": 5}}
     scene = built(tables)
     assert run(scene).status is Status.OK
     with pytest.raises(ModelError, match=r"map = \[50\.0, 51\.0, -1\.0, 0\.0\]: must meet a body"):

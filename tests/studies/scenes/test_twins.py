@@ -55,9 +55,9 @@ def test_the_punch_as_a_file_is_as_far_from_a_finer_one_as_the_built_in_scene(ru
         twin("punch", 0.5714, own, state="plane_stress", accuracy=accuracy, **values)
         for accuracy in ("draft", "standard")
     )
-    for name in ("residual_mises", "plastic_strain", "mises_loaded"):
+    for name, share in (("residual_stress", 1.2), ("plastic_strain", 1.2), ("map_mises", 1.25)):
         mesh_error = distance(known, finer, name)
-        assert distance(own, finer, name) < 1.2 * mesh_error, name
+        assert distance(own, finer, name) < share * mesh_error, name
         assert distance(own, known, name) < mesh_error, name
     s, surface = known.coordinates["s"], known.fields["surface_residual"][1][1, 0]
     at = np.array([25.0, 40.0, 48.0])  # away from the corner, where stress is singular
@@ -65,7 +65,7 @@ def test_the_punch_as_a_file_is_as_far_from_a_finer_one_as_the_built_in_scene(ru
     found, wanted = np.interp(at, lines[1], lines[0]), np.interp(at, s, surface)
     assert found == pytest.approx(wanted, abs=0.02 * np.abs(surface[np.isfinite(surface)]).max())
     peak = known.scalars["peak_contact_pressure"]
-    middle = np.interp(25.0, own.fields["pair_x"][1][0], own.fields["pair_pressure"][1][0, 0])
+    middle = np.interp(25.0, own.fields["contact_x"][1][0], own.fields["contact_pressure"][1][0, 0])
     same = np.interp(25.0, s, known.fields["contact_pressure"][1][0])
     assert middle == pytest.approx(same, abs=0.002 * peak)
 
@@ -77,7 +77,7 @@ def test_the_ball_as_a_file() -> None:
     own = one("ball.toml", traction=-p.force / cap_area(p.radius), a=p.expected_radius)
     for mine, its in (("strain", "max_plastic_strain"), ("peak", "peak_contact_pressure")):
         assert own.scalars[mine] == pytest.approx(known.scalars[its], rel=0.01), mine
-    radius, side = known.scalars["contact_half_width"], p.element_size * p.expected_radius
-    assert radius <= own.scalars["touching"] <= radius + side, "one tells the last that touches"
+    radius = known.scalars["contact_half_width"]
+    assert own.scalars["touching"] == pytest.approx(radius, rel=1e-9)
     force = own.fields["contact_normal_force"][1][0]
     assert force.max() == pytest.approx(p.force, rel=1e-3)

@@ -1,10 +1,10 @@
-"""Numbers that a user asks for: the extreme value, the integral or the extent of a field."""
+"""Numbers that a user requests: the extreme value, the integral or the extent of a field."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +13,10 @@ from solver.results.quantities import Quantity
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.results.look import Values
-    from solver.results.places import Places, SystemFields
+    from solver.results.contact_result import ContactResult
+    from solver.results.fields import Solved, SystemFields
+    from solver.results.run import Values
+    from solver.results.view import Places
 
     Array = NDArray[np.float64]
     Span = tuple[float, float]
@@ -26,7 +28,7 @@ EXTREME = ("maximum", "minimum")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class RequestedNumber:
     """A number of every run; a maximum and a minimum with their place.
 
     Attributes
@@ -74,24 +76,33 @@ class Asked:
         )
 
     def values(
-        self, fields: SystemFields, lines: Mapping[str, Places], contacts: Sequence[str]
+        self,
+        fields: SystemFields,
+        at: Solved,
+        lines: Mapping[str, Places],
+        contacts: Mapping[str, ContactResult],
     ) -> Values:
         """Return the number of a run, NaN where the field is not known.
 
         Parameters
         ----------
+        at : the state at its stage
         lines : those that ``line`` may name
-        contacts : names of the contact pairs
+        contacts : what acts between the surfaces of each contact pair in that state
         """
-        found = self._found(fields, lines, contacts)
+        found = self._found(fields, at, lines, contacts)
         return dict(zip(self.quantities, found, strict=True))
 
     def _found(
-        self, fields: SystemFields, lines: Mapping[str, Places], contacts: Sequence[str]
+        self,
+        fields: SystemFields,
+        at: Solved,
+        lines: Mapping[str, Places],
+        contacts: Mapping[str, ContactResult],
     ) -> tuple[float, ...]:
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
-            return (fields.on_pair(contacts.index(self.contact), self.stage).length,)
-        values, X = self._sought(fields, lines, contacts)
+            return (contacts[self.contact].length,)
+        values, X = self._sought(fields, at, lines, contacts)
         known = np.isfinite(values)
         if not known.any():
             return (np.nan,) * len(self.quantities)
@@ -105,43 +116,32 @@ class Asked:
         return (_positive_length(values, s),)
 
     def _sought(
-        self, fields: SystemFields, lines: Mapping[str, Places], contacts: Sequence[str]
+        self,
+        fields: SystemFields,
+        at: Solved,
+        lines: Mapping[str, Places],
+        contacts: Mapping[str, ContactResult],
     ) -> tuple[Array, Array]:
         """Return the values it is taken of (n,), NaN outside of the box, and where they are."""
         kind, _, part = self.of.partition(".")
         if self.contact is not None:
-            slave = fields.on_pair(contacts.index(self.contact), self.stage)
-            return getattr(slave, kind), slave.X
-        name, body = {"mises": "von_mises"}.get(kind, kind), str(self.body)
+            result = contacts[self.contact]
+            return getattr(result, kind), result.X
+        body = str(self.body)
         if self.line is not None:
-            found, X = fields.at(lines[self.line], self.stage)[name], lines[self.line].X
+            (values,) = fields.at_places(lines[self.line], [at])
+            found, X = getattr(values, kind), lines[self.line].X
         elif kind in ("mises", "plastic_strain"):  # recovered at nodes they may be beyond the law
-            X, mises, strain = fields.at_points(body, self.stage)
+            X, mises, strain = fields.at_points(at, body)
             found = mises if kind == "mises" else strain
         else:
-            found, X = fields.at_nodes(body, self.stage)[name], fields.system.full(body).X
+            found, X = getattr(fields.at_nodes(at, body), kind), fields.system.full(body).X
         values = found[_COMPONENTS[part]] if part else found
         inside = np.ones(X.shape[1], dtype=bool)
-        for at, span in zip(X, (self.x, self.y), strict=True):
+        for x, span in zip(X, (self.x, self.y), strict=True):
             if span is not None:
-                inside &= (at >= span[0]) & (at <= span[1])
+                inside &= (x >= span[0]) & (x <= span[1])
         return np.where(inside, values, np.nan), X
-
-
-class Looked(NamedTuple):
-    """Where a scene file looks, besides its view: what its record has by name.
-
-    Attributes
-    ----------
-    lines, points : in the order of their dimensions
-    contacts : names of the contact pairs
-    asked : numbers of every run
-    """
-
-    lines: Mapping[str, Places]
-    points: Mapping[str, Places]
-    contacts: Sequence[str]
-    asked: Sequence[Asked]
 
 
 def _positive_length(values: Array, s: Array) -> float:

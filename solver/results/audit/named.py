@@ -1,4 +1,4 @@
-"""What a record stores of a scene file's looks, against what is computed anew."""
+"""What a record stores at places that have names, against what is computed anew."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from solver.results.audit.values import Located, flowed
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.results.asked import Asked, Looked
     from solver.results.audit.sources import OfStates
     from solver.results.audit.tractions import Tractions
-    from solver.results.look import Look
+    from solver.results.named_places import NamedPlaces
     from solver.results.record import Record
+    from solver.results.requested import RequestedNumber
+    from solver.results.run import FinishedRun
 
     Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ _ROUNDED = 1e-9
 """Difference of times of the program that is rounding."""
 
 
-class LookedAt:
+class NamedPlacesCheck:
     """Lines, points, contact surfaces, the course of forces and motions, and numbers.
 
     Parameters
@@ -40,16 +41,16 @@ class LookedAt:
 
     def __init__(
         self,
-        look: Look,
+        run: FinishedRun,
         record: Record,
-        looked: Looked,
+        places: NamedPlaces,
         source: OfStates,
         out: Compared,
         stress_scale: float,
     ) -> None:
-        self._look, self._record, self._looked, self._source = look, record, looked, source
+        self._run, self._record, self._places, self._source = run, record, places, source
         self._out = out
-        sizes = [np.ptp(look.system.full(name).X, axis=1).max() for name in look.system.names]
+        sizes = [np.ptp(run.system.full(name).X, axis=1).max() for name in run.system.names]
         length = _LEAST_LENGTH * float(max(sizes))
         self._least = {"stress": stress_scale, "mises": stress_scale,
                        "plastic_strain": LEAST_STRAIN, "displacement": length,
@@ -63,9 +64,9 @@ class LookedAt:
         self._lines()
         self._points()
         self._pairs()
-        self._moments()
-        for asked in self._looked.asked:
-            self._asked(asked)
+        self._increments()
+        for number in self._places.numbers:
+            self._number(number)
 
     def _field(self, name: str) -> Array:
         return np.asarray(self._record.fields[name][1])
@@ -76,11 +77,11 @@ class LookedAt:
     # -- lines and points ------------------------------------------------------------------------
 
     def _lines(self) -> None:
-        for k, line in enumerate(self._looked.lines.values()):
+        for k, line in enumerate(self._places.lines.values()):
             X = np.stack([self._field("line_x")[k], self._field("line_y")[k]])
             self._out.add("line_x", X, line.X, float(np.abs(line.X).max()))
             s = np.append(0.0, np.cumsum(np.hypot(*np.diff(line.X))))
-            self._out.add("line_distance", self._field("line_distance")[k], s, s[-1])
+            self._out.add("line_s", self._field("line_s")[k], s, s[-1])
             stress, mises, strain = (
                 self._field(f"line_{name}")[k] for name in ("stress", "mises", "plastic_strain")
             )
@@ -89,7 +90,7 @@ class LookedAt:
                          strain[..., at])  # fmt: skip
 
     def _points(self) -> None:
-        for k, point in enumerate(self._looked.points.values()):
+        for k, point in enumerate(self._places.points.values()):
             X = np.array([self._field("point_x")[k], self._field("point_y")[k]])
             self._out.add("point_x", X, point.X[:, 0], float(np.abs(point.X).max()))
             stress, mises, strain = (
@@ -97,7 +98,7 @@ class LookedAt:
                 for name in ("stress", "mises", "plastic_strain")
             )
             places = self._fields("point", point.body, point.X, stress, mises, strain)
-            for j, stage in enumerate(self._look.view.stages):
+            for j, stage in enumerate(self._run.view.stages):
                 moved = self._source.fields(point.body, stage).displacement
                 own, scale = places.of(moved)[:, 0], self._scale("displacement", moved)
                 for axis, value in zip("xy", own, strict=True):
@@ -109,7 +110,7 @@ class LookedAt:
     ) -> Located:
         """Compare fields (stage, ..., n) at places (2, n) of a body."""
         places = Located(self._source.plain(body), X)
-        for k, stage in enumerate(self._look.view.stages):
+        for k, stage in enumerate(self._run.view.stages):
             fields = self._source.fields(body, stage)
             for name, told, nodal in (
                 ("stress", stress[k], fields.stress),
@@ -129,28 +130,28 @@ class LookedAt:
         return LIMIT / limit if found.measured else 1.0
 
     def _pairs(self) -> None:
-        for k, _ in enumerate(self._looked.contacts):
-            for j, stage in enumerate(self._look.view.stages):
+        for k, _ in enumerate(self._places.contacts):
+            for j, stage in enumerate(self._run.view.stages):
                 found = self._source.tractions(k, stage)
                 s = np.asarray(self._record.coordinates["fraction"]) * found.s[-1]
-                self._out.add("pair_distance", self._field("pair_distance")[k], s, s[-1])
+                self._out.add("contact_s", self._field("contact_s")[k], s, s[-1])
                 for axis, at in zip("xy", found.X, strict=True):
-                    name, own = f"pair_{axis}", between(s, found.s, at)
+                    name, own = f"contact_{axis}", between(s, found.s, at)
                     self._out.add(name, self._field(name)[k], own, float(np.abs(found.X).max()))
                 for name in ("pressure", "shear", "pressure_deformed", "gap", "slip"):
                     values = _on_slave(found, name)
-                    told = self._field(f"pair_{name}")[k, j]
+                    told = self._field(f"contact_{name}")[k, j]
                     scale = self._scale(name, values)
                     if name in ("gap", "slip"):  # unloaded, what is left of them is rounding
                         scale = max(found.way, self._least[name])
-                    self._out.add(f"pair_{name}", told, between(s, found.s, values), scale,
+                    self._out.add(f"contact_{name}", told, between(s, found.s, values), scale,
                                   self._share(found, name))  # fmt: skip
 
-    def _moments(self) -> None:
+    def _increments(self) -> None:
         """Compare forces and motions at the ends of stages."""
-        times = self._field("moment_time")
-        for stage in self._look.view.stages:
-            state = self._look.outcome.points[stage].state
+        times = self._field("increment_time")
+        for stage in self._run.view.stages:
+            state = self._run.outcome.points[stage].state
             near = np.flatnonzero(np.abs(times - state.time) < _ROUNDED)
             if not len(near):
                 continue
@@ -161,8 +162,8 @@ class LookedAt:
                 finite |= found.measured
                 contact[pair.slave[0]] += found.touching.on_slave.sum(axis=0)
                 contact[pair.master[0]] += found.touching.on_master.sum(axis=0)
-                for name in ("normal", "tangential"):
-                    own = getattr(state.contacts[k], name).sum()
+                for name, sign in (("normal", 1.0), ("tangential", -1.0)):
+                    own = sign * getattr(state.contacts[k], name).sum()
                     told = self._field(f"contact_{name}_force")[k, near[-1]]
                     self._out.add(f"contact_{name}_force", told, own, state.force_scale)
             for j, name in enumerate(self._source.system.all_names):
@@ -170,7 +171,7 @@ class LookedAt:
                 self._part(body, j, int(near[-1]), contact[name], state, measured=finite)
 
     def _part(
-        self, body: Any, j: int, moment: int, contact: Array, state: Any, *, measured: bool
+        self, body: Any, j: int, increment: int, contact: Array, state: Any, *, measured: bool
     ) -> None:
         """Compare the reaction and the motion of a body or rigid body."""
         own = -contact
@@ -181,7 +182,7 @@ class LookedAt:
             ):
                 held = isinstance(motion, Moved)
                 value = load_factor(motion.amplitude, state.time) * motion.value if held else moved
-                self._out.add(name, self._field(name)[j, moment], value,
+                self._out.add(name, self._field(name)[j, increment], value,
                               max(abs(value), self._least["gap"]))  # fmt: skip
         else:
             own = own - self._source.plain(body.name).applied(state.time)
@@ -189,58 +190,61 @@ class LookedAt:
                 own[0] = np.nan  # radial forces are in balance round the axis
         share = LIMIT / MEASURED if measured else 1.0
         for name, value in zip(("reaction_x", "reaction_y"), own, strict=True):
-            told = self._field(name)[j, moment]
+            told = self._field(name)[j, increment]
             if np.isfinite(told):
                 self._out.add(name, told, value, state.force_scale, share)
 
     # -- numbers -----------------------------------------------------------------------------
 
-    def _asked(self, asked: Asked) -> None:
+    def _number(self, number: RequestedNumber) -> None:
         """Compare an extreme value and its place, an integral or an extent."""
-        kind, _, part = asked.of.partition(".")
-        told, share = self._record.scalars[asked.name], 1.0
-        if asked.contact is not None:
-            found = self._source.tractions(self._looked.contacts.index(asked.contact), asked.stage)
+        kind, _, part = number.of.partition(".")
+        told, share = self._record.scalars[number.name], 1.0
+        if number.contact is not None:
+            found = self._source.tractions(
+                self._places.contacts.index(number.contact), number.stage
+            )
             values, X, s = _on_slave(found, kind), found.X, found.s
             share = self._share(found, kind)
             if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
                 return
-            if (kind, asked.take) == ("pressure", "extent"):
-                self._out.add(asked.name, told, found.length, s[-1])
+            if (kind, number.take) == ("pressure", "extent"):
+                share = LIMIT / MEASURED if found.measured else 1.0
+                self._out.add(number.name, told, found.length, s[-1], share)
                 return
             values = np.where(np.isnan(values) & ~found.closed, 0.0, values) if kind in (
                 "pressure", "shear") else values  # fmt: skip
         else:
-            values, X = self._values(asked, kind, part)
+            values, X = self._values(number, kind, part)
             s = np.append(0.0, np.cumsum(np.hypot(*np.diff(X))))
         scale = self._scale(kind, values)
         if not np.isfinite(values).any():
             return
-        if asked.take in ("maximum", "minimum"):
-            own = np.nanmax(values) if asked.take == "maximum" else np.nanmin(values)
-            self._out.add(asked.name, told, own, scale, share)
-            place = [self._record.scalars[f"{asked.name}_{axis}"] for axis in "xy"]
+        if number.take in ("maximum", "minimum"):
+            own = np.nanmax(values) if number.take == "maximum" else np.nanmin(values)
+            self._out.add(number.name, told, own, scale, share)
+            place = [self._record.scalars[f"{number.name}_{axis}"] for axis in "xy"]
             off = np.hypot(*(X - np.array(place)[:, None]))
             there = values[off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()]
             near = np.abs(there[np.isfinite(there)] - own).min(initial=np.inf)
-            self._out.add(f"{asked.name}_x", near, 0.0, scale, share)
-            self._out.add(f"{asked.name}_x", off.min(), 0.0, max(s[-1], self._least["gap"]))
+            self._out.add(f"{number.name}_x", near, 0.0, scale, share)
+            self._out.add(f"{number.name}_x", off.min(), 0.0, max(s[-1], self._least["gap"]))
             return
         values = np.nan_to_num(values)
-        if asked.take == "integral":
+        if number.take == "integral":
             whole, most = (float((v[1:] + v[:-1]) @ np.diff(s) / 2) for v in (values, abs(values)))
-            self._out.add(asked.name, told, whole, max(most, self._least[kind] * s[-1]), share)
+            self._out.add(number.name, told, whole, max(most, self._least[kind] * s[-1]), share)
             return
-        self._out.add(asked.name, told, _above_zero(values, s), s[-1], share)
+        self._out.add(number.name, told, _above_zero(values, s), s[-1], share)
 
-    def _values(self, asked: Asked, kind: str, part: str) -> tuple[Array, Array]:
+    def _values(self, number: RequestedNumber, kind: str, part: str) -> tuple[Array, Array]:
         """Return the values (n,) of a field of a body or line, and where they are (2, n)."""
-        if asked.line is not None:
-            line = self._looked.lines[asked.line]
+        if number.line is not None:
+            line = self._places.lines[number.line]
             body, X = line.body, line.X
         else:
-            body, X = str(asked.body), None
-        fields = self._source.fields(body, asked.stage)
+            body, X = str(number.body), None
+        fields = self._source.fields(body, number.stage)
         if X is None and kind in ("mises", "plastic_strain"):
             X, mises, flow = fields.at_points
             values = mises if kind == "mises" else flow
@@ -251,8 +255,8 @@ class LookedAt:
             values = values[_PARTS[part]] if part else np.maximum(values, 0.0)
             X = fields.plain.part.X if X is None else X
         inside = np.ones(X.shape[1], dtype=bool)
-        for at, span in zip(X, (asked.x, asked.y), strict=True):
-            if span is not None and asked.line is None:
+        for at, span in zip(X, (number.x, number.y), strict=True):
+            if span is not None and number.line is None:
                 inside &= (at >= span[0]) & (at <= span[1])
         return np.where(inside, values, np.nan), X
 
@@ -263,7 +267,7 @@ def _on_slave(found: Tractions, kind: str) -> Array:
         moved = kind == "pressure_deformed"
         return np.where(found.known, found.pressure(moved=moved), np.nan)
     if kind == "shear":
-        return np.where(found.known, found.shear(moved=False), np.nan)
+        return np.where(found.known, -found.shear(moved=False), np.nan)
     touching = found.touching
     return np.where(found.known, touching.gap if kind == "gap" else touching.way, np.nan)
 

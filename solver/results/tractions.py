@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from solver.contact.pressure import contact_pressure
-from solver.contact.problem import STICK
 from solver.fem.wheel import Wheel
+from solver.results.contact_result import ContactResult, contact_result
+from solver.results.fields import kept
 from solver.results.view import ALONG_X, Axis
 
 if TYPE_CHECKING:
@@ -18,12 +17,12 @@ if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.contact.system import System
     from solver.model.motion import TravellingPressure
-    from solver.results.samples import Solved
+    from solver.results.fields import Solved
 
     Array = NDArray[np.float64]
 
 
-class Touch(Protocol):
+class SurfaceTractions(Protocol):
     """Pressure and shear on the lower body, whose surface runs along x."""
 
     def along(self, converged: Any, x: Array) -> tuple[Array, Array, Array]:
@@ -42,93 +41,66 @@ class Touch(Protocol):
     def centre(self, converged: Any) -> float:
         """Return where the load is along x [mm]."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactPoints:
-    """What acts at the contact points of a surface, in the order of x; arrays (n,).
-
-    Attributes
-    ----------
-    x : position along the surface before loading [mm]
-    pressure, shear : [MPa], shear that on the lower body along +s
-    closed : whether the bodies touch there
-    sticking : whether they touch without slip; nowhere without friction
-    """
-
-    x: Array
-    pressure: Array
-    shear: Array
-    closed: NDArray[np.bool_]
-    sticking: NDArray[np.bool_]
+    def points(self, converged: Any) -> ContactResult | None:
+        """Return what acts at the points of a contact along x; None where there is none."""
 
 
-class SceneContact:
-    """The first interface of a system.
+class PairTractions:
+    """The first contact pair of a system, along ``axis``.
 
-    In every scene s grows against the tangent of the slave, along ``axis``. ``symmetric`` means
-    that the other half of the contact is not computed.
+    ``symmetric`` means that the other half of the contact is not computed.
     """
 
     def __init__(self, system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> None:
         self._system = system
         self._symmetric = symmetric
-        self._interface = system.interfaces[0]
-        chain = self._interface.slave_surface
-        self._x = axis.reached(chain.X[:, chain.vertices])
+        self._axis = axis
+        self._goes_on = system.interfaces[0].slave_surface.goes_on
+        self.points = kept(self._points)
 
-    def points(self, converged: Converged) -> ContactPoints:
-        """Return what acts at the vertices of the slave."""
-        contact, order = converged.state.contacts[0], np.argsort(self._x)
-        pressure, shear = contact_pressure(self._system, converged.state, 0)
-        closed = contact.normal > 0
-        stuck = closed & (contact.status == STICK) & (self._interface.friction > 0)
-        return ContactPoints(
-            x=self._x[order],
-            pressure=pressure[order],
-            shear=-shear[order],
-            closed=closed[order],
-            sticking=stuck[order],
-        )
+    def _points(self, converged: Converged) -> ContactResult:
+        """See `SurfaceTractions`."""
+        return contact_result(self._system, converged).along(self._axis)
 
     def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
-        """See `Touch`."""
-        state, order = converged.state, np.argsort(self._x)
-        pressure, shear = contact_pressure(self._system, state, 0)
-        gap = self._interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap
-        known = np.isfinite(gap) & state.contacts[0].normal.any()
-        gap = np.where(known, gap, np.nan)
+        """See `SurfaceTractions`."""
+        found = self.points(converged)
+        gap = found.gap if found.closed.any() else np.full_like(found.gap, np.nan)
 
         def sampled(values: Array, beyond: Array) -> Array:
             left, right = beyond
-            found = np.interp(x, self._x[order], values[order], left=left, right=right)
-            return np.asarray(found)
+            return np.asarray(np.interp(x, found.s, values, left=left, right=right))
 
         # zero pressure beyond the surface of the pair, where the surface of the body goes on
-        free = np.where(self._interface.slave_surface.goes_on, 0.0, np.nan)
-        free = free if self._x[0] < self._x[-1] else free[::-1]
+        free = np.where(self._goes_on, 0.0, np.nan)
+        chain = self._system.interfaces[0].slave_surface
+        first, last = self._axis.reached(chain.X[:, chain.vertices[[0, -1]]])
+        free = free if first < last else free[::-1]
         nowhere = np.full(2, np.nan)
-        return sampled(pressure, free), sampled(-shear, free), sampled(gap, nowhere)
+        return sampled(found.pressure, free), sampled(found.shear, free), sampled(gap, nowhere)
 
     def extent(self, converged: Converged) -> tuple[float, float]:
-        """See `Touch`."""
-        pressure, _ = contact_pressure(self._system, converged.state, 0)
-        x = self._x[converged.state.contacts[0].normal > 0]
-        width = float(x.max() if self._symmetric else np.ptp(x) / 2) if len(x) else 0.0
-        return width, float(pressure.max())
+        """See `SurfaceTractions`."""
+        found = self.points(converged)
+        patches = found.patches
+        if not patches:
+            return 0.0, float(found.pressure.max())
+        start, end = patches[0][0], patches[-1][1]
+        return end if self._symmetric else (end - start) / 2, float(found.pressure.max())
 
     def force(self, converged: Converged) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         return -float(converged.state.contacts[0].tangential.sum())
 
     def centre(self, converged: Converged) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         parts = zip(self._system.parts, converged.state.u, strict=True)
         return next(
             (part.centre[0] + part.hub(u).x for part, u in parts if isinstance(part, Wheel)), 0.0
         )
 
 
-class Prescribed:
+class PrescribedTractions:
     """A travelling pressure; its surface repeats itself after ``period``, unless that is 0."""
 
     def __init__(self, travelling: TravellingPressure, period: float) -> None:
@@ -136,58 +108,65 @@ class Prescribed:
         self._period = period
 
     def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         pressure, ratio = self._travelling.at(converged.state.time, x, self._period)
         return pressure, ratio * pressure, np.full_like(x, np.nan)
 
     def extent(self, converged: Solved) -> tuple[float, float]:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         share, _, _ = self._travelling.now(converged.state.time)
         return self._travelling.half_width, share * self._travelling.peak
 
     def force(self, converged: Solved) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         _, _, ratio = self._travelling.now(converged.state.time)
         width, peak = self.extent(converged)
         return np.pi / 2 * width * peak * ratio
 
     def centre(self, converged: Solved) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
         _, centre, _ = self._travelling.now(converged.state.time)
         return centre
 
+    def points(self, converged: Solved) -> None:
+        """See `SurfaceTractions`."""
+        del converged
 
-class Nothing:
+
+class NoTractions:
     """No contact and no travelling pressure: such a scene lists no output of contact."""
 
     def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
+        del converged
         nowhere = np.full_like(x, np.nan)
         return nowhere, nowhere, nowhere
 
     def extent(self, converged: Solved) -> tuple[float, float]:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
+        del converged
         return np.nan, np.nan
 
     def force(self, converged: Solved) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
+        del converged
         return np.nan
 
     def centre(self, converged: Solved) -> float:
-        """See `Touch`."""
+        """See `SurfaceTractions`."""
+        del converged
         return 0.0
 
+    def points(self, converged: Solved) -> None:
+        """See `SurfaceTractions`."""
+        del converged
 
-def touch_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Touch:
+
+def tractions_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> SurfaceTractions:
     """Return what acts between the bodies of a system, or on one of them."""
     if system.interfaces:
-        return SceneContact(system, symmetric=symmetric, axis=axis)
+        return PairTractions(system, symmetric=symmetric, axis=axis)
     for body in system.model.bodies:
         if body.travelling is not None:
-            return Prescribed(body.travelling, system.full(body.name).period)
-    return Nothing()
-
-
-def contact_points(touch: Touch, converged: Any) -> ContactPoints | None:
-    """Return what acts at the points of a contact; None where pressure does not come of contact."""
-    return touch.points(converged) if isinstance(touch, SceneContact) else None
+            return PrescribedTractions(body.travelling, system.full(body.name).period)
+    return NoTractions()

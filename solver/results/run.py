@@ -13,20 +13,21 @@ if TYPE_CHECKING:
     from solver.model.singular import SingularPoint
     from solver.results.audit.recomputed import Recomputed
     from solver.results.audit.report import Audit
-    from solver.results.samples import Bodies, Samples, Solved
-    from solver.results.touch import Touch
+    from solver.results.fields import Bodies, Solved
+    from solver.results.samples import Samples
+    from solver.results.tractions import SurfaceTractions
     from solver.results.view import View
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
+class FinishedRun:
     """A finished run.
 
     Attributes
     ----------
     parameters : the scene's parameters for this run
     samples : fields of its system at the positions of the scene's view
-    touch : pressure and shear on its lower body
+    tractions : pressure and shear on its lower body
     outcome : the result of its program
     check : () -> its audit, of a complete run
     notes : what the user must know of how it was computed
@@ -36,7 +37,7 @@ class Look:
 
     parameters: Any
     samples: Samples
-    touch: Touch
+    tractions: SurfaceTractions
     outcome: Outcome
     check: Callable[[], Audit]
     notes: tuple[str, ...] = ()
@@ -73,11 +74,11 @@ class Look:
         """States whose contact is recorded, each with the x at which s is zero [mm]."""
         states = [(name, self.outcome.points[name]) for name in self.view.stages]
         following = self.view.following
-        return [(c, self.touch.centre(c) if name in following else 0.0) for name, c in states]
+        return [(c, self.tractions.centre(c) if name in following else 0.0) for name, c in states]
 
 
 Values = Mapping[Quantity, Any]
 """What an output gives: a number or an array for each quantity, over its dimensions."""
 
-Output = Callable[[Look], Values]
+Output = Callable[[FinishedRun], Values]
 """Computes some quantities of a run."""

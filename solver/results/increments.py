@@ -1,0 +1,90 @@
+"""Reactions, motions and contact forces after each increment of a program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.results.contact import CONTACT
+from solver.results.quantities import Quantity, declare
+
+if TYPE_CHECKING:
+    from solver.results.history import Observed
+    from solver.results.run import Values
+
+INCREMENT = declare(
+    "increment", "number of the increment; 0 is the state before loading", dims=("increment",),
+    count=True,
+)  # fmt: skip
+PART = declare("part", "body or rigid body", "", dims=("part",))
+
+_PART, _FORCE = ("part", "increment"), ("contact", "increment")
+INCREMENT_TIME = declare(
+    "increment_time", "time of the program: stages done, or load factor", dims=("increment",)
+)
+REACTION = tuple(
+    declare(f"reaction_{a}", f"force of supports and prescribed motions along {a}", "N", dims=_PART)
+    for a in "xy"
+)
+MOTION = tuple(
+    declare(f"motion_{a}", f"displacement of a rigid body along {a}", "mm", dims=_PART)
+    for a in "xy"
+)
+ROTATION = declare("motion_rotation", "rotation of a rigid body", "rad", dims=_PART)
+NORMAL_FORCE = declare("contact_normal_force", "sum of the normal forces", "N", dims=_FORCE)
+TANGENTIAL_FORCE = declare(
+    "contact_tangential_force", "sum of the tangential forces on the master along s", "N",
+    dims=_FORCE,
+)  # fmt: skip
+
+
+def over_increments(
+    history: Sequence[Observed], times: Sequence[float], parts: Sequence[str], pairs: Sequence[str]
+) -> Values:
+    """Return reactions, motions and contact forces at the ends of the program's increments.
+
+    Parameters
+    ----------
+    history : every increment, those that were cut in parts too
+    times : at which the increments of the program end, the beginning first
+    parts, pairs : names of all bodies, those without a mesh too, and of the contact pairs
+    """
+    kept = _in_order(history, times)
+    lost = (np.nan, np.nan, np.nan)
+    reactions = np.array([[o.reactions.get(p, lost) if o else lost for o in kept] for p in parts])
+    motions = np.array([[o.motions.get(p, lost) if o else lost for o in kept] for p in parts])
+    out: dict[Quantity, Any] = {
+        PART: np.array(list(parts)),
+        INCREMENT: np.arange(len(times)),
+        INCREMENT_TIME: np.array(times),
+        REACTION[0]: reactions[..., 0],
+        REACTION[1]: reactions[..., 1],
+        MOTION[0]: motions[..., 0],
+        MOTION[1]: motions[..., 1],
+        ROTATION: motions[..., 2],
+    }
+    if pairs:
+        none = [lost[:2]] * len(pairs)
+        forces = np.array([o.contact if o else none for o in kept])
+        out |= {
+            CONTACT: np.array(list(pairs)),
+            NORMAL_FORCE: forces[..., 0].T,
+            TANGENTIAL_FORCE: -forces[..., 1].T,
+        }
+    return out
+
+
+def _in_order(history: Sequence[Observed], times: Sequence[float]) -> list[Observed | None]:
+    """Return the increment that ends at each of the times, None where it was not computed."""
+    found: list[Observed | None] = []
+    at = 0
+    for time in times:
+        later = range(at, len(history))
+        near = (k for k in later if math.isclose(history[k].time, time, abs_tol=1e-12))
+        k = next(near, None)
+        found.append(None if k is None else history[k])
+        at = at if k is None else k + 1
+    return found

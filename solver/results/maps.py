@@ -1,0 +1,86 @@
+"""Maps, depth profiles and surfaces: residual stress, plastic strain and stress under load."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.quantities import declare
+from solver.tensors import stress_difference
+
+if TYPE_CHECKING:
+    from solver.results.run import FinishedRun, Values
+
+_MAP = ("y", "x")
+
+RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("component", *_MAP))
+PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain after unloading", dims=_MAP)
+MAP_STRESS = declare("map_stress", "stress", "MPa", dims=("stage", "component", *_MAP))
+MAP_MISES = declare("map_mises", "von Mises stress", "MPa", dims=("stage", *_MAP))
+MAP_PLASTIC_STRAIN = declare(
+    "map_plastic_strain", "equivalent plastic strain", dims=("stage", *_MAP)
+)
+STRESS_DIFFERENCE = declare(
+    "stress_difference",
+    "difference of the principal stresses in the plane under load", "MPa", dims=_MAP,
+)  # fmt: skip
+RESIDUAL_PROFILE = declare(
+    "residual_profile", "residual stress along depth", "MPa",
+    dims=("station", "component", "depth"),
+)  # fmt: skip
+PROFILE_PLASTIC_STRAIN = declare(
+    "profile_plastic_strain",
+    "equivalent plastic strain along depth after unloading",
+    dims=("station", "depth"),
+)
+SURFACE_RESIDUAL = declare(
+    "surface_residual", "residual stress at the contact surface", "MPa",
+    dims=("body", "component", "s"),
+)  # fmt: skip
+SURFACE_MISES = declare(
+    "surface_mises", "von Mises stress at the surface of the lower body", "MPa",
+    dims=("stage", "s"),
+)  # fmt: skip
+
+
+def maps(run: FinishedRun) -> Values:
+    """Return maps around the contact: of bodies that are not released in every stage."""
+    samples = run.samples
+
+    def staged(name: str) -> np.ndarray:
+        return np.stack([samples.on_map(name, at) for at, _ in run.stages])
+
+    if not run.view.unloaded:
+        return {
+            MAP_STRESS: staged("stress"),
+            MAP_MISES: staged("mises"),
+            MAP_PLASTIC_STRAIN: staged("plastic_strain"),
+        }
+    return {
+        RESIDUAL_STRESS: samples.on_map("stress", run.unloaded),
+        PLASTIC_STRAIN: samples.on_map("plastic_strain", run.unloaded),
+        MAP_MISES: staged("mises"),
+    }
+
+
+def isochromatics(run: FinishedRun) -> Values:
+    """Return the map whose contours are isochromatics: twice the largest shear in the plane."""
+    return {STRESS_DIFFERENCE: stress_difference(run.samples.on_map("stress", run.loaded))}
+
+
+def profiles(run: FinishedRun) -> Values:
+    """Return residual stress and plastic strain along depth."""
+    return {
+        RESIDUAL_PROFILE: run.samples.profile("stress", run.unloaded).swapaxes(0, 1),
+        PROFILE_PLASTIC_STRAIN: run.samples.profile("plastic_strain", run.unloaded),
+    }
+
+
+def surfaces(run: FinishedRun) -> Values:
+    """Return residual stress along the contact surfaces, and von Mises stress of the lower one."""
+    samples, bodies = run.samples, run.view.surfaces
+    return {
+        SURFACE_RESIDUAL: np.stack([samples.on_surface("stress", b, run.unloaded) for b in bodies]),
+        SURFACE_MISES: np.stack([samples.surface_mises(at, x) for at, x in run.stages]),
+    }

@@ -1,0 +1,63 @@
+"""Places that have names, and all that is stored at them: lines, points, contacts, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from solver.results.contact import contacts
+from solver.results.increments import over_increments
+from solver.results.places import along_lines, at_points
+from solver.results.view import Places
+
+if TYPE_CHECKING:
+    from solver.results.requested import RequestedNumber
+    from solver.results.run import FinishedRun, Values
+
+
+class NamedPlaces(NamedTuple):
+    """Places that have names, besides the view of a scene, and the numbers requested of a run.
+
+    Attributes
+    ----------
+    lines, points : in the order of their dimensions
+    contacts : names of the contact pairs
+    numbers : requested of every run
+    samples : positions along each contact
+    """
+
+    lines: Mapping[str, Places]
+    points: Mapping[str, Places]
+    contacts: Sequence[str]
+    numbers: Sequence[RequestedNumber]
+    samples: int
+
+
+def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float]) -> Values:
+    """Return all that is stored at places that have names, and after each increment.
+
+    Parameters
+    ----------
+    times : at which the increments of the program end, the beginning first
+    """
+    from solver.results.contact_result import contact_result  # only who computes needs the solver
+
+    system: Any = run.system
+    fields = run.samples.fields
+    states: list[Any] = [state for state, _ in run.stages]
+    results = [
+        [contact_result(system, at, k) for at in states] for k in range(len(places.contacts))
+    ]
+    out: dict[Any, Any] = {}
+    if places.lines:
+        out |= along_lines(fields, places.lines, states)
+    if places.points:
+        out |= at_points(fields, places.points, states)
+    if places.contacts:
+        out |= contacts(results, places.contacts, places.samples)
+    out |= over_increments(run.outcome.history, times, system.all_names, places.contacts)
+    for number in places.numbers:
+        k = run.view.stages.index(number.stage)
+        acting = {name: of[k] for name, of in zip(places.contacts, results, strict=True)}
+        out |= number.values(fields, states[k], places.lines, acting)
+    return out

@@ -1,0 +1,75 @@
+"""Where the results of a scene file are taken: map, lines, points, contacts, and numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.results.named_places import NamedPlaces
+from solver.results.requested import RequestedNumber
+from solver.results.view import Places, View
+from studies.scenes import tables
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_NOWHERE = np.zeros(0)
+
+
+def view_of(scene: tables.SceneFile) -> View:
+    """Return the map grid and the states; see `places_of` for lines, points and contacts."""
+    names = scene.stage_names
+    released = "unloaded" if scene.loading else _released(scene)
+    under_load = [name for name in names if name != released]
+    grid = scene.results.map
+    return View(
+        x=grid.x.positions() if grid else _NOWHERE,
+        y=grid.y.positions() if grid else _NOWHERE,
+        depth=_NOWHERE,
+        station=_NOWHERE,
+        s=_NOWHERE,
+        profile_body=next(iter(scene.bodies)),
+        surfaces=dict.fromkeys(scene.bodies, ""),
+        stages=tuple(names),
+        loaded=under_load[-1] if under_load else names[-1],
+        unloaded=released,
+        symmetric=scene.symmetric,
+    )
+
+
+def _released(scene: tables.SceneFile) -> str:
+    """Return the name of the last stage, if the bodies are released in it."""
+    last = scene.stages[-1]
+    return last.name if last.release and len(scene.stages) > 1 else ""
+
+
+def numbers_of(scene: tables.SceneFile) -> list[RequestedNumber]:
+    """Return the numbers that a scene file requests of every run."""
+    return [RequestedNumber(name=name, **each.model_dump()) for name, each in scene.outputs.items()]
+
+
+def places_of(scene: tables.SceneFile) -> NamedPlaces:
+    """Return the places that a scene file names, and the numbers that it requests."""
+    taken = scene.results
+    return NamedPlaces(
+        lines={
+            n: Places(line.body, places(line, taken.samples)) for n, line in taken.lines.items()
+        },
+        points={n: Places(at.body, np.array(at.at)[:, None]) for n, at in taken.points.items()},
+        contacts=[contact.name for contact in scene.contacts],
+        numbers=numbers_of(scene),
+        samples=taken.samples,
+    )
+
+
+def places(line: tables.LineResultTable, samples: int) -> Array:
+    """Return the points of a line (2, n) [mm]."""
+    if line.start is not None and line.end is not None:
+        return np.linspace(line.start, line.end, samples).T
+    assert line.centre is not None and line.angles is not None
+    angle = np.radians(np.linspace(*line.angles, samples))
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(np.array(line.centre)[:, None] + line.radius * circle)
