@@ -73,8 +73,8 @@ class BodyValues(NamedTuple):
     ----------
     displacement : (2, n) [mm]
     stress : (4, n) recovered, components xx, yy, zz, xy [MPa]
-    mises : (n,) von Mises stress, recovered from the integration points and not above the largest
-        of them: that of recovered stress would go beyond the strength [MPa]
+    mises : (n,) von Mises stress, recovered from the integration points: that of recovered stress
+        would go beyond the strength [MPa]
     plastic_strain : (n,) equivalent plastic strain, recovered
     """
 
@@ -102,11 +102,10 @@ class SystemFields:
     def _at_nodes(self, at: Solved, body: str) -> BodyValues:
         """Return the fields at the nodes of a body."""
         response = self.system.response(body, at)
-        mises = von_mises(response.stress)
         return BodyValues(
             displacement=self.system.displacement(body, at.state).reshape(-1, 2).T,
             stress=to_tensor(self.recovered(body, response.stress)),
-            mises=np.clip(self.recovered(body, mises), 0.0, mises.max()),
+            mises=not_below_zero(self.recovered(body, von_mises(response.stress))),
             plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
         )
 

@@ -76,12 +76,16 @@ class Samples:
         return to_tensor(self.along_depth(self.fields.recovered(body, points)))
 
     def surface_mises(self, at: Solved, centre: float) -> Array:
-        """Return von Mises stress along s at the surface of the profile body [MPa]."""
+        """Return von Mises stress along s at the surface of the profile body [MPa].
+
+        It is not above the largest at an integration point.
+        """
         name = self.view.profile_body
         body = self.system.full(name)
         nodes = body.boundary_nodes(self.view.surfaces[name])
         nodes = nodes[np.argsort(self.view.axis.reached(body.X[:, nodes]))]
         stress = self.fields.at_nodes(at, name).mises[nodes]
+        stress = np.minimum(stress, self.fields.at_points(at, name)[1].max())
         x = self.view.axis.reached(body.X[:, nodes]) - centre
         beyond = {"left": np.nan, "right": np.nan}
         way = {"period": body.period} if body.period else beyond

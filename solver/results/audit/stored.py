@@ -238,7 +238,8 @@ class _Viewed:
             nodes = fields.plain.part.boundary_nodes(view.surfaces[name])
             reached = along(self._view, fields.plain.part.X[:, nodes])
             order = np.argsort(reached)
-            values = _mises(fields)[nodes][order]
+            most = float(np.max(fields.at_points[1]))
+            values = np.minimum(fields.mises[nodes][order], most)
             centre = self._source.centre(stage)
             own = between(s + centre, reached[order], values)
             self._out.add("surface_mises", mises[k], own, self.stress_scale)

@@ -71,9 +71,8 @@ class StateFields:
 
     @cached_property
     def mises(self) -> Array:
-        """Von Mises stress at the nodes, recovered from the points, not above the largest."""
-        points = equivalent(self._points[0])
-        return np.clip(self.plain.recovered(points), 0.0, points.max())
+        """Von Mises stress at the nodes, recovered from the points."""
+        return np.maximum(self.plain.recovered(equivalent(self._points[0])), 0.0)
 
     @cached_property
     def accumulated(self) -> Array:
@@ -186,10 +185,9 @@ class PassFields:
 
     @cached_property
     def mises(self) -> Array:
-        """Von Mises stress at the nodes, recovered from the points, not above the largest."""
+        """Von Mises stress at the nodes, recovered from the points."""
         points, surface = equivalent(self._points[0]), equivalent(self._surface[0])
-        most = max(np.nanmax(points), np.nan_to_num(surface).max())
-        return np.clip(self._with_surface(points, surface), 0.0, most)
+        return np.maximum(self._with_surface(points, surface), 0.0)
 
     @cached_property
     def accumulated(self) -> Array:
