@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.materials.material import Material
-from solver.mesh import grid, mapped, merged, with_middle
+from solver.mesh import grid, within
+from solver.mesh.grids import around, renamed
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
@@ -44,7 +45,7 @@ def _half_space(parameters: RollingParameters) -> Body:
         )
     return Body(
         name="half_space",
-        mesh=with_middle(grid(x, y), "track", parameters.fine),
+        mesh=within(grid(x, y), "track", ["top"], x=(-parameters.fine, parameters.fine)),
         material=parameters.material(),
         supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
@@ -55,13 +56,10 @@ def _half_space(parameters: RollingParameters) -> Body:
 def _ring(R: float, reach: float, h: float, turned: float) -> Mesh:
     """Return the mesh of a wheel above (0, 0), turned by an angle [rad]; see `wheel_nodes`."""
     angle, radius = wheel_nodes(R, reach, h)
-    ring = with_middle(grid(angle, radius), "rim", reach / R)
-
-    def around(p: np.ndarray) -> np.ndarray:
-        angle = p[0] - turned
-        return np.stack([-p[1] * np.sin(angle), R - p[1] * np.cos(angle)])
-
-    return merged(mapped(ring, around))
+    flat = within(grid(radius, angle), "rim", ["right"], y=(-reach / R, reach / R))
+    lowest = turned - np.pi / 2
+    ring = around(flat.translated((0.0, lowest)), (0.0, R))
+    return renamed(ring, {"inner": "left", "rim": "rim"})
 
 
 def wheel_body(axle: Axle, reach: float, h: float, material: Material) -> Body:
@@ -70,7 +68,7 @@ def wheel_body(axle: Axle, reach: float, h: float, material: Material) -> Body:
         name="wheel",
         mesh=_ring(axle.radius, reach, h, -axle.turned),
         material=material,
-        supports={"bottom": "xy"},
+        supports={"inner": "xy"},
         axle=axle,
     )
 

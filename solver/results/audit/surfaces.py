@@ -16,7 +16,7 @@ from solver.contact.normals import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import Temperature
 from solver.results.audit.plain import load_factor
 
