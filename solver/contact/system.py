@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from solver.contact.interface import Interface
     from solver.contact.state import Converged
+    from solver.fem.frame import RigidMotion
     from solver.fem.part import Part
     from solver.fem.surface import Surface
-    from solver.fem.wheel import Hub
     from solver.materials.state import Response
     from solver.model.loads import Load
     from solver.model.model import Model
@@ -231,10 +231,10 @@ class System:
             self._expanded.append((u, time, found))
         return found
 
-    def axle(self, converged: Converged) -> Hub | None:
+    def axle(self, converged: Converged) -> RigidMotion | None:
         """Return the motion of the first wheel, where there is one."""
         both = zip(self.parts, converged.state.u, strict=True)
-        return next((part.hub(u) for part, u in both if isinstance(part, Wheel)), None)
+        return next((part.motion_of(u) for part, u in both if isinstance(part, Wheel)), None)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
@@ -285,7 +285,7 @@ class System:
             least = min(gap.min() for gap in gaps)
             u[number] = part.lowered(u[number], least)
             for k, gap in zip(own, gaps, strict=True):
-                touching = gap < least + _SET_DOWN * part.radius
+                touching = gap < least + _SET_DOWN * part.frame.radius
                 finite = self.interfaces[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite)
         return replace(state, time=time, u=tuple(u), contacts=tuple(contacts))
