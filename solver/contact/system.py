@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from solver.contact.geometry import Pairing
     from solver.contact.interface import Interface
     from solver.contact.state import Converged
     from solver.fem.frame import RigidMotion
@@ -96,6 +97,8 @@ class System:
 
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
+        # of one state: the rows of a pairing may be large
+        self._paired: deque[tuple[State, int, Pairing]] = deque(maxlen=len(self.interfaces))
         self._check_held()
 
     def _check_held(self) -> None:
@@ -229,6 +232,19 @@ class System:
         found = part.expand(u, time)
         if found is not u:  # of a condensed body: its inside is solved for
             self._expanded.append((u, time, found))
+        return found
+
+    def pairing(self, state: State, pair: int) -> Pairing:
+        """Return how the surfaces of a contact pair lie in a state, paired as its increment did.
+
+        Those of the state last asked for are kept.
+        """
+        for of, number, known in self._paired:
+            if of is state and number == pair:
+                return known
+        finite = state.contacts[pair].finite
+        found = self.interfaces[pair].pairing(state.u, state.time, finite=finite)
+        self._paired.append((state, pair, found))
         return found
 
     def axle(self, converged: Converged) -> RigidMotion | None:

@@ -86,8 +86,7 @@ def _radius(system: Any, converged: Any) -> float:
     Beyond the edge of a contact the gap opens as the distance to the power 3/2. Its power 2/3 at
     the two points next to the edge lies on a line that ends there.
     """
-    interface, state = system.interfaces[0], converged.state
-    chain = interface.slave_surface
+    state, chain = converged.state, system.interfaces[0].slave_surface
     x = chain.X[0, chain.vertices]
     order = np.argsort(x)
     x, closed = x[order], np.flatnonzero(state.contacts[0].normal[order] > 0)
@@ -96,7 +95,7 @@ def _radius(system: Any, converged: Any) -> float:
     last = int(closed[-1])
     # the hat of the first open vertex reaches into the contact
     here = slice(last + 2, last + 4)
-    gap = interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap[order][here]
+    gap = state.contacts[0].gap[order][here]
     if len(gap) < 2 or not (np.isfinite(gap).all() and 0 < gap[0] < gap[1]):
         return float(x[last])
     near, far = gap ** (2 / 3)

@@ -73,7 +73,7 @@ def on_slave(system: System, at: Converged, pair: int) -> Slave:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X), axis=0))])
     pressure, shear = contact_pressure(system, state, pair)
     shared, _ = contact_pressure(system, state, pair, deformed=True)
-    pairing = interface.pairing(state.u, state.time, finite=state.contacts[pair].finite)
+    pairing = system.pairing(state, pair)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
     slip = np.where(np.isfinite(gap), interface.slip(pairing, state.u), np.nan)
     return Slave(s, X, pressure, shear, shared, gap, slip, state.contacts[pair].normal > 0)

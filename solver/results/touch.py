@@ -94,7 +94,7 @@ class SceneContact:
         """See `Touch`."""
         state, order = converged.state, np.argsort(self._x)
         pressure, shear = contact_pressure(self._system, state, 0)
-        gap = self._interface.pairing(state.u, state.time, finite=state.contacts[0].finite).gap
+        gap = state.contacts[0].gap
         known = np.isfinite(gap) & state.contacts[0].normal.any()
         gap = np.where(known, gap, np.nan)
 
