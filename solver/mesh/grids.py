@@ -161,16 +161,6 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
     return ring.with_boundaries({name: renumbered(which) for name, which in names.items()})
 
 
-def around(mesh: Mesh, centre: tuple[float, float]) -> MeshQuad2:
-    """Return a grid over radius [mm] and angle [rad] bent around a centre; boundaries keep names.
-
-    A whole turn is closed: its ends are no boundary any more.
-    """
-    cx, cy = centre
-    bent = mapped(mesh, lambda X: np.stack([cx + X[0] * np.cos(X[1]), cy + X[0] * np.sin(X[1])]))
-    return merged(bent) if np.ptp(mesh.p[1]) > 2 * np.pi * (1 - _SAME) else bent
-
-
 def joined(blocks: Sequence[MeshQuad2]) -> MeshQuad2:
     """Return quadratic meshes as one, without boundaries; nodes in one place are merged."""
     from skfem import MeshQuad, MeshQuad2

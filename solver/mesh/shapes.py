@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.mesh.grids import around, grid, joined, mapped, renamed
+from solver.mesh.grids import grid, joined, mapped, merged, renamed
 from solver.mesh.lines import continued, refined
 
 if TYPE_CHECKING:
@@ -153,9 +153,15 @@ def ring(
     out = _Spread(size, growth).lines("radii", (inner, outer), across)
     turn = _Spread(size / outer, growth).lines("angles", (start, end), along)
     _few((len(out) - 1) * (len(turn) - 1))
-    bent = around(grid(out, turn), centre)
+    cx, cy = centre
+    bent = mapped(
+        grid(out, turn),
+        lambda X: np.stack([cx + X[0] * np.cos(X[1]), cy + X[0] * np.sin(X[1])]),
+    )
+    if end - start > 2 * np.pi * (1 - _SAME):
+        return renamed(merged(bent), {"inner": "left", "outer": "right"})
     names = {"inner": "left", "outer": "right", "start": "bottom", "end": "top"}
-    return renamed(bent, {new: old for new, old in names.items() if len(bent.boundaries[old])})
+    return renamed(bent, names)
 
 
 def fillet(

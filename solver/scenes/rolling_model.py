@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.materials.material import Material
-from solver.mesh import grid, within
-from solver.mesh.grids import around, renamed
+from solver.mesh import grid, mapped, merged, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
@@ -56,10 +55,13 @@ def _half_space(parameters: RollingParameters) -> Body:
 def _ring(R: float, reach: float, h: float, turned: float) -> Mesh:
     """Return the mesh of a wheel above (0, 0), turned by an angle [rad]; see `wheel_nodes`."""
     angle, radius = wheel_nodes(R, reach, h)
-    flat = within(grid(radius, angle), "rim", ["right"], y=(-reach / R, reach / R))
-    lowest = turned - np.pi / 2
-    ring = around(flat.translated((0.0, lowest)), (0.0, R))
-    return renamed(ring, {"inner": "left", "rim": "rim"})
+    ring = within(grid(angle, radius), "rim", ["top"], x=(-reach / R, reach / R))
+
+    def around(p: np.ndarray) -> np.ndarray:
+        angle = p[0] - turned
+        return np.stack([-p[1] * np.sin(angle), R - p[1] * np.cos(angle)])
+
+    return merged(mapped(ring, around))
 
 
 def wheel_body(axle: Axle, reach: float, h: float, material: Material) -> Body:
@@ -68,7 +70,7 @@ def wheel_body(axle: Axle, reach: float, h: float, material: Material) -> Body:
         name="wheel",
         mesh=_ring(axle.radius, reach, h, -axle.turned),
         material=material,
-        supports={"inner": "xy"},
+        supports={"bottom": "xy"},
         axle=axle,
     )
 
