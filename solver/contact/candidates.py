@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,6 +67,11 @@ class Candidates:
         """Number of candidate vertices."""
         return len(self.friction)
 
+    @property
+    def places(self) -> list[slice]:
+        """For each interface, where its candidates are among all."""
+        return _places(self.vertices)
+
     def bound(self, N: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the largest tangential forces (n,) under normal forces N [N]."""
         return least(bound_lines(self.friction, self.cohesion, self.limit), N)
@@ -128,10 +134,9 @@ class Candidates:
         Forces are the mean of those before and after. Contact then takes work only at vertices
         that open or close within the increment, where the mean is not the true history.
         """
-        normal, friction, at = 0.0, 0.0, 0
-        for state, vertices, gap in zip(before, self.vertices, self.gaps, strict=True):
-            here = slice(at, at + len(vertices))
-            at += len(vertices)
+        normal, friction = 0.0, 0.0
+        each = zip(before, self.vertices, self.gaps, self.places, strict=True)
+        for state, vertices, gap, here in each:
             force = state.normal.copy()
             force[vertices] += self.forces[: self.n][here]
             moved = force > 0
@@ -150,10 +155,8 @@ class Candidates:
         status: NDArray[np.int64],
     ) -> tuple[ContactState, ...]:
         """Return the contact states with these forces and statuses."""
-        out, at = [], 0
-        for state, vertices in zip(before, self.vertices, strict=True):
-            here = slice(at, at + len(vertices))
-            at += len(vertices)
+        out = []
+        for state, vertices, here in zip(before, self.vertices, self.places, strict=True):
             normal, tangential = np.zeros((2, len(state.normal)))
             normal[vertices] = forces[: self.n][here]
             if len(forces) > self.n:
@@ -173,6 +176,12 @@ class Candidates:
             rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
             out.append(replace(new, touching=new.status != OPEN, gap=gap, rates=rates))
         return tuple(out)
+
+
+def _places(vertices: Sequence[NDArray[np.int64]]) -> list[slice]:
+    """Return where the candidates of each interface are among all."""
+    ends = accumulate(map(len, vertices), initial=0)
+    return [slice(first, last) for first, last in pairwise(ends)]
 
 
 def no_candidates(system: System) -> Candidates:
@@ -217,13 +226,10 @@ def find_candidates(
     untimed = np.zeros(n, dtype=bool)
     pieces: list[list[ContactRows]] = [[] for _ in system.parts]
     slips: list[NDArray[np.float64]] = []
-    first = 0
-    for interface, pairing, at, before in zip(
-        system.interfaces, pairings, vertices, start.contacts, strict=True
+    for interface, pairing, at, before, normal in zip(
+        system.interfaces, pairings, vertices, start.contacts, _places(vertices), strict=True
     ):
-        normal = slice(first, first + len(at))
-        tangent = slice(n + first, n + first + len(at))
-        first += len(at)
+        tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         apart[normal] = np.where(before.touching, 0.0, _apart(before, span))[at]

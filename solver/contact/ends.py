@@ -23,12 +23,10 @@ _COVERED = 1 - 1e-6
 
 def beyond_end(system: System, u: tuple[NDArray[np.float64], ...], candidates: Candidates) -> str:
     """Return the message that contact has reached the end of a surface; empty if it has not."""
-    first = 0
-    for interface, vertices, covered in zip(
-        system.interfaces, candidates.vertices, candidates.covered, strict=True
+    for interface, vertices, covered, here in zip(
+        system.interfaces, candidates.vertices, candidates.covered, candidates.places, strict=True
     ):
-        pressed = candidates.forces[first : first + len(vertices)] > 0
-        first += len(vertices)
+        pressed = candidates.forces[here] > 0
         side = _side(interface, u, vertices[pressed], covered[pressed])
         if side is not None:
             body = interface.parts[side].body.name

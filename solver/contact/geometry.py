@@ -19,7 +19,7 @@ import numpy as np
 
 from solver.contact.normals import end_normals
 from solver.fem.surface import at_vertices
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.mesh.shapes import shape_derivatives
+from solver.mesh.edges import shape_derivatives
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.mesh.shapes import shape_functions
+from solver.mesh.edges import shape_functions
 from solver.model.rigid import RigidBody
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ def contact_pressure(
     of them is the slave. The two are one under small sliding.
     """
     contact, chain = state.contacts[interface], system.interfaces[interface].slave_surface
-    pairing = system.interfaces[interface].pairing(state.u, finite=contact.finite)
+    pairing = system.pairing(state, interface)
     safe = np.where(pairing.area > 0, pairing.area, 1.0)
     x = chain.X[:, chain.vertices]
     edge = chain.lengths

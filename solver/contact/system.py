@@ -24,11 +24,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from solver.contact.geometry import Pairing
     from solver.contact.interface import Interface
     from solver.contact.state import Converged
+    from solver.fem.frame import RigidMotion
     from solver.fem.part import Part
     from solver.fem.surface import Surface
-    from solver.fem.wheel import Hub
     from solver.materials.state import Response
     from solver.model.loads import Load
     from solver.model.model import Model
@@ -96,6 +97,8 @@ class System:
 
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
+        # of one state: the rows of a pairing may be large
+        self._paired: deque[tuple[State, int, Pairing]] = deque(maxlen=len(self.interfaces))
         self._check_held()
 
     def _check_held(self) -> None:
@@ -231,10 +234,23 @@ class System:
             self._expanded.append((u, time, found))
         return found
 
-    def axle(self, converged: Converged) -> Hub | None:
+    def pairing(self, state: State, pair: int) -> Pairing:
+        """Return how the surfaces of a contact pair lie in a state, paired as its increment did.
+
+        Those of the state last asked for are kept.
+        """
+        for of, number, known in self._paired:
+            if of is state and number == pair:
+                return known
+        finite = state.contacts[pair].finite
+        found = self.interfaces[pair].pairing(state.u, state.time, finite=finite)
+        self._paired.append((state, pair, found))
+        return found
+
+    def axle(self, converged: Converged) -> RigidMotion | None:
         """Return the motion of the first wheel, where there is one."""
         both = zip(self.parts, converged.state.u, strict=True)
-        return next((part.hub(u) for part, u in both if isinstance(part, Wheel)), None)
+        return next((part.motion_of(u) for part, u in both if isinstance(part, Wheel)), None)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
@@ -285,7 +301,7 @@ class System:
             least = min(gap.min() for gap in gaps)
             u[number] = part.lowered(u[number], least)
             for k, gap in zip(own, gaps, strict=True):
-                touching = gap < least + _SET_DOWN * part.radius
+                touching = gap < least + _SET_DOWN * part.frame.radius
                 finite = self.interfaces[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite)
         return replace(state, time=time, u=tuple(u), contacts=tuple(contacts))

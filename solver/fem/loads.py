@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.surface import edges_of
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
 from solver.tensors import to_mandel
 

@@ -1,17 +1,17 @@
 """A rigid body as the increments see it: three unknowns, finite rotation.
 
-Unknowns are the displacement (x, y) of the centre and the arc that rotation makes at the distance
-of the farthest point. A point is at ``c0 + c + Q (X - c0)``. Motions under a force are free, as
-those of a body held by contact alone; the others are prescribed.
+Unknowns are those of its `MovingFrame`, whose radius is the distance of the farthest point. Motions
+under a force are free, as those of a body held by contact alone; the others are prescribed.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
+from solver.fem.frame import MovingFrame, RigidMotion
 from solver.fem.loads import Superposed
 from solver.fem.operators import Fixed
 from solver.fem.part import Part
@@ -30,14 +30,6 @@ if TYPE_CHECKING:
 _AXIS = 1e-9
 """Ratio of the distance from the axis to the size of the body, below which a point is on the
 axis."""
-
-
-class RigidMotion(NamedTuple):
-    """Displacement of the centre along x and y [mm], counter-clockwise rotation [rad]."""
-
-    x: float
-    y: float
-    rotation: float
 
 
 class Unmoved:
@@ -67,15 +59,16 @@ class RigidPart(Part):
         self.body = body
         self.n = 3
         self._axisymmetric = axisymmetric
-        self.centre = np.asarray(body.centre, dtype=float)
+        centre = np.asarray(body.centre, dtype=float)
         points = [np.asarray(curve.points, dtype=float) for curve in body.surfaces.values()]
         self.nodes = np.hstack(points)
         self._first = dict(zip(
             body.surfaces, np.cumsum([0, *(p.shape[1] for p in points)]).tolist(), strict=False
         ))  # fmt: skip
-        self.arm = float(np.linalg.norm(self.nodes - self.centre[:, None], axis=0).max())
+        arm = float(np.linalg.norm(self.nodes - centre[:, None], axis=0).max())
+        self.frame = MovingFrame(centre=centre, radius=arm)
         # a moment acts as a force at the arm
-        scale = np.diag([1.0, 1.0, self.arm])
+        scale = np.diag([1.0, 1.0, arm])
         moved = [isinstance(motion, Moved) for motion in body.every_load]
         each = list(zip(body.every_load, moved, np.eye(3), scale, strict=True))
         self.loads = Superposed.of(3, ((m, m.value * e / s.sum()) for m, held, e, s in each
@@ -99,7 +92,7 @@ class RigidPart(Part):
         nodes = self._first[boundary] + np.arange(count)
         X = self.nodes[:, nodes]
         depth = None if self._axisymmetric else self.body.thickness
-        on_axis = (np.abs(X[0, [0, -1]]) < _AXIS * self.arm) & self._axisymmetric
+        on_axis = (np.abs(X[0, [0, -1]]) < _AXIS * self.frame.radius) & self._axisymmetric
         start, end = (on and not axis for on, axis in zip(curve.goes_on, on_axis, strict=True))
         return Surface(nodes, np.stack(ends, axis=1), X, depth, (start, end))
 
@@ -107,17 +100,11 @@ class RigidPart(Part):
 
     def motion_of(self, u: Array) -> RigidMotion:
         """Return the motion of the body."""
-        return RigidMotion(float(u[0]), float(u[1]), float(u[2] / self.arm))
-
-    def _from_centre(self, X: Array, u: Array) -> Array:
-        """Return where points (2, n) are from the centre, turned [mm]."""
-        angle = self.motion_of(u).rotation
-        c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s], [s, c]]) @ (X - self.centre[:, None])
+        return self.frame.motion(u)
 
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
-        return self._from_centre(surface.X, u) + (self.centre + u[:2])[:, None] - surface.X
+        return self.frame.displacements(u, surface.X)
 
     def pull_back(
         self, surface: Surface, u: Array, block: Array, gaps: int
@@ -125,9 +112,7 @@ class RigidPart(Part):
         """Return derivative rows on the three unknowns, after their numbers."""
         del gaps
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
-        x, y = self._from_centre(surface.X, u) / self.arm
-        turning = (nodal * np.stack([-y, x], axis=1)).sum(axis=(1, 2))
-        return np.arange(3), np.hstack([nodal.sum(axis=1), turning[:, None]])
+        return np.arange(3), self.frame.rows(u, nodal, self.frame.passing(surface.X))
 
     def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with prescribed motions at their values for a time."""
@@ -142,7 +127,9 @@ class RigidPart(Part):
         """Return by how much it is turned between two times [rad], 0 where it is free to turn."""
         if not self._held[2]:
             return 0.0
-        return float(abs(self._driven.at(after)[2] - self._driven.at(before)[2])) / self.arm
+        return (
+            float(abs(self._driven.at(after)[2] - self._driven.at(before)[2])) / self.frame.radius
+        )
 
     def start(self) -> Array:
         """Return the unknowns (3,) before any load."""

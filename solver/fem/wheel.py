@@ -1,19 +1,19 @@
 """An elastic wheel, condensed to its rim, with finite rotation.
 
-Unknowns are the elastic displacements d of the rim's nodes in the frame of the hub, the
-displacement (cx, cy) of the hub and the arc w = R * rotation. A rim node is at
-``c0 + c + Q(w / R) (X - c0 + d)``; the hub is rigid. The condensed stiffness acts on d alone and
-never changes; rotation enters through the contact rows only. The axle's advance is prescribed;
+Unknowns are the elastic displacements d of the rim's nodes in the frame of the hub, which is rigid,
+and the three of this `MovingFrame`. The condensed stiffness acts on d alone and never changes;
+rotation enters through the contact rows only. The axle's advance is prescribed;
 its height is free and balances the vertical force; rotation is free and balances the moment, or
 is prescribed.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.fem.frame import MovingFrame, RigidMotion, turning
 from solver.fem.loads import Superposed
 from solver.fem.part import same_unknowns
 from solver.fem.substructure import Substructure
@@ -28,18 +28,6 @@ if TYPE_CHECKING:
 _X, _Y, _TURN = range(3)
 
 
-class Hub(NamedTuple):
-    """Motion of a hub: displacement along x and y [mm], counter-clockwise rotation [rad].
-
-    ``arc`` is the rotation times the wheel's radius [mm].
-    """
-
-    x: float
-    y: float
-    arc: float
-    rotation: float
-
-
 class Wheel(Substructure):
     """A part whose unknowns are rim displacements in the hub's frame, then (cx, cy, w)."""
 
@@ -49,8 +37,7 @@ class Wheel(Substructure):
         super().__init__(whole, surfaces, linear_solver)
         axle = whole.body.axle
         assert axle is not None
-        self.centre = np.asarray(axle.centre, dtype=float)
-        self.radius = axle.radius
+        self.frame = MovingFrame(centre=np.asarray(axle.centre, dtype=float), radius=axle.radius)
         self.axle = axle
         self._hub = self.n
         self.n += 3
@@ -66,7 +53,7 @@ class Wheel(Substructure):
         force = np.zeros(self.n)
         force[self._hub + _Y] = -self.axle.force.at(time)
         if self.axle.rotation is None:
-            force[self._hub + _TURN] = self.axle.moment.at(time) / self.radius
+            force[self._hub + _TURN] = self.axle.moment.at(time) / self.frame.radius
         return force
 
     def grows(self, before: float, after: float) -> bool:
@@ -74,38 +61,28 @@ class Wheel(Substructure):
         loads = (self.axle.force, self.axle.moment)
         return any(abs(load.at(after)) > abs(load.at(before)) for load in loads)
 
-    def hub(self, u: NDArray[np.float64]) -> Hub:
+    def motion_of(self, u: NDArray[np.float64]) -> RigidMotion:
         """Return the motion of the hub."""
-        x, y, arc = (float(value) for value in u[self._hub :])
-        return Hub(x, y, arc, arc / self.radius)
+        return self.frame.motion(u[self._hub :])
 
     # -- kinematics ----------------------------------------------------------------------------
-
-    def _frame(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the rotation matrix."""
-        angle = self.hub(u).rotation
-        c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s], [s, c]])
 
     def passing(self, surface: Surface, d: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the motion of material per arc (2, n_nodes), along a rim of constant shape.
 
         ``d`` (2, n_nodes) are the displacements of its nodes in the frame of the hub [mm].
         """
-        x, y = surface.X - self.centre[:, None]
         starts, middles = surface.edges[:, :1], surface.edges[:, 2:]
         chain = np.append(np.hstack([starts, middles]), surface.edges[-1, 1])
         arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(surface.X[:, chain]), axis=0)))
-        out = np.stack([-y, x]) / self.radius
+        out = self.frame.passing(surface.X)
         out[:, chain] += np.gradient(d[:, chain], arc, axis=1)
         return out
 
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
-        Q = self._frame(u)
-        hub = u[self._hub : self._hub + 2, None]
         d = u[surface.dofs].reshape(-1, 2).T
-        return Q @ (surface.X - self.centre[:, None] + d) + self.centre[:, None] + hub - surface.X
+        return self.frame.displacements(u[self._hub :], surface.X, d)
 
     def pull_back(
         self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
@@ -120,13 +97,11 @@ class Wheel(Substructure):
         points in contact it has an error of 1e-4 of force times radius, which would turn a wheel
         that is held by less friction.
         """
-        Q = self._frame(u)
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
-        d = u[surface.dofs].reshape(-1, 2).T
-        turning = (nodal * (Q @ self.passing(surface, d)).T).sum(axis=(1, 2))
-        turning[:gaps] = 0.0
-        hub = nodal.sum(axis=1)
-        rows = np.hstack([(nodal @ Q).reshape(block.shape), hub, turning[:, None]])
+        d, q = u[surface.dofs].reshape(-1, 2).T, u[self._hub :]
+        hub = self.frame.rows(q, nodal, self.passing(surface, d))
+        hub[:gaps, _TURN] = 0.0
+        rows = np.hstack([(nodal @ self.frame.turned(q)).reshape(block.shape), hub])
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
@@ -140,7 +115,7 @@ class Wheel(Substructure):
         if self.axle.rotation is None:
             out[turn] -= out[x] - u[x]
         else:
-            out[turn] = self.radius * self.axle.rotation.at(time)
+            out[turn] = self.frame.radius * self.axle.rotation.at(time)
         return out
 
     def way(self, before: float, after: float) -> float:
@@ -150,7 +125,8 @@ class Wheel(Substructure):
     def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
         """Return the way of the contact along the rim [mm]: none where the wheel is locked."""
         del way
-        return self.hub(before).arc - self.hub(after).arc
+        turn = self._hub + _TURN
+        return float(before[turn] - after[turn])
 
     def sources(self, way: float) -> NDArray[np.int64]:
         """Return for each unknown the one an arc ``way`` [mm] behind it, those of the hub itself.
@@ -158,10 +134,8 @@ class Wheel(Substructure):
         Displacements keep their directions: over a side the frame turns by less than a prediction
         is exact.
         """
-        angle = way / self.radius
-        c, s = np.cos(angle), np.sin(angle)
-        centre = self.centre[:, None]
-        places = np.array([[c, s], [-s, c]]) @ (self.nodes - centre) + centre
+        centre = self.frame.centre[:, None]
+        places = turning(-way / self.frame.radius) @ (self.nodes - centre) + centre
         rim = same_unknowns(self.nodes, places)
         return np.concatenate([rim, self._hub + np.arange(3)])
 
@@ -181,5 +155,5 @@ class Wheel(Substructure):
         A wheel free to turn has the rotation of rolling there from where it was meshed.
         """
         u = np.zeros(self.n)
-        u[self._hub + _TURN] = self.radius * self.axle.turned
+        u[self._hub + _TURN] = self.frame.radius * self.axle.turned
         return self.moved(u, time)

@@ -34,7 +34,7 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     without friction: one that sticks from the beginning of the increment, before it touches, has
     none, and has all of its shear from that.
     """
-    first, n = 0, candidates.n
+    n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
     bound, strained = np.zeros(n), np.zeros(n)
     if len(candidates.motion) > n:
@@ -45,11 +45,10 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     unknown = np.where(candidates.untimed, np.minimum(bound, strained), 0.0)
     stuck = np.where((N > 0) & (candidates.status == STICK), bound, 0.0)
     found = np.zeros((5, len(system.interfaces)))
-    for k, (interface, at) in enumerate(zip(system.interfaces, candidates.vertices, strict=True)):
-        here = slice(first, first + len(at))
-        first += len(at)
+    each = zip(system.interfaces, candidates.vertices, candidates.places, strict=True)
+    for k, (interface, at, here) in enumerate(each):
         passed = _passed(interface, start.contacts[k], at, N[here], candidates.slips[k])
-        sums = (each[here].sum() for each in (unknown, bound, N, stuck))
+        sums = (part[here].sum() for part in (unknown, bound, N, stuck))
         found[:, k] = *sums, passed
     untimed, friction, normal, sticking, way = found
     return Timing(untimed=untimed, friction=friction, passed=way, normal=normal, stuck=sticking)

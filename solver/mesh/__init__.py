@@ -1,8 +1,25 @@
-"""Meshes: graded grids, the elements that cells may be, and which meshes are refused."""
+"""Meshes: graded grids, shapes, the elements that cells may be, and which meshes are refused."""
 
 from __future__ import annotations
 
-from solver.mesh.grids import graded, grid, mapped, merged, refined, with_middle
-from solver.mesh.notches import without
+from solver.mesh.grids import grid, mapped, merged, within, without
+from solver.mesh.lines import graded, refined
+from solver.mesh.shapes import Near, ball, disc, fillet, half_plane, pad, rectangle, ring
 
-__all__ = ["graded", "grid", "mapped", "merged", "refined", "with_middle", "without"]
+__all__ = [
+    "Near",
+    "ball",
+    "disc",
+    "fillet",
+    "graded",
+    "grid",
+    "half_plane",
+    "mapped",
+    "merged",
+    "pad",
+    "rectangle",
+    "refined",
+    "ring",
+    "within",
+    "without",
+]

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from skfem.quadrature import get_quadrature
 
 from solver.errors import ModelError
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

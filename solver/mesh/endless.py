@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.mesh.grids import graded
+from solver.mesh.lines import continued, graded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,12 +40,11 @@ def track_lines(
     """
     a, h = half_width, element_size
     ahead, behind = window_elements(a, h, reach)
-    window = h * np.arange(-behind, ahead + 1)
-    beyond = graded(_FAR * a, h, _FAR_GROWTH, _FAR * a / 2)[1:]
-    x = np.concatenate([window[0] - beyond[::-1], window, window[-1] + beyond])
+    window: Array = h * np.arange(-behind, ahead + 1, dtype=float)
+    far = _FAR * a
+    x = continued(window, far, h, _FAR_GROWTH, far / 2, both=True)
     near = graded(window_depth(a, reach), h, growth, window_depth(a, reach))
-    below = graded(_FAR * a, near[-1] - near[-2], _FAR_GROWTH, _FAR * a / 2)[1:]
-    return x, -np.concatenate([near, near[-1] + below])[::-1]
+    return x, -continued(near, far, near[-1] - near[-2], _FAR_GROWTH, far / 2)[::-1]
 
 
 def window_elements(a: float, h: float, reach: float = 1.0) -> tuple[int, int]:

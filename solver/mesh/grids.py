@@ -1,4 +1,4 @@
-"""Graded tensor grids and meshes mapped from them.
+"""Tensor grids: bent, joined, with cells taken out and boundaries named.
 
 A body takes any scikit-fem mesh with named boundaries, also one read with ``skfem.Mesh.load``
 (meshio).
@@ -6,8 +6,7 @@ A body takes any scikit-fem mesh with named boundaries, also one read with ``skf
 
 from __future__ import annotations
 
-import math
-from itertools import pairwise
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,123 +14,13 @@ import numpy as np
 from solver.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
     from skfem import Mesh, MeshQuad2
 
-
-_MOST = 1_000_000
-"""Elements that a line may be divided into."""
 _SAME = 1e-9
-"""Ratio of the distance to the size of a mesh, below which corners are merged."""
-
-
-def graded(length: float, smallest: float, ratio: float, largest: float) -> NDArray[np.float64]:
-    """Return node positions from 0 to ``length``, growing geometrically from ``smallest``.
-
-    Element sizes are smallest, smallest * ratio, ... up to ``largest``; all are then scaled by
-    the one factor (below 1) that makes them fill ``length`` exactly, so the first one is never
-    larger than asked for.
-    """
-    if not 0 < smallest <= length:
-        raise ModelError("smallest", smallest, f"must be in (0, {length:g}] [mm]")
-    if not ratio >= 1:
-        raise ModelError("ratio", ratio, "must be at least 1")
-    sizes: list[float] = []
-    total, size = 0.0, smallest
-    while total < length * (1 - 1e-9):
-        if len(sizes) == _MOST:
-            allowed = f"must make at most {_MOST} elements along {length:g} mm"
-            raise ModelError("size", smallest, allowed)
-        sizes.append(min(size, max(largest, smallest)))
-        total += sizes[-1]
-        size *= ratio
-    nodes = np.concatenate([[0.0], np.cumsum(sizes)])
-    return np.asarray(nodes * (length / nodes[-1]))
-
-
-def cells(length: float, smallest: float, ratio: float, largest: float) -> NDArray[np.float64]:
-    """Return the middles of what `graded` divides ``length`` into, which no boundary meets."""
-    nodes = graded(length, smallest, ratio, largest)
-    return (nodes[1:] + nodes[:-1]) / 2
-
-
-def closer(start: float, stop: float, num: int, near: float, size: float) -> NDArray[np.float64]:
-    """Return points from ``start`` to ``stop``, ``size`` apart at ``near``, farther away from it.
-
-    The distances are those of a hyperbolic sine: equal close to ``near``, then in a constant
-    ratio. Points that are ``size`` apart or closer when spread evenly are spread evenly.
-
-    Parameters
-    ----------
-    near : between start and stop [mm]
-    size : distance of points at ``near`` [mm]
-
-    Raises
-    ------
-    ModelError
-        for ``size``, where neighbouring distances would differ by more than a factor of two
-    """
-    if (stop - start) / (num - 1) <= size:
-        return np.linspace(start, stop, num)
-    sides = np.array([start - near, stop - near])
-
-    def needed(growth: float) -> float:
-        """Return the number of steps of a growth (logarithm of the ratio) that fill the length."""
-        return float(np.ptp(np.arcsinh(sides * growth / size))) / growth
-
-    low, high = 0.0, math.log(2)
-    if needed(high) > num - 1:
-        raise ModelError(
-            "size", size, f"is too small for {num} points: take more, or a larger size"
-        )
-    while high - low > 1e-15:
-        middle = (low + high) / 2
-        low, high = (middle, high) if needed(middle) > num - 1 else (low, middle)
-    first, last = np.arcsinh(sides * high / size)
-    points = near + size / high * np.sinh(np.linspace(first, last, num))
-    points[[0, -1]] = start, stop
-    return np.asarray(points)
-
-
-def refined(
-    points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
-) -> NDArray[np.float64]:
-    """Return node positions through ``points``, elements growing away from each by ``ratio``.
-
-    Between two points the elements grow from both, and meet where they are equally large.
-
-    Parameters
-    ----------
-    points : (n,) increasing positions, each a node [mm]
-    sizes : (n,) largest element beside each of them; inf leaves it to the others [mm]
-    ratio : of neighbouring element sides, above 1
-    largest : (n - 1,) largest element between neighbours [mm]
-    """
-    if not ratio > 1:
-        raise ModelError("ratio", ratio, "must be above 1")
-    pieces = [np.array([points[0]], dtype=float)]
-    spans = zip(pairwise(points), pairwise(sizes), largest, strict=True)
-    for (start, end), (first, last), most in spans:
-        length = end - start
-        ahead = _meeting(length, first, last, ratio)
-        if ahead > 0:
-            pieces.append(start + graded(ahead, min(first, most, ahead), ratio, most)[1:])
-        if ahead < length:
-            back = length - ahead
-            pieces.append(end - graded(back, min(last, most, back), ratio, most)[-2::-1])
-    return np.concatenate(pieces)
-
-
-def _meeting(length: float, first: float, last: float, ratio: float) -> float:
-    """Return how far from the first end elements that grow from both ends are equally large.
-
-    Where a side grows by the ratio, it grows by ``ratio - 1`` for each unit of length.
-    """
-    if math.isinf(last):
-        return length if math.isfinite(first) else 0.0
-    return min(max((length + (last - first) / (ratio - 1)) / 2, 0.0), length)
+"""Ratio of the distance to the size of a mesh, below which places are the same."""
 
 
 def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") -> Mesh:
@@ -155,11 +44,77 @@ def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") ->
     )
 
 
-def with_middle(mesh: Mesh, name: str, half: float) -> Mesh:
-    """Return a grid with a name for its top where the first coordinate is within ``half``."""
-    top = np.asarray(mesh.boundaries["top"])
-    middle = mesh.p[0, mesh.facets[:, top]].mean(axis=0)
-    return mesh.with_boundaries({name: top[np.abs(middle) < half]})
+def within(
+    mesh: Mesh,
+    name: str,
+    of: Sequence[str],
+    x: tuple[float, float] | None = None,
+    y: tuple[float, float] | None = None,
+) -> Mesh:
+    """Return a mesh with a boundary ``name``: the facets of others that lie in a box.
+
+    Parameters
+    ----------
+    of : the other boundaries
+    x, y : from where to where the middles of its facets are [mm]; None is everywhere
+
+    Raises
+    ------
+    ModelError
+        for ``of``, where the mesh has no such boundary; for ``name``, where the box has no facet
+    """
+    known = mesh.boundaries or {}
+    for other in of:
+        if other not in known:
+            allowed = f"must name boundaries of the mesh: {', '.join(known) or 'it has none'}"
+            raise ModelError(f"boundaries.{name}.of", other, allowed)
+    facets = np.unique(np.concatenate([np.asarray(known[other]) for other in of]))
+    inside = np.ones(len(facets), dtype=bool)
+    for at, span in zip(mesh.p[:, mesh.facets[:, facets]].mean(axis=1), (x, y), strict=True):
+        if span is not None:
+            inside &= (at >= span[0]) & (at <= span[1])
+    if not inside.any():
+        raise ModelError(f"boundaries.{name}", {"x": x, "y": y}, "has no facet in its box")
+    return mesh.with_boundaries({name: facets[inside]})
+
+
+def renamed(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
+    """Return a mesh whose only boundaries are some of its own, by new names: new -> old."""
+    known = mesh.boundaries or {}
+    return replace(mesh, _boundaries={new: known[old] for new, old in names.items()})
+
+
+def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float]) -> Mesh:
+    """Return a mesh without the cells of a rectangle; the boundary this opens is ``name``.
+
+    Other boundaries keep what is left of them. On the side of a body the rectangle is a notch,
+    inside it is a hole.
+
+    Parameters
+    ----------
+    mesh : of straight cells, whose edges run along the sides of the rectangle
+    x, y : from where to where it goes [mm]; beyond the body is allowed
+
+    Raises
+    ------
+    ModelError
+        no cell lies inside, none outside, or one lies across a side
+    """
+    (low, high), corners = np.array([x, y], dtype=float).T[:, :, None], mesh.p[:, mesh.t]
+    slack = _SAME * float(np.ptp(mesh.p, axis=1).max())
+    least, most = corners.min(axis=1), corners.max(axis=1)
+    inside = ((least > low - slack) & (most < high + slack)).all(axis=0)
+    touched = ((least < high - slack) & (most > low + slack)).all(axis=0)
+    rectangle = f"x {x[0]:g} to {x[1]:g}, y {y[0]:g} to {y[1]:g}"
+    if (touched & ~inside).any():
+        raise ModelError(name, rectangle, "must have its sides along lines of the mesh")
+    if inside.all() or not inside.any():
+        raise ModelError(name, rectangle, "must hold some cells of the mesh, and leave some")
+    kept = np.flatnonzero(~inside)
+    facets = np.unique(mesh.t2f[:, kept])  # in the order in which the new mesh numbers them
+    one, other = mesh.f2t[:, facets]
+    opened = (other >= 0) & (inside[one] != inside[other])
+    return mesh.restrict(kept).with_boundaries({name: np.flatnonzero(opened)})
 
 
 def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Mesh:
@@ -204,3 +159,17 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
 
     names = mesh.boundaries or {}
     return ring.with_boundaries({name: renumbered(which) for name, which in names.items()})
+
+
+def joined(blocks: Sequence[MeshQuad2]) -> MeshQuad2:
+    """Return quadratic meshes as one, without boundaries; nodes in one place are merged."""
+    from skfem import MeshQuad, MeshQuad2
+
+    corners = [block.p[:, : block.nvertices] for block in blocks]
+    first = np.cumsum([0, *(c.shape[1] for c in corners)])
+    cells = np.hstack([block.t + k for block, k in zip(blocks, first, strict=False)])
+    whole = MeshQuad2.from_mesh(MeshQuad(np.hstack(corners), cells, sort_t=False))
+    nodes = whole.doflocs.copy()
+    own = np.dstack([block.doflocs[:, block.dofs.element_dofs] for block in blocks])
+    nodes[:, whole.dofs.element_dofs] = own
+    return merged(MeshQuad2(doflocs=nodes, t=whole.t, sort_t=False, validate=False))

@@ -1,25 +1,392 @@
-"""Shape functions of an edge."""
+"""Shapes meshed: rectangle, half-plane, pad, ring, fillet, disc and ball.
+
+Each has its boundaries named. ``size`` is the largest side of an element; where something is
+`Near`, elements are as small as that says, and grow away from there by ``growth``, the ratio of
+neighbouring sides. Lengths are in mm.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import ModelError
+from solver.mesh.grids import grid, joined, mapped, merged, renamed
+from solver.mesh.lines import continued, refined
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from skfem import Mesh
+
+    Array = NDArray[np.float64]
+    Pair = tuple[float, float]
+
+_MOST_ELEMENTS = 200_000
+"""Elements a shape may have."""
+_SAME = 1e-9
+_CORE, _BULGE = 0.45, 0.15  # of a disc: half side of its middle square / radius, how round it is
+_EXTENT = 6.0
+"""Side of the grid that is bent into the ball / radius: it leaves out a cap on the far side."""
+_FINE = 3.0  # most of a ball that is fine / radius
 
 
-def shape_functions(xi: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return edge shape functions (..., count) at ``xi`` in [-1, 1]: both ends, then the middle."""
-    if count == 2:
-        return np.stack([(1 - xi) / 2, (1 + xi) / 2], axis=-1)
-    return np.stack([xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi**2], axis=-1)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Near:
+    """Where a shape is meshed finely: elements have the side ``size`` within ``radius`` of ``at``.
+
+    All are in mm.
+    """
+
+    at: Pair
+    size: float
+    radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise `ModelError` for a size that is not positive, and a negative radius."""
+        _positive(size=self.size)
+        if not 0 <= self.radius < math.inf:
+            raise ModelError("radius", self.radius, "must be at least 0 [mm]")
 
 
-def shape_derivatives(xi: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return the derivatives of `shape_functions` with respect to ``xi``."""
-    if count == 2:
-        half = np.full_like(xi, 0.5)
-        return np.stack([-half, half], axis=-1)
-    return np.stack([xi - 0.5, xi + 0.5, -2 * xi], axis=-1)
+def rectangle(
+    x: Pair,
+    y: Pair,
+    *,
+    size: float,
+    growth: float = 1.3,
+    near: Sequence[Near] = (),
+    cells: str = "quad",
+) -> Mesh:
+    """Return the rectangle from ``x[0]`` to ``x[1]`` and ``y[0]`` to ``y[1]``.
+
+    Its boundaries are left, right, bottom and top; its cells are ``quad`` or ``tri``.
+    """
+    spread = _Spread(size, growth)
+    along, up = (
+        spread.lines(name, span, [(n.at[k], n.size, n.radius) for n in near])
+        for k, (name, span) in enumerate((("x", x), ("y", y)))
+    )
+    _few((len(along) - 1) * (len(up) - 1))
+    return grid(along, up, cells)
+
+
+def half_plane(
+    extent: float,
+    *,
+    size: float,
+    growth: float = 1.3,
+    near: Sequence[Near] = (),
+    symmetric: bool = False,
+    cells: str = "quad",
+) -> Mesh:
+    """Return a rectangle below y = 0, as deep as it reaches to either side; or its half x >= 0.
+
+    Its boundaries are left, right, bottom and top.
+    """
+    _positive(extent=extent)
+    x = (0.0 if symmetric else -extent, extent)
+    return rectangle(x, (-extent, 0.0), size=size, growth=growth, near=near, cells=cells)
+
+
+def pad(
+    width: float,
+    height: float,
+    radius: float,
+    *,
+    size: float,
+    growth: float = 1.3,
+    near: Sequence[Near] = (),
+) -> Mesh:
+    """Return a block on y = 0, its bottom an arc of ``radius`` that touches x = 0.
+
+    It is as high at its sides as in its middle. Its boundaries are left, right, bottom and top.
+    """
+    _positive(width=width, height=height, radius=radius)
+    half, R = width / 2, radius
+    if not half < R:
+        raise ModelError("radius", R, f"must be greater than {half:g}, half the width")
+    if not R - math.sqrt(R**2 - half**2) < height:
+        raise ModelError("height", height, "must be greater than the arc is high")
+
+    def bent(X: Array) -> Array:
+        arc = X[0] ** 2 / (R + np.sqrt(R**2 - X[0] ** 2))
+        return np.stack([X[0], arc + X[1] * (1 - arc / height)])
+
+    block = rectangle((-half, half), (0.0, height), size=size, growth=growth, near=near)
+    return mapped(block, bent)
+
+
+def ring(
+    radii: Pair,
+    angles: Pair = (0.0, 360.0),
+    centre: Pair = (0.0, 0.0),
+    *,
+    size: float,
+    growth: float = 1.3,
+    near: Sequence[Near] = (),
+) -> Mesh:
+    """Return what lies between two radii and between two angles [degrees].
+
+    Its boundaries are inner, outer, and, unless it is closed, start and end.
+    """
+    inner, outer = radii
+    _positive(radii=inner)
+    start, end = (math.radians(angle) for angle in angles)
+    if end - start > 2 * np.pi * (1 + _SAME):
+        raise ModelError("angles", angles, "must span at most 360 degrees")
+    along, across = [], []
+    for each in near:
+        x, y = each.at[0] - centre[0], each.at[1] - centre[1]
+        r = math.hypot(x, y)
+        if not r:
+            raise ModelError("near", each.at, "must not be the centre of the ring")
+        angle = start + (math.atan2(y, x) - start) % (2 * np.pi)
+        side = each.size / (r + each.radius)  # as large where the fine part is widest
+        across.append((r, each.size, each.radius))
+        turns = (angle, angle - 2 * np.pi, angle + 2 * np.pi)  # of a closed ring, both ends
+        along += [(turn, side, each.radius / r) for turn in turns]
+    out = _Spread(size, growth).lines("radii", (inner, outer), across)
+    turn = _Spread(size / outer, growth).lines("angles", (start, end), along)
+    _few((len(out) - 1) * (len(turn) - 1))
+    cx, cy = centre
+    bent = mapped(
+        grid(out, turn),
+        lambda X: np.stack([cx + X[0] * np.cos(X[1]), cy + X[0] * np.sin(X[1])]),
+    )
+    if end - start > 2 * np.pi * (1 - _SAME):
+        return renamed(merged(bent), {"inner": "left", "outer": "right"})
+    names = {"inner": "left", "outer": "right", "start": "bottom", "end": "top"}
+    return renamed(bent, names)
+
+
+def fillet(
+    wide: float,
+    narrow: float,
+    radius: float,
+    lengths: Pair,
+    *,
+    size: float,
+    growth: float = 1.3,
+    near: Sequence[Near] = (),
+) -> Mesh:
+    """Return a bar that narrows from ``wide`` to ``narrow`` over a fillet at y = 0.
+
+    Its axis is x = 0, its widths are counted from there, and it reaches ``lengths`` below and
+    above. Where something is near, the whole fillet is fine. Its boundaries are left (the axis),
+    bottom, right (the end of the wide part), surface, fillet and top.
+    """
+    below, above = lengths
+    _positive(wide=wide, narrow=narrow, radius=radius, lengths=min(lengths))
+    r = radius
+    if not narrow + r < wide:
+        raise ModelError("radius", r, f"must be less than {wide - narrow:g}, wide - narrow")
+    if not r < above:
+        raise ModelError("radius", r, f"must be less than {above:g}, the length above")
+    # along the surface from its upper end; across from the surface to the axis and the bottom
+    bends = np.array([above - r, np.pi / 2 * r, wide - narrow - r])
+    marks = np.concatenate([[0.0], np.cumsum(bends)])
+    middle, half = float(marks[1] + bends[1] / 2), float(bends[1] / 2)
+    along = [(middle, n.size, max(n.radius, half)) for n in near]
+    depth = [(0.0, n.size, n.radius) for n in near]
+    across = math.hypot(narrow + r, below + r)  # the longest line across
+    spread = _Spread(size, growth)
+    along_it = spread.lines("near", (0.0, float(marks[-1])), along, marks[1:3].tolist())
+    across_it = spread.lines("near", (0.0, across), depth)
+    _few((len(along_it) - 1) * (len(across_it) - 1))
+
+    def place(X: Array) -> Array:
+        s, t = X[0], X[1] / across
+        angle = np.clip((s - marks[1]) / r, 0.0, np.pi / 2)
+        surface = np.stack([
+            narrow + r * (1 - np.cos(angle)) + np.maximum(s - marks[2], 0.0),
+            above - np.minimum(s, marks[1]) - r * np.sin(angle),
+        ])  # fmt: skip
+        down = np.minimum(s / middle, 1.0)
+        aside = np.maximum((s - middle) / (marks[-1] - middle), 0)
+        inside = np.stack([wide * aside, above - (above + below) * down])
+        return np.asarray((1 - t) * surface + t * inside)
+
+    # the first direction is across, so that elements keep their orientation
+    flat = grid(across_it, along_it)
+    mesh = renamed(mapped(flat, lambda X: place(X[::-1])), {"top": "bottom", "right": "top"})
+    middles = flat.p[1, flat.facets].mean(axis=0)
+    outer, inner = (np.asarray(flat.boundaries[name]) for name in ("left", "right"))
+    arc = (middles[outer] > marks[1]) & (middles[outer] < marks[2])
+    return mesh.with_boundaries({
+        "surface": outer, "fillet": outer[arc],
+        "left": inner[middles[inner] < middle], "bottom": inner[middles[inner] > middle],
+    })  # fmt: skip
+
+
+def disc(radius: float, centre: Pair = (0.0, 0.0), *, size: float) -> Mesh:
+    """Return a whole disc, meshed evenly: its boundaries are rim, east, north, west and south.
+
+    The last four are quarters of the rim.
+    """
+    _positive(radius=radius, size=size)
+    R = radius
+    n = max(2, 2 * round(np.pi * R / 4 / size))  # elements along a quarter of the rim
+    m = max(1, round((1 - _CORE) * R / size))
+    _few(n * (n + 4 * m))
+    square = np.linspace(-1.0, 1.0, n + 1)
+
+    def core(X: Array) -> Array:
+        return np.asarray(_CORE * R * X * (1 + _BULGE * (1 - X[::-1] ** 2)))
+
+    def quarter(turn: float) -> Callable[[Array], Array]:
+        def place(X: Array) -> Array:
+            t, side = X[0], X[1]
+            inner = core(np.stack([np.ones_like(side), side]))
+            angle = side * np.pi / 4
+            rim = R * np.stack([np.cos(angle), np.sin(angle)])
+            x, y = (1 - t) * inner + t * rim
+            c, s = np.cos(turn), np.sin(turn)
+            return np.stack([c * x - s * y, s * x + c * y])
+
+        return place
+
+    strip = grid(np.linspace(0.0, 1.0, m + 1), square)
+    quarters = [mapped(strip, quarter(k * np.pi / 2)) for k in range(4)]
+    mesh = joined([mapped(grid(square, square), core), *quarters])
+    outside = mesh.boundary_facets()
+    x, y = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
+    side = np.round(np.arctan2(y, x) / (np.pi / 2)).astype(int) % 4
+    named = {"rim": outside}
+    named |= {each: outside[side == k] for k, each in enumerate(("east", "north", "west", "south"))}
+    return mesh.translated(centre).with_boundaries(named)
+
+
+def ball(
+    radius: float,
+    at: Pair = (0.0, 0.0),
+    *,
+    size: float,
+    fine: float,
+    growth: float = 1.3,
+    above: bool = True,
+    symmetric: bool = False,
+) -> Mesh:
+    """Return a disc that touches y = ``at[1]`` at ``at``, ever finer towards there.
+
+    It lies above or below, as a section through a ball or a cylinder; where symmetric it is the
+    half x >= ``at[0]``, and ``left`` is its axis. A cap is left out on its far side, from 1.5 radii
+    away on the axis to 1.8 at the surface: its boundaries are ``cap`` and ``right``, and ``left``
+    of a whole one. That which touches is ``surface``.
+
+    Parameters
+    ----------
+    size : side of the elements at ``at`` [mm]
+    fine : distance within which they have it [mm]
+    growth : ratio of neighbouring sides beyond
+    """
+    _positive(radius=radius, size=size)
+    if not size <= fine <= _FINE * radius:
+        raise ModelError("fine", fine, f"must be from {size:g} to {_FINE * radius:g}")
+    lines = ball_lines(radius, fine, size, growth)
+    along = lines if symmetric else np.concatenate([-lines[:0:-1], lines])
+    across = lines if above else -lines[::-1]
+    _few((len(along) - 1) * (len(across) - 1))
+    bent = mapped(grid(along, across), lambda X: _onto_disc(X, radius))
+    surface, cap = ("bottom", "top") if above else ("top", "bottom")
+    names = {"surface": surface, "cap": cap, "left": "left", "right": "right"}
+    return renamed(bent, names).translated(at)
+
+
+def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
+    """Return the lines from 0 on of the grid that is bent into a ball [mm]."""
+    return fine_lines(_EXTENT * radius, fine, size, growth)
+
+
+def fine_lines(extent: float, fine: float, size: float, growth: float) -> Array:
+    """Return lines from 0 to ``extent``: of one ``size`` as far as ``fine``, then growing [mm]."""
+    even = np.linspace(0.0, fine, max(1, round(fine / size)) + 1)
+    return continued(even, extent - fine, size, growth, extent / 4)
+
+
+def _onto_disc(x: Array, radius: float) -> Array:
+    """Return points (2, n), those of either half-plane mapped on a disc in it that touches y = 0.
+
+    The Moebius map ``w = z / (1 - i z / 2 R)`` leaves what is near the origin where it is, and
+    takes the line y = 0 to the circle. It keeps angles, so that squares stay squares.
+    """
+    side = np.where(x[1].mean() < 0, -1.0, 1.0)
+    z = x[0] + 1j * side * x[1]
+    w = z / (1 - 0.5j * z / radius)
+    return np.stack([w.real, side * w.imag])
+
+
+def cap_area(radius: float) -> float:
+    """Return the area around the axis of the surface where the cap is left out [mm2]."""
+    extent = _EXTENT * radius
+    way, weight = np.polynomial.legendre.leggauss(60)
+    along, weight = extent * (way + 1) / 2, extent * weight / 2
+    area = 0.0
+    for z in (along + 1j * extent, extent + 1j * along):
+        bent = 1 - 0.5j * z / radius
+        area += float(weight @ (2 * np.pi * (z / bent).real / np.abs(bent) ** 2))
+    return area
+
+
+@dataclass(frozen=True, slots=True)
+class _Spread:
+    """How elements spread along a direction: the largest side, and the ratio of neighbours."""
+
+    size: float
+    growth: float
+
+    def __post_init__(self) -> None:
+        _positive(size=self.size)
+        if not 1 < self.growth < math.inf:
+            raise ModelError("growth", self.growth, "must be greater than 1")
+
+    def lines(
+        self,
+        name: str,
+        span: Pair,
+        near: Sequence[tuple[float, float, float]],
+        through: Sequence[float] = (),
+    ) -> Array:
+        """Return node positions over a span, fine near some positions: (position, side, radius).
+
+        Of those it goes ``through``, each is a node.
+        """
+        start, end = span
+        if not -math.inf < start < end < math.inf:
+            raise ModelError(name, list(span), "must be two increasing numbers")
+        if (end - start) / self.size > _MOST_ELEMENTS:
+            raise ModelError("size", self.size, f"makes more than {_MOST_ELEMENTS} elements")
+        marks: dict[float, float] = dict.fromkeys((start, *through, end), np.inf)
+        fine: list[tuple[float, float, float]] = []
+        for at, side, radius in near:
+            low, high = max(at - radius, start), min(at + radius, end)
+            if low > high:
+                continue  # outside of this span: the elements nearest to it stay as they are
+            for mark in (low, high):
+                marks[mark] = min(marks.get(mark, np.inf), side)
+            fine.append((low, high, side))
+        points = sorted(marks)
+        same = _SAME * (end - start)
+        points = [p for k, p in enumerate(points) if not k or p - points[k - 1] > same]
+        sides = [
+            min((s for low, high, s in fine if low <= a and b <= high), default=self.size)
+            for a, b in pairwise(points)
+        ]
+        return refined(points, [marks[p] for p in points], self.growth, sides)
+
+
+def _few(count: int) -> None:
+    """Refuse a mesh of too many elements."""
+    if count > _MOST_ELEMENTS:
+        raise ModelError("size", f"{count} elements", f"at most {_MOST_ELEMENTS} elements")
+
+
+def _positive(**lengths: float) -> None:
+    """Refuse lengths that are not positive numbers."""
+    for name, length in lengths.items():
+        if not 0 < length < math.inf:
+            raise ModelError(name, length, "must be positive [mm]")

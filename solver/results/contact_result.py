@@ -76,7 +76,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
     X = chain.X[:, chain.vertices]
     pressure, shear = contact_pressure(system, state, pair)
     deformed, _ = contact_pressure(system, state, pair, deformed=True)
-    pairing = interface.pairing(state.u, state.time, finite=contact.finite)
+    pairing = system.pairing(state, pair)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
     closed = contact.normal > 0
     return ContactResult(

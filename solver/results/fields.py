@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from solver.contact.state import State
     from solver.fem.discretisation import Discretisation
-    from solver.fem.wheel import Hub
+    from solver.fem.frame import RigidMotion
     from solver.materials.state import Response
     from solver.results.view import Places
 
@@ -62,7 +62,7 @@ class Bodies(Protocol):
     def displacement(self, name: str, state: State) -> Array:
         """Return the displacements (n,) of a body [mm]."""
 
-    def axle(self, converged: Any) -> Hub | None:
+    def axle(self, converged: Any) -> RigidMotion | None:
         """Return the motion of the first wheel, where there is one."""
 
 

@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.fem.surface import edges_of
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.tensors import SQRT2
 
 if TYPE_CHECKING:

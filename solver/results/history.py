@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged
     from solver.contact.system import System
-    from solver.fem.rigid import RigidMotion
+    from solver.fem.frame import RigidMotion
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def observe(system: System, converged: Converged) -> Observed:
         if isinstance(part, RigidPart):
             motions[name] = part.motion_of(u)
             x, y, turning = forces
-            reactions[name] = (float(x), float(y), float(turning) * part.arm)
+            reactions[name] = (float(x), float(y), float(turning) * part.frame.radius)
         elif part.body.axle is None:  # type: ignore[union-attr]
             # in equilibrium: this holds for a condensed body too, whose supports are inside
             loads = system.full(name).external(state.time).reshape(-1, 2).sum(axis=0)

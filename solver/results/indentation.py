@@ -57,12 +57,10 @@ def follow(samples: Samples, converged: Any) -> Followed:
     system: Any = samples.system
     contact = converged.state.contacts[0]
     force = float(contact.normal.sum())
-    interface = system.interfaces[0]
-    chain = interface.slave_surface
+    chain = system.interfaces[0].slave_surface
     x = chain.X[0, chain.vertices]
     order = np.argsort(x)
-    gap = interface.pairing(converged.state.u, finite=contact.finite).gap
-    patches = contact_patches(x[order], gap[order], contact.normal[order] > 0)
+    patches = contact_patches(x[order], contact.gap[order], contact.normal[order] > 0)
     return Followed(force, _approach(system, converged), patches[-1][1] if patches else 0.0)
 
 

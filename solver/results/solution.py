@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from solver.contact.state import Converged
-    from solver.fem.rigid import RigidMotion
+    from solver.fem.frame import RigidMotion
     from solver.loading.program import Stage
     from solver.model.model import Model
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from solver.contact.state import State
 from solver.fem.fields import recovery
-from solver.fem.wheel import Hub
+from solver.fem.frame import RigidMotion
 from solver.materials.state import PlasticState, Response
 from solver.results.contact_result import contact_patches
 from solver.steady import RollingContact
@@ -116,10 +116,10 @@ class TrackBody:
         del name
         return state.u[0]
 
-    def axle(self, converged: Standing) -> Hub | None:
+    def axle(self, converged: Standing) -> RigidMotion | None:
         """Return the displacement of the axle, which stands at x = 0."""
         touching = converged.touching
-        return None if touching is None else Hub(x=0.0, y=touching.height, arc=0.0, rotation=0.0)
+        return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
 
     def under_load(self, found: Pass) -> Standing:
         """Return the state while the load of a pass is there."""

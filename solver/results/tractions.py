@@ -96,7 +96,12 @@ class PairTractions:
         """See `SurfaceTractions`."""
         parts = zip(self._system.parts, converged.state.u, strict=True)
         return next(
-            (part.centre[0] + part.hub(u).x for part, u in parts if isinstance(part, Wheel)), 0.0
+            (
+                part.frame.centre[0] + part.motion_of(u).x
+                for part, u in parts
+                if isinstance(part, Wheel)
+            ),
+            0.0,
         )
 
 

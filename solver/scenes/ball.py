@@ -23,8 +23,8 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.loading.program import Lap, Program, Stage, walked
-from solver.mesh import grid
-from solver.mesh.ball import ball, ball_lines, cap_area, graded_lines
+from solver.mesh import ball, grid
+from solver.mesh.shapes import ball_lines, cap_area, fine_lines
 from solver.model.body import Body
 from solver.model.loads import Traction
 from solver.model.model import Model
@@ -124,15 +124,15 @@ class BallParameters(ContactParameters):
 
 
 def _ball(p: BallParameters, *, above: bool) -> Body:
-    far = ("top" if above else "bottom", "right")
+    fine, side, growth = p.sides
     push = (-1 if above else 1) * p.force / cap_area(p.radius)
     return Body(
         name="ball",
-        mesh=ball(p.radius, *p.sides, above=above),
+        mesh=ball(p.radius, size=side, fine=fine, growth=growth, above=above, symmetric=True),
         material=p.material(p.ball_stiffness, elastic=True) if above else p.material(),
         kinematics="axisymmetric",
         supports={"left": "x"},
-        loads=tuple(Traction(boundary=name, y=push) for name in far),
+        loads=tuple(Traction(boundary=name, y=push) for name in ("cap", "right")),
     )
 
 
@@ -141,7 +141,7 @@ def model(parameters: BallParameters) -> Model:
     p = parameters
     if p.yielding == "ball":
         plane = RigidBody(name="plane", surfaces={"base": line((0.0, 0.0), (p.radius, 0.0))})
-        pair = p.contact(slave=("ball", "top"), master=("plane", "base"), sliding="finite")
+        pair = p.contact(slave=("ball", "surface"), master=("plane", "base"), sliding="finite")
         return Model(bodies=(_ball(p, above=False),), rigid=(plane,), contacts=(pair,))
     lines = _half_space_lines(p)
     half_space = Body(
@@ -151,12 +151,12 @@ def model(parameters: BallParameters) -> Model:
         kinematics="axisymmetric",
         supports={"left": "x", "bottom": "y"},
     )
-    pair = p.contact(slave=("half_space", "top"), master=("ball", "bottom"), sliding="finite")
+    pair = p.contact(slave=("half_space", "top"), master=("ball", "surface"), sliding="finite")
     return Model(bodies=(_ball(p, above=True), half_space), contacts=(pair,))
 
 
 def _half_space_lines(p: BallParameters) -> NDArray[np.float64]:
-    return graded_lines(p.half_space_size * p.expected_radius, *p.sides)
+    return fine_lines(p.half_space_size * p.expected_radius, *p.sides)
 
 
 def program(parameters: BallParameters) -> Program:
@@ -198,7 +198,7 @@ def view(parameters: BallParameters) -> View:
         station=a * np.array([0.0, 0.5, 1.0]),
         s=a * np.concatenate([np.linspace(0.0, 2.0, 161), np.linspace(2.05, 5.0, 60)]),
         profile_body=body,
-        surfaces={body: "top"},
+        surfaces={body: "surface" if body == "ball" else "top"},
         symmetric=True,
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.mesh import grid, refined, with_middle, without
+from solver.mesh import grid, refined, within, without
 from solver.model.body import Body
 from solver.scenes.effort import Lattice, lattice
 
@@ -169,7 +169,7 @@ class FlatPunch:
         half_plane = grid(np.concatenate([under, beyond[1:]]), down, cells)
         if groove := self.punch_groove:
             punch = without(punch, "groove", (a - groove.side, a), (groove.distance, groove.end))
-        half_plane = with_middle(half_plane, FACING, self.reach)
+        half_plane = within(half_plane, FACING, ["top"], x=(0.0, self.reach))
         if groove := self.half_plane_groove:
             sides = (a + groove.distance, a + groove.end)
             half_plane = without(half_plane, "groove", sides, (-groove.side, 0.0))

@@ -93,7 +93,9 @@ def _creepage(bodies: Bodies, first: Solved, last: Solved) -> float:
     before, now = bodies.axle(first), bodies.axle(last)
     if before is None or now is None:
         return np.nan
-    return float(1 + (now.arc - before.arc) / (now.x - before.x))
+    axle = bodies.full("wheel").body.axle
+    assert axle is not None
+    return 1 + axle.radius * (now.rotation - before.rotation) / (now.x - before.x)
 
 
 def passes(traces: Sequence[Trace], cycle: int) -> Values:

@@ -22,7 +22,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.loading.program import Program, load_and_release, walked
-from solver.mesh.grids import cells
+from solver.mesh.lines import cells
 from solver.model.model import Model
 from solver.model.singular import SingularPoint
 from solver.parameters import (

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.mesh import graded
+from solver.mesh.lines import continued, graded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,12 +32,10 @@ def half_space_nodes(
     a : Hertz half-width [mm]
     growth : ratio of neighbouring sides in depth
     """
-    beyond = fine + graded(far, h, 1.4, far / 4)[1:]
     track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
-    x = track if periodic else np.concatenate([-beyond[::-1], track, beyond])
+    x = track if periodic else continued(track, far, h, 1.4, far / 4, both=True)
     deep = graded(_DEEP * a, h, growth, _DEEP * a)
-    deeper = deep[-1] + graded(far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[1:]
-    return x, -np.concatenate([deep, deeper])[::-1]
+    return x, -continued(deep, far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[::-1]
 
 
 def recorded_step(a: float) -> float:
@@ -54,8 +52,7 @@ def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
     Elements of side ``h`` lie within an arc ``reach`` of the lowest point.
     """
     rim = np.linspace(-reach, reach, rim_elements(reach, h) + 1)
-    beyond = reach + graded(math.pi * R - reach, h, 1.5, 0.3 * R)[1:]
-    angle = np.concatenate([-beyond[::-1], rim, beyond]) / R
+    angle = continued(rim, math.pi * R - reach, h, 1.5, 0.3 * R, both=True) / R
     return angle, R - graded((1 - _HUB) * R, h, 1.3, 0.2 * R)[::-1]
 
 

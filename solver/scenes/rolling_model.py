@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.materials.material import Material
-from solver.mesh import grid, mapped, merged, with_middle
+from solver.mesh import grid, mapped, merged, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
@@ -44,7 +44,7 @@ def _half_space(parameters: RollingParameters) -> Body:
         )
     return Body(
         name="half_space",
-        mesh=with_middle(grid(x, y), "track", parameters.fine),
+        mesh=within(grid(x, y), "track", ["top"], x=(-parameters.fine, parameters.fine)),
         material=parameters.material(),
         supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
@@ -55,7 +55,7 @@ def _half_space(parameters: RollingParameters) -> Body:
 def _ring(R: float, reach: float, h: float, turned: float) -> Mesh:
     """Return the mesh of a wheel above (0, 0), turned by an angle [rad]; see `wheel_nodes`."""
     angle, radius = wheel_nodes(R, reach, h)
-    ring = with_middle(grid(angle, radius), "rim", reach / R)
+    ring = within(grid(angle, radius), "rim", ["top"], x=(-reach / R, reach / R))
 
     def around(p: np.ndarray) -> np.ndarray:
         angle = p[0] - turned

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.mesh.grids import cells
+from solver.mesh.lines import cells
 from solver.results.view import View
 from solver.scenes.rolling_grids import recorded_step
 

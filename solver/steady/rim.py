@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.fem.discretisation import Discretisation
+from solver.fem.frame import turning
 from solver.fem.surface import extract
 from solver.fem.wheel import Wheel
 
@@ -48,10 +49,9 @@ class Rim:
         ``length^2 / (2 R)``, and seem to slip by x / R of that: 2 % of the slip that brakes by
         30 %, with elements of a quarter of the half-width.
         """
-        angle = length / self.wheel.radius
-        c, s = np.cos(angle), np.sin(angle)
-        arm = self.surface.X - self.wheel.centre[:, None]
-        return np.asarray((arm - np.array([[c, -s], [s, c]]) @ arm).T.ravel())
+        frame = self.wheel.frame
+        arm = self.surface.X - frame.centre[:, None]
+        return np.asarray((arm - turning(length / frame.radius) @ arm).T.ravel())
 
     def passing(self, d: Array) -> Array:
         """Return the motion (n,) of material per arc, along a rim with displacements (n,)."""

@@ -13,7 +13,7 @@ from solver.fem.discretisation import Discretisation
 from solver.fem.loads import travelling_forces
 from solver.fem.surface import extract
 from solver.materials.material import Material
-from solver.mesh import grid, with_middle
+from solver.mesh import grid, within
 from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
@@ -164,7 +164,7 @@ def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> Tra
 def _body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:
     return Body(
         name="half_space",
-        mesh=with_middle(grid(x, y), "contact", contact),
+        mesh=within(grid(x, y), "contact", ["top"], x=(-contact, contact)),
         material=Material(
             youngs_modulus=elasticity.youngs_modulus, poisson_ratio=elasticity.poisson_ratio
         ),

@@ -11,13 +11,13 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release
+from solver.mesh import within
 from solver.model.amplitude import Amplitude
 from solver.scenes.material_parameters import MaterialParameters
 from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
-from studies.scenes.shape_tables import LineTable
-from studies.scenes.shapes import mesh_of
+from studies.scenes.shape_tables import LineTable, mesh_of
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -289,23 +289,8 @@ def _placed(mesh: Mesh, table: tables.BodyTable) -> Mesh:
     """Return a mesh where its body stands, with the boundaries of its table."""
     if any(table.move):
         mesh = mesh.translated(table.move)
-    own = {new: _within(mesh, new, each) for new, each in table.boundaries.items()}
+    own = {
+        new: within(mesh, new, each.of, each.x, each.y).boundaries[new]
+        for new, each in table.boundaries.items()
+    }
     return mesh.with_boundaries(own) if own else mesh
-
-
-def _within(mesh: Mesh, name: str, table: tables.BoundaryTable) -> Any:
-    """Return the facets of other boundaries whose middles lie in a box."""
-    known = mesh.boundaries or {}
-    for other in table.of:
-        if other not in known:
-            allowed = f"must name boundaries of the mesh: {', '.join(known) or 'it has none'}"
-            raise ModelError(f"boundaries.{name}.of", other, allowed)
-    facets = np.unique(np.concatenate([np.asarray(known[other]) for other in table.of]))
-    x, y = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
-    inside = np.ones(len(facets), dtype=bool)
-    for at, span in ((x, table.x), (y, table.y)):
-        if span is not None:
-            inside &= (at >= span[0]) & (at <= span[1])
-    if not inside.any():
-        raise ModelError(f"boundaries.{name}", table.model_dump(), "has no facet in its box")
-    return facets[inside]

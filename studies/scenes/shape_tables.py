@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from annotated_types import Interval
 from pydantic import Field
 
+from solver.errors import ModelError
+from solver.mesh import Near, ball, disc, fillet, half_plane, pad, rectangle, ring
 from solver.parameters import Length
 from studies.scenes.table import Count, Place, SceneTable, Span
+
+if TYPE_CHECKING:
+    from skfem import Mesh
 
 
 class NearTable(SceneTable):
@@ -96,7 +102,7 @@ class DiscTable(SceneTable):
 class RoundTable(SceneTable):
     """A disc that touches y = 0 at ``at``, fine there, without a cap on its far side.
 
-    Its boundaries are those of `solver.mesh.ball`: where it lies above, surface and cap.
+    Its boundaries are those of `solver.mesh.ball`.
     """
 
     kind: Literal["round"]
@@ -113,6 +119,33 @@ Shape = Annotated[
     RectangleTable | HalfPlaneTable | PadTable | RingTable | FilletTable | DiscTable | RoundTable,
     Field(discriminator="kind"),
 ]
+_MESHED: Mapping[str, Callable[..., Mesh]] = {
+    "rectangle": rectangle, "half_plane": half_plane, "pad": pad, "ring": ring, "sector": ring,
+    "fillet": fillet, "disc": disc, "round": ball,
+}  # fmt: skip
+
+
+def mesh_of(shape: Any, cells: str) -> Mesh:
+    """Return the mesh of a shape, its boundaries named.
+
+    Parameters
+    ----------
+    shape : one of the tables above
+    cells : ``quad`` or ``tri``; shapes with curved sides have quadrilaterals
+
+    Raises
+    ------
+    ModelError
+        naming the entry of the shape that is wrong
+    """
+    given = {name: getattr(shape, name) for name in type(shape).model_fields if name != "kind"}
+    if near := given.get("near"):
+        given["near"] = [Near(**each.model_dump()) for each in near]
+    if isinstance(shape, RectangleTable | HalfPlaneTable):
+        given["cells"] = cells
+    elif cells == "tri":
+        raise ModelError("element", cells, f"a {shape.kind} is meshed with quadrilaterals")
+    return _MESHED[shape.kind](**given)
 
 
 class LineTable(SceneTable):

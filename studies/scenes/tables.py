@@ -10,7 +10,7 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
-from solver.mesh.grids import closer
+from solver.mesh.lines import closer
 from solver.parameters import Friction, Length, Stress
 from solver.scenes.material_parameters import MaterialParameters
 from studies.scenes.shape_tables import ArcTable, LineTable, Shape

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,23 @@ def test_bodies_that_overlap_before_loading_press_on_each_other():
     assert solution.stress("lower", "loaded")[1] == pytest.approx(
         np.full(solution.nodes("lower").shape[1], expected), rel=1e-3
     )
+
+
+def test_a_state_is_paired_once_and_another_anew():
+    plate = Body(
+        name="plate",
+        mesh=grid(np.linspace(-10, 20, 31), np.linspace(-10, 0, 11)),
+        material=STEEL,
+        supports={"bottom": "xy"},
+    )
+    pads = (pad("one", -5.0, 100.0), pad("two", 10.0, 100.0))
+    pairs = tuple(ContactPair(slave=(p.name, "bottom"), master=("plate", "top")) for p in pads)
+    solution = solve(Model(bodies=(*pads, plate), contacts=pairs))
+    system, state = solution.system, solution.loaded.state
+    found = [system.pairing(state, k) for k in range(2)]
+    assert all(system.pairing(state, k) is each for k, each in enumerate(found))
+    assert all(np.array_equal(each.gap, state.contacts[k].gap) for k, each in enumerate(found))
+    raised = replace(state, u=tuple(u + 0.1 for u in state.u[:2]) + state.u[2:])
+    for k, each in enumerate(found):
+        assert system.pairing(raised, k).gap == pytest.approx(each.gap + 0.1)
+        assert np.array_equal(system.pairing(state, k).gap, each.gap)

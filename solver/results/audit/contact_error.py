@@ -20,7 +20,7 @@ import numpy as np
 
 from solver.contact.pressure import contact_pressure
 from solver.fem.error import ErrorPoints
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.results.audit.surfaces import deformed
 from solver.tensors import to_tensor
 

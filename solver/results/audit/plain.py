@@ -16,8 +16,8 @@ import numpy as np
 
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
+from solver.mesh.edges import shape_functions
 from solver.mesh.elements import element_type
-from solver.mesh.shapes import shape_functions
 from solver.model.loads import InitialStress, Pressure, Temperature, Traction
 from solver.tensors import SQRT2, to_mandel, to_tensor
 

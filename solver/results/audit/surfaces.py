@@ -16,7 +16,7 @@ from solver.contact.normals import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import Temperature
 from solver.results.audit.plain import load_factor
 
@@ -51,13 +51,15 @@ def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
     part, u = system.parts[system.part(name)], state.u[system.part(name)]
     if isinstance(part, RigidPart):
         x, y, angle = part.motion_of(u)
-        return _turned(part.nodes, part.centre, angle, (x, y)), np.eye(2)
+        return _turned(part.nodes, part.frame.centre, angle, (x, y)), np.eye(2)
     whole = system.full(name)
     d = system.displacement(name, state).reshape(-1, 2).T
     if not isinstance(part, Wheel):
         return whole.X + d, np.eye(2)
-    at = part.hub(u)
-    return _turned(whole.X + d, part.centre, at.rotation, (at.x, at.y)), _rotation(at.rotation)
+    at = part.motion_of(u)
+    return _turned(whole.X + d, part.frame.centre, at.rotation, (at.x, at.y)), _rotation(
+        at.rotation
+    )
 
 
 def _rotation(angle: float) -> Array:

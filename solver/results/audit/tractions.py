@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.mesh.shapes import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.results.audit.surfaces import Surfaces, deformed
 
 if TYPE_CHECKING:

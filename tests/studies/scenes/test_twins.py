@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Record, Status
-from solver.mesh.ball import cap_area
+from solver.mesh.shapes import cap_area
 from solver.scenes.ball import BallParameters
 from studies.scenes.scene import read_scene
 

@@ -1,0 +1,73 @@
+"""A frame that moves as a whole: the finite motion of rigid bodies and of wheels.
+
+Its three unknowns q are the displacement c = (x, y) of its centre and the arc w that rotation makes
+at a radius R. A point at X before loading, displaced by d in the frame, is at
+``c0 + c + Q(w / R) (X - c0 + d)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+class RigidMotion(NamedTuple):
+    """Displacement of the centre along x and y [mm], counter-clockwise rotation [rad]."""
+
+    x: float
+    y: float
+    rotation: float
+
+
+def turning(angle: float) -> Array:
+    """Return the matrix (2, 2) that turns vectors by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MovingFrame:
+    """The frame of a body that moves as a whole.
+
+    Attributes
+    ----------
+    centre : (2,) c0, about which it turns [mm]
+    radius : R, at which rotation is an arc [mm]
+    """
+
+    centre: Array
+    radius: float
+
+    def motion(self, q: Array) -> RigidMotion:
+        """Return the motion that the unknowns (3,) are."""
+        x, y, arc = (float(value) for value in q)
+        return RigidMotion(x, y, arc / self.radius)
+
+    def turned(self, q: Array) -> Array:
+        """Return the matrix Q (2, 2) from vectors in the frame to those at rest."""
+        return turning(self.motion(q).rotation)
+
+    def displacements(self, q: Array, X: Array, d: Array | float = 0.0) -> Array:
+        """Return the displacements (2, n) of points X, displaced by d in the frame [mm]."""
+        from_centre = self.turned(q) @ (X - self.centre[:, None] + d)
+        return np.asarray(from_centre + (self.centre + q[:2])[:, None] - X)
+
+    def passing(self, X: Array) -> Array:
+        """Return the motion of points X per arc (2, n), in the frame."""
+        x, y = X - self.centre[:, None]
+        return np.stack([-y, x]) / self.radius
+
+    def rows(self, q: Array, nodal: Array, passing: Array) -> Array:
+        """Return rows (m, 3) on the unknowns, from those on points (m, n, 2) at rest.
+
+        ``passing`` (2, n) is the motion of the points per arc, in the frame.
+        """
+        by_arc = (nodal * (self.turned(q) @ passing).T).sum(axis=(1, 2))
+        return np.hstack([nodal.sum(axis=1), by_arc[:, None]])

@@ -1,0 +1,145 @@
+"""Where the lines of a grid are: node positions along one direction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_MOST = 1_000_000
+"""Elements that a line may be divided into."""
+
+
+def graded(length: float, smallest: float, ratio: float, largest: float) -> Array:
+    """Return node positions from 0 to ``length``, growing geometrically from ``smallest``.
+
+    Element sizes are smallest, smallest * ratio, ... up to ``largest``; all are then scaled by
+    the one factor (below 1) that makes them fill ``length`` exactly, so the first one is never
+    larger than asked for.
+    """
+    if not 0 < smallest <= length:
+        raise ModelError("smallest", smallest, f"must be in (0, {length:g}] [mm]")
+    if not ratio >= 1:
+        raise ModelError("ratio", ratio, "must be at least 1")
+    sizes: list[float] = []
+    total, size = 0.0, smallest
+    while total < length * (1 - 1e-9):
+        if len(sizes) == _MOST:
+            allowed = f"must make at most {_MOST} elements along {length:g} mm"
+            raise ModelError("size", smallest, allowed)
+        sizes.append(min(size, max(largest, smallest)))
+        total += sizes[-1]
+        size *= ratio
+    nodes = np.concatenate([[0.0], np.cumsum(sizes)])
+    return np.asarray(nodes * (length / nodes[-1]))
+
+
+def continued(
+    lines: Array,
+    length: float,
+    smallest: float,
+    ratio: float,
+    largest: float,
+    *,
+    both: bool = False,
+) -> Array:
+    """Return lines that go on for ``length`` beyond the last, growing as `graded` does [mm].
+
+    With ``both`` they go on before the first too.
+    """
+    beyond = graded(length, smallest, ratio, largest)[1:]
+    before = lines[0] - beyond[::-1] if both else lines[:0]
+    return np.concatenate([before, lines, lines[-1] + beyond])
+
+
+def cells(length: float, smallest: float, ratio: float, largest: float) -> Array:
+    """Return the middles of what `graded` divides ``length`` into, which no boundary meets."""
+    nodes = graded(length, smallest, ratio, largest)
+    return (nodes[1:] + nodes[:-1]) / 2
+
+
+def closer(start: float, stop: float, num: int, near: float, size: float) -> Array:
+    """Return points from ``start`` to ``stop``, ``size`` apart at ``near``, farther away from it.
+
+    The distances are those of a hyperbolic sine: equal close to ``near``, then in a constant
+    ratio. Points that are ``size`` apart or closer when spread evenly are spread evenly.
+
+    Parameters
+    ----------
+    near : between start and stop [mm]
+    size : distance of points at ``near`` [mm]
+
+    Raises
+    ------
+    ModelError
+        for ``size``, where neighbouring distances would differ by more than a factor of two
+    """
+    if (stop - start) / (num - 1) <= size:
+        return np.linspace(start, stop, num)
+    sides = np.array([start - near, stop - near])
+
+    def needed(growth: float) -> float:
+        """Return the number of steps of a growth (logarithm of the ratio) that fill the length."""
+        return float(np.ptp(np.arcsinh(sides * growth / size))) / growth
+
+    low, high = 0.0, math.log(2)
+    if needed(high) > num - 1:
+        raise ModelError(
+            "size", size, f"is too small for {num} points: take more, or a larger size"
+        )
+    while high - low > 1e-15:
+        middle = (low + high) / 2
+        low, high = (middle, high) if needed(middle) > num - 1 else (low, middle)
+    first, last = np.arcsinh(sides * high / size)
+    points = near + size / high * np.sinh(np.linspace(first, last, num))
+    points[[0, -1]] = start, stop
+    return np.asarray(points)
+
+
+def refined(
+    points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
+) -> Array:
+    """Return node positions through ``points``, elements growing away from each by ``ratio``.
+
+    Between two points the elements grow from both, and meet where they are equally large.
+
+    Parameters
+    ----------
+    points : (n,) increasing positions, each a node [mm]
+    sizes : (n,) largest element beside each of them; inf leaves it to the others [mm]
+    ratio : of neighbouring element sides, above 1
+    largest : (n - 1,) largest element between neighbours [mm]
+    """
+    if not ratio > 1:
+        raise ModelError("ratio", ratio, "must be above 1")
+    pieces = [np.array([points[0]], dtype=float)]
+    spans = zip(pairwise(points), pairwise(sizes), largest, strict=True)
+    for (start, end), (first, last), most in spans:
+        length = end - start
+        ahead = _meeting(length, first, last, ratio)
+        if ahead > 0:
+            pieces.append(start + graded(ahead, min(first, most, ahead), ratio, most)[1:])
+        if ahead < length:
+            back = length - ahead
+            pieces.append(end - graded(back, min(last, most, back), ratio, most)[-2::-1])
+    return np.concatenate(pieces)
+
+
+def _meeting(length: float, first: float, last: float, ratio: float) -> float:
+    """Return how far from the first end elements that grow from both ends are equally large.
+
+    Where a side grows by the ratio, it grows by ``ratio - 1`` for each unit of length.
+    """
+    if math.isinf(last):
+        return length if math.isfinite(first) else 0.0
+    return min(max((length + (last - first) / (ratio - 1)) / 2, 0.0), length)
