@@ -81,7 +81,7 @@ class SceneContact:
         contact, order = converged.state.contacts[0], np.argsort(self._x)
         pressure, shear = contact_pressure(self._system, converged.state, 0)
         closed = contact.normal > 0
-        stuck = closed & (contact.status == STICK) & (self._interface.friction > 0)
+        stuck = closed & (contact.status == STICK) & self._interface.rough
         return ContactPoints(
             x=self._x[order],
             pressure=pressure[order],

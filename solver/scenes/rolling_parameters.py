@@ -97,6 +97,9 @@ class RollingParameters(WheelParameters):
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
+        if self.load == "hertz" and self.friction_law != "coulomb":
+            allowed = "must be coulomb: load = hertz prescribes the shear"
+            raise ModelError("friction_law", self.friction_law, allowed)
         for name in ("shear_limit", "cohesion") if self.load == "hertz" else ():
             if value := getattr(self, name):
                 raise ModelError(name, value, "must be 0: load = hertz prescribes the shear")
