@@ -102,10 +102,17 @@ class Parts(Generic[T]):
     def fields(self, cls: C) -> C:
         """Add the word, which the class declares as text, and all parameters to a class's fields.
 
-        It goes before ``dataclass``: what a class without decorator declares is not yet a field.
+        It stands below ``dataclass``, which makes fields of them.
+
+        Raises
+        ------
+        ModelError
+            when a class that it inherits from has a field of one of these names
         """
         cls.__annotations__[self.kind] = Literal[tuple(self)]
         for name, (hint, field) in self.parameters().items():
+            if name in getattr(cls, "__dataclass_fields__", {}):
+                raise ModelError(self.kind, name, "is another parameter already: name it otherwise")
             cls.__annotations__[name] = hint
             own = dataclasses.field(default=field.default, metadata=field.metadata)
             setattr(cls, name, own)
