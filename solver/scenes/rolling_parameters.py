@@ -121,7 +121,6 @@ class RollingParameters(WheelParameters):
         """Raise `ModelError` for what a track without ends cannot have."""
         for name, usual in (
             ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
-            ("cohesion", 0.0),
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")
