@@ -55,7 +55,7 @@ class Own(FrictionLaw):
 """
 
 
-def run(code: str, own: Path) -> subprocess.CompletedProcess[str]:
+def run(code: str, own: Path | str) -> subprocess.CompletedProcess[str]:
     setting = os.environ | {"RESIDUA_PARTS": str(own), "PYTHONPATH": str(ROOT)}
     return subprocess.run(
         [sys.executable, "-c", code], env=setting, capture_output=True, text=True, check=False
@@ -86,3 +86,14 @@ def test_a_parameter_that_scenes_have_already_is_refused(tmp_path: Path) -> None
     own.write_text(CLASHES)
     done = run("import solver.scenes.punch", own)
     assert "friction_law = 'yield_stress': is another parameter already" in done.stderr
+
+
+@pytest.mark.processes
+def test_ids_follow_the_file_of_a_law(tmp_path: Path) -> None:
+    own, found = tmp_path / "own.py", []
+    asked = "from studies.definition.identity import solver_hash; print(solver_hash())"
+    for text in ("", OWN.read_text(), OWN.read_text().replace("6.0, 25", "6.0, 13")):
+        own.write_text(text)
+        found.append(run(asked, own if text else "").stdout)
+    assert all(found)
+    assert len(set(found)) == 3
