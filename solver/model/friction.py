@@ -55,16 +55,13 @@ class BoundLines(NamedTuple):
     @classmethod
     def joined(cls, each: Sequence[BoundLines]) -> BoundLines:
         """Return the lines of all places, one after the other."""
+        ends = np.cumsum([0, *(lines.slope.shape[1] for lines in each)])
         most = max((len(lines.slope) for lines in each), default=1)
-        nowhere = cls.none(0)
-        padded = [nowhere, *each]
-        return cls(*(
-            np.hstack([
-                np.pad(of[k], ((0, most - len(of[k])), (0, 0)), constant_values=beyond)
-                for of in padded
-            ])
-            for k, beyond in enumerate((0.0, np.inf))
-        ))  # fmt: skip
+        whole = cls(np.zeros((most, ends[-1])), np.full((most, ends[-1]), np.inf))
+        for first, last, lines in zip(ends[:-1], ends[1:], each, strict=True):
+            for of, own in zip(whole, lines, strict=True):
+                of[: len(own), first:last] = own
+        return whole
 
     @property
     def rough(self) -> NDArray[np.bool_]:
@@ -86,9 +83,8 @@ class BoundLines(NamedTuple):
     def over(self, area: Array) -> BoundLines:
         """Return the lines of force over force, from those of shear over pressure."""
         finite = np.isfinite(self.level)
-        return BoundLines(
-            self.slope, np.multiply(self.level, area, out=self.level.copy(), where=finite)
-        )
+        level = np.multiply(self.level, area, out=self.level.copy(), where=finite)
+        return BoundLines(self.slope, level)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -231,20 +227,20 @@ def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
         return BoundLines.none(at.n)
     each = law.bound(at)
     try:
-        pairs = [[np.broadcast_to(np.asarray(v, float), at.n) for v in line] for line in each]
-        slope, level = (np.array(of) for of in zip(*pairs, strict=True))
+        found = BoundLines(*np.empty((2, len(each), at.n)))
+        for k, (slope, level) in enumerate(each):
+            found.slope[k], found.level[k] = slope, level
+        least = found.level.min(axis=0)
     except (TypeError, ValueError):
         allowed = f"must give lines (slope, stress), of numbers or of arrays ({at.n},)"
         raise ModelError("friction_law", law, allowed) from None
-    found = BoundLines(slope, level)
-    if not (np.isfinite(slope).all() and (slope >= 0).all()):
-        worst = float(slope.min()) if np.isfinite(slope).all() else math.nan
-        allowed = f"must give slopes that are finite and at least 0, not {worst:.4g}"
+    wrong = found.slope[~((found.slope >= 0) & np.isfinite(found.slope))]
+    if wrong.size:
+        allowed = f"must give slopes that are finite and at least 0, not {wrong[0]:.4g}"
         raise ModelError("friction_law", law, allowed)
-    if not (level >= 0).all() or level.min(axis=0).any():
+    if least.any():  # NaN is not zero either
         allowed = "must give a bound that is zero without pressure: the least stress of its lines "
-        least = float(level.min(axis=0)[np.abs(level.min(axis=0)).argmax()])
-        raise ModelError("friction_law", law, f"{allowed}is {least:.4g} MPa")
+        raise ModelError("friction_law", law, f"{allowed}is {least[least != 0][0]:.4g} MPa")
     return found
 
 
