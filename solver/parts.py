@@ -17,7 +17,7 @@ import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 from solver.errors import ModelError
 
@@ -98,6 +98,25 @@ class Parts(Generic[T]):
                     allowed = f"declares its parameter {name} as no other part does"
                     raise ModelError(self.kind, word, allowed)
         return found
+
+    def fields(self, cls: C) -> C:
+        """Add the word, which the class declares as text, and all parameters to a class's fields.
+
+        It stands below ``dataclass``, which makes fields of them.
+
+        Raises
+        ------
+        ModelError
+            when a class that it inherits from has a field of one of these names
+        """
+        cls.__annotations__[self.kind] = Literal[tuple(self)]
+        for name, (hint, field) in self.parameters().items():
+            if name in getattr(cls, "__dataclass_fields__", {}):
+                raise ModelError(self.kind, name, "is another parameter already: name it otherwise")
+            cls.__annotations__[name] = hint
+            own = dataclasses.field(default=field.default, metadata=field.metadata)
+            setattr(cls, name, own)
+        return cls
 
     def used(self, word: str) -> frozenset[str]:
         """Return the names of the parameters of a part."""

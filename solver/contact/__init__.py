@@ -1,1 +1,1 @@
-"""Unilateral contact with Coulomb friction: geometry, and the problem on the contact points."""
+"""Unilateral contact with friction: geometry, and the problem on the contact points."""

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.problem import OPEN, bound_lines, least
+from solver.contact.problem import OPEN
 from solver.contact.rows import ContactRows, joined
+from solver.model.friction import BoundLines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,9 +33,7 @@ class Candidates:
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
-    friction : (n,) coefficient
-    limit : (n,) largest tangential force at any normal force [N]
-    cohesion : (n,) tangential force that needs no normal force [N]
+    lines : tangential over normal force, whose least is the bound [N]
     motion : (n or 2n,) gap, and slip when there is friction [mm]
     apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : the contact forces of the current iterate in the same order [N]
@@ -48,9 +47,7 @@ class Candidates:
     """
 
     vertices: tuple[NDArray[np.int64], ...]
-    friction: NDArray[np.float64]
-    limit: NDArray[np.float64]
-    cohesion: NDArray[np.float64]
+    lines: BoundLines
     motion: NDArray[np.float64]
     apart: NDArray[np.float64]
     forces: NDArray[np.float64]
@@ -65,21 +62,16 @@ class Candidates:
     @property
     def n(self) -> int:
         """Number of candidate vertices."""
-        return len(self.friction)
+        return len(self.status)
 
     @property
     def places(self) -> list[slice]:
         """For each interface, where its candidates are among all."""
         return _places(self.vertices)
 
-    def bound(self, N: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest tangential forces (n,) under normal forces N [N]."""
-        return least(bound_lines(self.friction, self.cohesion, self.limit), N)
-
     def smooth(self) -> Candidates:
         """Return the same candidates without friction."""
-        nothing = np.zeros(self.n)
-        return replace(self, friction=nothing, cohesion=nothing)
+        return replace(self, lines=BoundLines.none(self.n))
 
     def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
         """Return the nodal forces (size,) that contact forces exert on a part [N]."""
@@ -115,7 +107,7 @@ class Candidates:
         """Return the natural residual of the contact conditions, as a force [N].
 
         ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -s, s)|`` with
-        ``s = min(mu N, limit)`` and the stiffness k of the elastic contact points.
+        their bound s and the stiffness k of the elastic contact points.
         """
         n, F, k = self.n, self.forces, stiffness
         if n == 0:
@@ -123,7 +115,7 @@ class Candidates:
         N = F[:n]
         worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
         if len(F) > n:
-            bound = self.bound(N)
+            bound = self.lines.least(N)
             wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
             worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
         return worst
@@ -169,12 +161,18 @@ class Candidates:
     def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of time."""
         after = self.states(before, self.forces, self.status)
-        out = []
-        for old, new, gap, slip in zip(before, after, self.gaps, self.slips, strict=True):
+        moved = np.abs(self.motion[self.n :]) if len(self.motion) > self.n else np.zeros(self.n)
+        moved, first, out = np.where(self.status == OPEN, 0.0, moved), 0, []
+        each = zip(before, after, self.vertices, self.gaps, self.slips, strict=True)
+        for old, new, at, gap, slip in each:
+            slipped = old.slipped.copy()
+            slipped[at] += moved[first : first + len(at)]
+            first += len(at)
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
             rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
-            out.append(replace(new, touching=new.status != OPEN, gap=gap, rates=rates))
+            touching = new.status != OPEN
+            out.append(replace(new, touching=touching, gap=gap, rates=rates, slipped=slipped))
         return tuple(out)
 
 
@@ -194,7 +192,8 @@ def no_candidates(system: System) -> Candidates:
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
     known = empty.astype(bool)
-    return Candidates(none, *(empty,) * 6, status, known, rows, covered, gaps, slips, np.inf)
+    lines = BoundLines.none(0)
+    return Candidates(none, lines, *(empty,) * 3, status, known, rows, covered, gaps, slips, np.inf)
 
 
 def find_candidates(
@@ -221,23 +220,22 @@ def find_candidates(
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
     m = 2 * n if frictional else n
-    motion, friction, apart, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
-    limit, cohesion = np.zeros((2, n))
+    motion, apart, beyond = np.zeros(m), np.zeros(n), np.inf
+    lines: list[BoundLines] = []
     untimed = np.zeros(n, dtype=bool)
     pieces: list[list[ContactRows]] = [[] for _ in system.parts]
     slips: list[NDArray[np.float64]] = []
-    for interface, pairing, at, before, normal in zip(
-        system.interfaces, pairings, vertices, start.contacts, _places(vertices), strict=True
+    for pair, (interface, pairing, at, before, normal) in enumerate(
+        zip(system.interfaces, pairings, vertices, start.contacts, _places(vertices), strict=True)
     ):
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         apart[normal] = np.where(before.touching, 0.0, _apart(before, span))[at]
         untimed[normal] = np.isnan(apart[normal])
-        friction[normal] = interface.friction
-        cohesion[normal] = interface.cohesion * pairing.area[at]
         apart[normal] = np.nan_to_num(apart[normal])
-        limit[normal] = interface.shear_limit(pairing, time)[at] * pairing.area[at]
+        shear = system.bound(pair, pairing, start, time).at(at)
+        lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
@@ -257,9 +255,7 @@ def find_candidates(
     forces = gather("normal")
     return Candidates(
         vertices=tuple(vertices),
-        friction=friction,
-        limit=limit,
-        cohesion=cohesion,
+        lines=BoundLines.joined(lines),
         motion=motion,
         apart=apart,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,

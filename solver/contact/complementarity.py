@@ -17,12 +17,10 @@ from scipy import linalg
 
 from solver.contact.given_bound import given_bound
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem, ContactSolution
-from solver.model.model import LEAST_FRICTION
+from solver.model.friction import LEAST_FRICTION, BoundLines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from solver.contact.problem import Lines
 
 _MAX_SETS = 40
 _MAX_PASSES = 20
@@ -65,21 +63,22 @@ def change_of(
 
     Tangential forces at their limit stay there.
     """
-    slope, force = problem.lines
-    piece = (slope * solution.forces[: problem.n] + force).argmin(axis=0)
+    lines = problem.lines
+    piece = lines.piece(solution.forces[: problem.n])
+    alone = BoundLines(lines.slope, np.zeros_like(lines.level))
     changed = replace(problem, offset=offset, balance=0 * problem.balance)
     nothing_moves = np.zeros_like(offset), np.zeros_like(solution.rigid)
-    return _forces(changed, solution.status, piece, (slope, 0 * force)) or nothing_moves
+    return _forces(changed, solution.status, piece, alone) or nothing_moves
 
 
 def _forces(
-    problem: ContactProblem, status: NDArray[np.int64], piece: NDArray[np.int64], bound: Lines
+    problem: ContactProblem, status: NDArray[np.int64], piece: NDArray[np.int64], bound: BoundLines
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Return forces and rigid motions of given statuses, or None for a singular system.
 
     Where a point slips, ``piece`` says which line of the ``bound`` its tangential force is on.
     """
-    n, k, rough = problem.n, len(problem.balance), problem.rough
+    n, k, rough = problem.n, len(problem.balance), problem.lines.rough
     closed = np.flatnonzero(status != OPEN)
     stick = np.flatnonzero(status == STICK) if problem.frictional else closed[:0]
     if problem.frictional:
@@ -145,15 +144,15 @@ def _active_sets(
 
     ``piece`` (n,) belongs to the status: the line of the bound that a sliding point is on.
     """
-    n, mu, rough = problem.n, problem.friction, problem.rough
+    n, lines, points = problem.n, problem.lines, np.arange(problem.n)
+    rough, steepest = lines.rough, lines.slope.max(axis=0)
     force, length = problem.scales
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
     # under little friction: a small part of the force it carries, but not less than rounding
-    tiny_shear = force * np.clip(_ACCURATE * mu, _ROUNDING, _TOLERANCE)
+    tiny_shear = force * np.clip(_ACCURATE * steepest, _ROUNDING, _TOLERANCE)
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
         status[np.argmin(problem.offset[:n])] = STICK
-    lines, points = problem.lines, np.arange(n)
     seen = set()
     for _ in range(_MAX_SETS):
         key = status.tobytes() + piece.tobytes()
@@ -171,14 +170,14 @@ def _active_sets(
         new[~closed & (gap < -tiny_length)] = STICK
         if problem.frictional:
             T, slip = F[n:], motion[n:]
-            bound = problem.bound(N) + tiny_shear
+            bound = lines.least(N) + tiny_shear
             keep = closed & (new != OPEN) & rough
             new[keep & (status == STICK) & (T > bound)] = BACKWARD
             new[keep & (status == STICK) & (T < -bound)] = FORWARD
             new[keep & (status == FORWARD) & (slip < -tiny_length)] = STICK
             new[keep & (status == BACKWARD) & (slip > tiny_length)] = STICK
         # a point stays on its line within the tolerance: rounding must not make a cycle
-        bounds = lines[0] * N + lines[1]
+        bounds = lines.slope * N + lines.level
         least = bounds.argmin(axis=0)
         stays = bounds[piece, points] <= bounds[least, points] + tiny_force
         onto = np.where(rough & (new > STICK), np.where(stays, piece, least), 0)
@@ -194,10 +193,10 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     After every pass the active sets start again from its status, so that the solution is exact
     and the passes themselves need not converge.
     """
-    n = problem.n
+    n, lines, rough = problem.n, problem.lines, problem.lines.rough
     force, _ = problem.scales
     # start with a large bound: in every pass friction must suffice to hold a floating body
-    bound = problem.bound(np.full(n, force if len(problem.balance) else 0.0))
+    bound = lines.least(np.full(n, force if len(problem.balance) else 0.0))
     for _ in range(_MAX_PASSES):
         solved = given_bound(problem, bound)
         if solved is None:
@@ -206,16 +205,15 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         N = np.maximum(F[:n], 0.0)
         status = np.where(N > 1e-9 * force, STICK, OPEN)
         if problem.frictional:
-            sliding = (status != OPEN) & problem.rough
+            sliding = (status != OPEN) & rough
             reached = np.abs(F[n:]) >= bound * (1 - 1e-9)
             status[sliding & reached & (F[n:] < 0)] = FORWARD
             status[sliding & reached & (F[n:] > 0)] = BACKWARD
-        slope, given = problem.lines
-        on = np.where(status > STICK, (slope * N + given).argmin(axis=0), 0)
+        on = np.where(status > STICK, lines.piece(N), 0)
         found = _active_sets(problem, status, on)
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
-        before, bound = bound, problem.bound(N)
+        before, bound = bound, lines.least(N)
         if np.abs(bound - before).max() <= 1e-12 * before.max():
             F = np.where(np.resize(status, len(F)) == OPEN, 0.0, F)
             return ContactSolution(F, q, status, True) if _holds(problem, F, q) else None
@@ -233,7 +231,7 @@ def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float6
     N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
     off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
     if problem.frictional:
-        bound = problem.bound(N) / force
+        bound = problem.lines.least(N) / force
         T, slip = F[n:] / force, motion[n:] / length
         off = np.concatenate([off, np.clip(T - slip, -bound, bound) - T])
     return bool((np.abs(off) <= _KNOWN).all())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,6 @@ from solver.contact.geometry import Pairing, pair
 from solver.contact.normals import is_curved
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
-from solver.model.model import effective_friction
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +22,7 @@ if TYPE_CHECKING:
     from solver.fem.part import Part
     from solver.fem.rigid import RigidPart
     from solver.fem.surface import Surface
+    from solver.model.friction import FrictionLaw
     from solver.model.model import ContactPair, Model
 
 
@@ -31,10 +30,8 @@ if TYPE_CHECKING:
 class Interface:
     """A contact pair, as it was declared, on its two parts.
 
-    ``shear_strength`` is the largest shear it carries at any pressure while no body is hot,
-    ``cohesion`` what it carries without pressure [MPa]; ``hot`` is what heat takes of the yield
-    stress of slave and master; ``reference`` is the pairing before loading, which small sliding
-    keeps.
+    ``hot`` is what heat takes of the yield stress of slave and master; ``reference`` is the pairing
+    before loading, which small sliding keeps.
     """
 
     declared: ContactPair
@@ -42,22 +39,16 @@ class Interface:
     master: int
     slave_surface: Surface
     master_surface: Surface
-    friction: float
-    shear_strength: float
+    law: FrictionLaw
     hot: tuple[Heat | None, Heat | None]
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
 
     @property
-    def cohesion(self) -> float:
-        """Shear that it carries without pressure [MPa]."""
-        return self.declared.cohesion
-
-    @property
     def rough(self) -> bool:
         """Whether it carries shear."""
-        return self.friction > 0 or self.cohesion > 0
+        return self.law.rough
 
     @property
     def sides(self) -> tuple[tuple[int, Part, Surface], tuple[int, Part, Surface]]:
@@ -88,19 +79,17 @@ class Interface:
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 
-    def shear_limit(self, pairing: Pairing, time: float) -> NDArray[np.float64]:
-        """Return the largest shear (n,) at any pressure at a time [MPa].
+    def strength(self, pairing: Pairing, time: float) -> NDArray[np.float64]:
+        """Return the shear yield stress (n,) of the weaker body at a time [MPa].
 
-        The weaker body is that whose mean shear yield stress under the hat of a vertex is less.
+        That is the body whose mean shear yield stress under the hat of a vertex is less.
         """
-        if self.hot == (None, None):
-            return np.full(len(pairing.gap), self.shear_strength)
         least = np.full(len(pairing.gap), np.inf)
         for part, hot, rows in zip(self.parts, self.hot, pairing.normal, strict=True):
             strength = part.body.material.shear_yield_stress
             left = 1.0 if hot is None else _mean(rows, hot.strong(time))
             least = np.minimum(least, strength * left)
-        return self.declared.shear_limit * least
+        return least
 
     def slip(
         self,
@@ -200,19 +189,14 @@ def interface_of(
                 "these surfaces do not face each other: before loading no normal of the slave "
                 "meets the master from outside; check the boundaries and where the bodies are",
             )  # fmt: skip
-    strength = min(part.body.material.shear_yield_stress for part in both)
-    limited = not math.isinf(contact.shear_limit)
-    hot = [
-        part.hot(chain) if limited else None for part, (_, chain) in zip(both, sides, strict=True)
-    ]
+    hot = [part.hot(chain) for part, (_, chain) in zip(both, sides, strict=True)]
     return Interface(
         declared=contact,
         slave=slave,
         master=master,
         slave_surface=slave_surface,
         master_surface=master_surface,
-        friction=effective_friction(contact.friction),
-        shear_strength=contact.shear_limit * strength,
+        law=contact.law,
         hot=(hot[0], hot[1]),
         parts=both,
         reach=reach,

@@ -22,7 +22,8 @@ class ContactState:
     ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
     surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` tells
     whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
-    master faces the vertex [mm]; ``rates`` (2, n) are those of gap and slip over time in the last
+    master faces the vertex [mm]; ``slipped`` is the sum of all its slip in contact, forth and back,
+    since the first increment [mm]; ``rates`` (2, n) are those of gap and slip over time in the last
     increment, NaN where not known. ``finite`` tells whether the surfaces are paired anew as they
     move, or always as before loading.
     """
@@ -34,16 +35,26 @@ class ContactState:
     gap: NDArray[np.float64]
     rates: NDArray[np.float64]
     finite: bool
+    slipped: NDArray[np.float64]
 
     @classmethod
     def at_rest(
-        cls, gap: NDArray[np.float64], touching: NDArray[np.bool_], *, finite: bool
+        cls,
+        gap: NDArray[np.float64],
+        touching: NDArray[np.bool_],
+        *,
+        finite: bool,
+        before: ContactState | None,
     ) -> ContactState:
-        """Return the state of vertices without forces, those that touch sticking."""
+        """Return the state of vertices without forces, those that touch sticking.
+
+        What they have slipped ``before`` is kept.
+        """
         n = len(touching)
+        slipped = np.zeros(n) if before is None else before.slipped
         status = np.where(touching, STICK, OPEN)
         rates = np.full((2, n), np.nan)
-        return cls(np.zeros(n), np.zeros(n), status, touching, gap, rates, finite)
+        return cls(np.zeros(n), np.zeros(n), status, touching, gap, rates, finite, slipped)
 
     def halted(self) -> ContactState:
         """Return the state without its rates: another motion begins."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import null_space
+from scipy.sparse import csr_array
 
 from solver.contact.interface import interface_of, surfaces_of
 from solver.contact.slave import with_slaves
@@ -19,10 +20,10 @@ from solver.fem.fields import recovery
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
+from solver.model.friction import ContactPlaces, lines_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from scipy.sparse import csr_array
 
     from solver.contact.geometry import Pairing
     from solver.contact.interface import Interface
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from solver.fem.part import Part
     from solver.fem.surface import Surface
     from solver.materials.state import Response
+    from solver.model.friction import BoundLines
     from solver.model.loads import Load
     from solver.model.model import Model
 
@@ -96,6 +98,7 @@ class System:
         )
 
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
+        self._at_vertices: dict[int, csr_array] = {}
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
         # of one state: the rows of a pairing may be large
         self._paired: deque[tuple[State, int, Pairing]] = deque(maxlen=len(self.interfaces))
@@ -200,15 +203,44 @@ class System:
         """Whether an elastic state depends on the load alone, and not on its history.
 
         True without friction, and where all facing vertices touch before loading: every status
-        then stays the same while the load grows. Cohesion and a limit of shear make it false, since
-        they do not grow with the load.
+        then stays the same while the load grows. A bound of friction that does not grow with the
+        load, such as cohesion and a limit of shear, makes it false.
         """
-        bounded = any(np.isfinite(i.shear_strength) or i.cohesion for i in self.interfaces)
-        if self.overlapping or bounded:
+        if self.overlapping or not all(i.law.proportional for i in self.interfaces):
             return False
         gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
         conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()
-        return bool(conforming) or all(i.friction == 0 for i in self.interfaces)
+        return bool(conforming) or not any(i.rough for i in self.interfaces)
+
+    def bound(self, pair: int, pairing: Pairing, start: State, time: float) -> BoundLines:
+        """Return the lines of shear over pressure at the vertices of a slave [MPa].
+
+        Parameters
+        ----------
+        pairing : of the interface, at the time
+        start : state at the beginning of the increment
+        """
+        interface, contact = self.interfaces[pair], start.contacts[pair]
+        return lines_of(
+            interface.law,
+            ContactPlaces(
+                n=len(pairing.gap),
+                find_strength=lambda: interface.strength(pairing, time),
+                find_plastic_strain=lambda: self.plastic_strain(pair, start),
+                find_slip=lambda: contact.slipped,
+            ),
+        )
+
+    def plastic_strain(self, pair: int, state: State) -> Array:
+        """Return the accumulated plastic strain (n,) at the vertices of a slave."""
+        interface = self.interfaces[pair]
+        number, chain = interface.slave, interface.slave_surface
+        if not self.parts[number].meshed:
+            return np.zeros(len(chain.vertices))
+        if pair not in self._at_vertices:
+            at = chain.nodes[chain.vertices]
+            self._at_vertices[pair] = csr_array(self.recovery(self.all_names[number])[at])
+        return np.maximum(self._at_vertices[pair] @ state.plastic[number].accumulated, 0.0)
 
     def part(self, name: str) -> int:
         """Return the number of the part called ``name``."""
@@ -278,10 +310,13 @@ class System:
     def at_rest(self, state: State) -> State:
         """Return a state without contact forces; vertices that touch stick."""
         contacts = []
-        for interface in self.interfaces:
+        known = state.contacts or (None,) * len(self.interfaces)
+        for interface, before in zip(self.interfaces, known, strict=True):
             gap = interface.pairing(state.u, state.time).gap
             touching = gap <= self.touching
-            contacts.append(ContactState.at_rest(gap, touching, finite=interface.finite))
+            contacts.append(
+                ContactState.at_rest(gap, touching, finite=interface.finite, before=before)
+            )
         return replace(state, contacts=tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:
@@ -303,5 +338,5 @@ class System:
             for k, gap in zip(own, gaps, strict=True):
                 touching = gap < least + _SET_DOWN * part.frame.radius
                 finite = self.interfaces[k].finite
-                contacts[k] = ContactState.at_rest(gap, touching, finite=finite)
+                contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])
         return replace(state, time=time, u=tuple(u), contacts=tuple(contacts))

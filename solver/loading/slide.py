@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.candidates import Candidates
-    from solver.contact.state import ContactState
+    from solver.contact.state import State
     from solver.contact.system import System
 
 _SPENT = 0.95
@@ -50,11 +50,13 @@ class Slide:
         )
 
 
-def spent(system: System, contacts: Sequence[ContactState]) -> str:
+def spent(system: System, state: State) -> str:
     """Return a hint on the pairs whose friction was almost spent in the last equilibrium."""
     found = []
-    for interface, contact in zip(system.interfaces, contacts, strict=True):
-        most = float(interface.friction * contact.normal.sum())
+    for k, (interface, contact) in enumerate(zip(system.interfaces, state.contacts, strict=True)):
+        pairing = interface.pairing(state.u, state.time, finite=contact.finite)
+        lines = system.bound(k, pairing, state, state.time).over(pairing.area)
+        most = float(lines.least(contact.normal)[contact.normal > 0].sum())
         share = abs(float(contact.tangential.sum())) / most if most > 0 else 0.0
         if share > _SPENT:
             names = [system.all_names[k] for k in (interface.slave, interface.master)]
@@ -79,7 +81,7 @@ def slide(
     closed = N > 0
     if not closed.any():
         return None
-    bound = candidates.bound(N)
+    bound = candidates.lines.least(N)
     for i, part in enumerate(system.parts):
         motion = candidates.of_part(i, part.rigid)
         if len(motion) == n or not motion.size:

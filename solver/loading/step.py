@@ -76,9 +76,7 @@ def newton_step(
         ContactProblem(
             W=W,
             offset=motion,
-            friction=candidates.friction,
-            limit=candidates.limit,
-            cohesion=candidates.cohesion,
+            lines=candidates.lines,
             A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
             balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
         ),

@@ -289,7 +289,7 @@ class Stepper:
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
         if failure.why.limit and growing:
             return LimitLoad(f"no equilibrium {way}: {failure.why}", reached, attempted)
-        hint = spent(self.system, point.now.state.contacts)
+        hint = spent(self.system, point.now.state)
         return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:

@@ -38,7 +38,7 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
     N = np.maximum(candidates.forces[:n], 0.0)
     bound, strained = np.zeros(n), np.zeros(n)
     if len(candidates.motion) > n:
-        bound = candidates.bound(N)
+        bound = candidates.lines.least(N)
         slips = zip(candidates.slips, candidates.vertices, strict=True)
         slipped = np.abs(np.concatenate([slip[at] for slip, at in slips]))
         strained = np.abs(candidates.forces[n:]) + stiffness[n:] * slipped

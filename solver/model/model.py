@@ -11,21 +11,12 @@ import numpy as np
 from solver.errors import ModelError
 from solver.materials.doubts import doubts
 from solver.model.body import Body
+from solver.model.friction import Coulomb, FrictionLaw
 from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
 
 if TYPE_CHECKING:
     from solver.model.amplitude import Amplitude
-
-LEAST_FRICTION = 1e-10
-"""A coefficient of friction up to this value counts as zero. The forces it allows are below the
-tolerance of normal forces in the contact problem: a hundredth of the out-of-balance force and a
-thousandth of the contact violation that an increment may leave."""
-
-
-def effective_friction(friction: float) -> float:
-    """Return the coefficient that the solver uses: zero up to `LEAST_FRICTION`."""
-    return friction if friction > LEAST_FRICTION else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +30,7 @@ class ContactPair:
         Choose as slave the surface that ends at a corner, else the one that is finer or yields.
         They are exchanged where the slave cannot bear the forces (`solver.contact.slave`)
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
-        leaves out the tangential unknowns
+        leaves out the tangential unknowns. Or a law of friction (`FrictionLaw`)
     cohesion : shear that contact carries beyond friction [MPa]: the shear is at most ``friction *
         pressure + cohesion``; where the pressure is below the cohesion it stands in its place
     shear_limit : largest contact shear / initial shear yield stress of the weaker body, at any
@@ -63,7 +54,7 @@ class ContactPair:
 
     slave: tuple[str, str]
     master: tuple[str, str]
-    friction: float = 0.0
+    friction: float | FrictionLaw = 0.0
     shear_limit: float = math.inf
     sliding: Literal["auto", "small", "finite"] = "auto"
     cohesion: float = 0.0
@@ -72,17 +63,25 @@ class ContactPair:
     amplitude: Amplitude | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.friction) and self.friction >= 0):
-            raise ModelError("friction", self.friction, "must be finite and at least 0")
-        if not (np.isfinite(self.cohesion) and self.cohesion >= 0):
-            raise ModelError("cohesion", self.cohesion, "must be finite and at least 0 [MPa]")
         if not self.shear_limit > 0:
             raise ModelError("shear_limit", self.shear_limit, "must be positive")
+        if isinstance(self.friction, FrictionLaw):
+            for name, none in (("cohesion", 0.0), ("shear_limit", math.inf)):
+                if (value := getattr(self, name)) != none:
+                    raise ModelError(name, value, "must not stand beside a law of friction")
+        _ = self.law  # checks itself
         if self.sliding not in ("auto", "small", "finite"):
             raise ModelError("sliding", self.sliding, "must be auto, small or finite")
         for name in ("gap", "interference"):
             if not np.isfinite(getattr(self, name)):
                 raise ModelError(name, getattr(self, name), "must be finite [mm]")
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The law of friction."""
+        if isinstance(self.friction, FrictionLaw):
+            return self.friction
+        return Coulomb(friction=self.friction, cohesion=self.cohesion, shear_limit=self.shear_limit)
 
     def offset(self, time: float) -> float:
         """Return what is added at a time to the distance of the surfaces as meshed [mm]."""
@@ -126,11 +125,7 @@ class Model:
                 pair = (contact.slave, contact.master)
                 raise ModelError("contacts", pair, "must not be two rigid bodies")
             elastic = all(self.body(name, side).material.elastic for side, (name, _) in sides)
-            if elastic and not math.isinf(contact.shear_limit):
-                raise ModelError(
-                    "shear_limit", contact.shear_limit,
-                    "must be inf between elastic bodies: there is no yield stress to refer to",
-                )  # fmt: skip
+            contact.law.check_bodies(elastic=elastic)
         self._check_pairs()
 
     def _check_pairs(self) -> None:

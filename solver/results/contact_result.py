@@ -88,7 +88,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
         gap=gap,
         slip=np.where(np.isfinite(gap), interface.slip(pairing, state.u), np.nan),
         closed=closed,
-        sticking=closed & (contact.status == STICK) & (interface.friction > 0),
+        sticking=closed & (contact.status == STICK) & interface.rough,
     )
 
 

@@ -17,11 +17,11 @@ from solver.materials.law import Law
 from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
 from solver.materials.tresca import TrescaMaterial
-from solver.model.model import ContactPair, effective_friction
+from solver.model.friction import FRICTION, FrictionLaw
+from solver.model.model import ContactPair
 from solver.parameters import (
     Accuracy,
     Fraction,
-    Friction,
     HardeningRatio,
     Poisson,
     Stress,
@@ -111,8 +111,7 @@ class MaterialParameters(ElasticParameters):
     @property
     def idle(self) -> frozenset[str]:
         """Parameters that no number depends on with this hardening rule."""
-        used = _USED.get(self.hardening, frozenset())
-        return frozenset().union(*_USED.values()) - used
+        return idle_of(self)
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:
         """Return the law of the material, with ``stiffness`` times Young's modulus."""
@@ -135,22 +134,27 @@ class MaterialParameters(ElasticParameters):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@FRICTION.fields
 class ContactParameters(MaterialParameters):
-    """Elastic-plastic material and friction."""
+    """Elastic-plastic material, and a law of friction with the parameters of all laws."""
 
-    friction: Friction = described(0.0, "Coulomb friction coefficient")
-    shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
-        0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
-    )
+    friction_law: str = described("coulomb", "law of friction")
 
-    cohesion: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
-        0.0, "contact shear beyond friction * pressure; no more than the pressure itself"
-    )
+    @property
+    def idle(self) -> frozenset[str]:
+        """Parameters that no number depends on with these rules."""
+        others = frozenset(FRICTION.parameters()) - FRICTION.used(self.friction_law)
+        return others.union(idle_of(self))
+
+    @property
+    def friction_part(self) -> FrictionLaw:
+        """The law of friction."""
+        return FRICTION.made(self.friction_law, self)
 
     @property
     def frictionless(self) -> bool:
         """Whether the contact is solved without friction."""
-        return effective_friction(self.friction) == 0.0
+        return not self.friction_part.rough
 
     def contact(
         self,
@@ -162,11 +166,15 @@ class ContactParameters(MaterialParameters):
         return ContactPair(
             slave=slave,
             master=master,
-            friction=self.friction,
-            shear_limit=self.shear_limit or math.inf,
-            cohesion=self.cohesion,
+            friction=self.friction_part,
             sliding=sliding,
         )
+
+
+def idle_of(parameters: MaterialParameters) -> frozenset[str]:
+    """Return the parameters of hardening that its rule does not use."""
+    used = _USED.get(parameters.hardening, frozenset())
+    return frozenset().union(*_USED.values()) - used
 
 
 def law_of(parameters: MaterialParameters, material: Material) -> Law:

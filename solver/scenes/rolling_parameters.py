@@ -97,6 +97,9 @@ class RollingParameters(WheelParameters):
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
+        if self.load == "hertz" and self.friction_law != "coulomb":
+            allowed = "must be coulomb: load = hertz prescribes the shear"
+            raise ModelError("friction_law", self.friction_law, allowed)
         for name in ("shear_limit", "cohesion") if self.load == "hertz" else ():
             if value := getattr(self, name):
                 raise ModelError(name, value, "must be 0: load = hertz prescribes the shear")
@@ -118,7 +121,6 @@ class RollingParameters(WheelParameters):
         """Raise `ModelError` for what a track without ends cannot have."""
         for name, usual in (
             ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
-            ("cohesion", 0.0),
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")

@@ -14,7 +14,7 @@ from solver.linear.threads import one_thread
 from solver.loading.bearing import too_much_shear
 from solver.materials.material import Material
 from solver.model.amplitude import Amplitude
-from solver.model.model import effective_friction
+from solver.model.friction import effective_friction
 from solver.model.motion import Axle
 from solver.scenes.rolling_model import wheel_body
 from solver.steady import Rim, RollingWheel, rolling, track_of
@@ -111,9 +111,9 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
     return RollingWheel(
         track,
         rim_of(run),
-        friction=friction,
+        friction=p.friction_part,
         force=p.force,
-        limit=p.shear_limit * p.linear_material().shear_yield_stress or np.inf,
+        strength=p.linear_material().shear_yield_stress,
         drive=None if p.guided else p.traction * friction * p.force,
         creepage=1.0 if p.traction == 1.0 else p.given_creepage,
     )

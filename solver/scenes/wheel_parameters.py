@@ -53,6 +53,9 @@ class WheelParameters(ContactParameters):
         ContactParameters.__post_init__(self)
         if self.traction and self.frictionless:
             raise ModelError("traction", self.traction, "must be 0 without friction")
+        if self.friction_law != "coulomb" and self.traction not in (0.0, 1.0):
+            allowed = "must be 0 or 1 unless friction_law is coulomb: full slip is friction * force"
+            raise ModelError("traction", self.traction, allowed)
         prescribed = self.control == "creepage"
         if prescribed and self.traction:
             raise ModelError("traction", self.traction, "must be 0 where creepage is given")

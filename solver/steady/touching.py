@@ -27,7 +27,6 @@ class RollingContact(AppliedLoad):
     area : (n,) of the hats of the vertices [mm2]
     gap : (n,) between track and rim, NaN where none faces the other [mm]
     status : (n,) of the contact points
-    friction : coefficient
     bound : (n,) of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
     height : displacement of the axle [mm]
@@ -40,7 +39,6 @@ class RollingContact(AppliedLoad):
     area: Array
     gap: Array
     status: NDArray[np.int64]
-    friction: float
     bound: Array
     creepage: float
     height: float
@@ -50,6 +48,11 @@ class RollingContact(AppliedLoad):
     def pressure(self) -> Array:
         """Contact pressure at the vertices (n,), zero where none faces the rim [MPa]."""
         return self._over_area(self.normal)
+
+    @property
+    def most_shear(self) -> Array:
+        """Shear that friction allows at the vertices (n,) [MPa]."""
+        return self._over_area(np.nan_to_num(self.bound))
 
     @property
     def shear(self) -> Array:

@@ -26,7 +26,8 @@ import numpy as np
 from solver.contact.complementarity import change_of, solve_contact
 from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem
-from solver.errors import NoContact, NotConverged, WindowTooSmall
+from solver.errors import ModelError, NoContact, NotConverged, WindowTooSmall
+from solver.model.friction import ContactPlaces, lines_of
 from solver.steady.rim import flowed
 from solver.steady.touching import RollingContact
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.problem import ContactSolution
+    from solver.model.friction import BoundLines, FrictionLaw
     from solver.steady.rim import Rim
     from solver.steady.track import Track
 
@@ -88,8 +90,8 @@ class RollingWheel:
     ----------
     track : that it rolls on
     rim : with which it may touch
-    friction : coefficient
-    limit : largest shear at any pressure [MPa]
+    friction : law of friction, which knows no state here
+    strength : initial shear yield stress of the track [MPa]
     force : vertical force on the axle [N]
     drive : moment on the axle / radius, positive when braking [N]; None where `creepage` is given
     creepage : 1 + R d(rotation) / d(advance)
@@ -100,15 +102,15 @@ class RollingWheel:
         track: Track,
         rim: Rim,
         *,
-        friction: float,
+        friction: FrictionLaw,
         force: float,
-        limit: float = np.inf,
+        strength: float = np.inf,
         drive: float | None = None,
         creepage: float = 0.0,
     ) -> None:
         self._track, self._rim, self._friction, self._force = track, rim, friction, force
-        self._drive = drive if friction else None
-        self._limit = limit
+        self._drive = drive if friction.rough else None
+        self._strength = strength
         self._creepage = creepage
         surface = track.surface
         self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
@@ -170,7 +172,7 @@ class RollingWheel:
         every = np.zeros((2, len(surface.vertices)))
         every[:, geometry.at] = found.forces.reshape(2, -1)
         gap, bound = np.full((2, len(surface.vertices)), np.nan)
-        bound[geometry.at] = problem.bound(found.forces[: len(geometry.at)])
+        bound[geometry.at] = problem.lines.least(found.forces[: len(geometry.at)])
         moved = problem.offset + problem.W @ found.forces + problem.A @ found.rigid
         gap[geometry.at] = moved[: len(geometry.at)]
         turns = self._drive is not None
@@ -184,7 +186,6 @@ class RollingWheel:
             area=geometry.area,
             gap=gap,
             status=self._known.status,
-            friction=self._friction,
             bound=bound,
             creepage=float(found.rigid[1]) / self._length if turns else self._creepage,
             height=self._known.height,
@@ -275,11 +276,25 @@ class RollingWheel:
         return ContactProblem(
             W=W,
             offset=offset,
-            friction=np.full(n, self._friction),
+            lines=self._bound(n).over(geometry.area[geometry.at]),
             A=np.stack(motions, axis=1),
             balance=np.array(balance),
-            limit=None if np.isinf(self._limit) else self._limit * geometry.area[geometry.at],
         )
+
+    def _bound(self, n: int) -> BoundLines:
+        """Return the lines of shear over pressure at n points."""
+
+        def nothing() -> Array:
+            allowed = "must not depend on slip or plastic strain on a track without ends"
+            raise ModelError("friction_law", self._friction, allowed)
+
+        places = ContactPlaces(
+            n=n,
+            find_strength=lambda: np.full(n, self._strength),
+            find_plastic_strain=nothing,
+            find_slip=nothing,
+        )
+        return lines_of(self._friction, places)
 
     def _nodal(self, force: Array) -> Array:
         """Return the forces (n,) on all nodes of the track from those on its surface."""

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import solver
+from solver.parts import own_digest
 
 if TYPE_CHECKING:
     from solver.scenes import Scene
@@ -106,7 +107,7 @@ def solver_hash() -> str:
     """Return the digest of all that decides what a run's file holds.
 
     These are the sources of the solver, and the modules that lay its records out as data sets,
-    each with its place: to move a file changes the digest.
+    each with its place: to move a file changes the digest. Files with parts of one's own count too.
     """
     from studies.definition.meaning import meaning  # `residua --help` makes no id
 
@@ -114,6 +115,8 @@ def solver_hash() -> str:
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
     digests = {name: _digest(meaning(path.read_bytes()).encode()) for name, path in files.items()}
+    if own := own_digest():
+        digests["parts"] = own
     return _digest(json.dumps(digests, sort_keys=True).encode())
 
 

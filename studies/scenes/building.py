@@ -13,6 +13,7 @@ from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release
 from solver.mesh import within
 from solver.model.amplitude import Amplitude
+from solver.model.friction import FRICTION
 from solver.scenes.material_parameters import MaterialParameters
 from studies.errors import StudyError, nearest
 from studies.scenes import tables
@@ -204,7 +205,6 @@ class Builder:
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
 
-        given = table.model_dump(exclude={"name", "slave", "master", "amplitude", "shear_limit"})
         slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
         for side, (body, boundary) in (("slave", slave), ("master", master)):
             self._named(f"contacts[{k}].{side}", body, boundary)
@@ -214,9 +214,11 @@ class Builder:
             lambda: ContactPair(
                 slave=(slave[0], slave[1]),
                 master=(master[0], master[1]),
-                shear_limit=table.shear_limit or math.inf,
+                friction=FRICTION.made(table.friction_law, table),
+                sliding=table.sliding,
+                gap=table.gap,
+                interference=table.interference,
                 amplitude=amplitude,
-                **given,
             ),
         )
 

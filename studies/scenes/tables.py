@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import numpy as np
 from annotated_types import Interval
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
 from solver.mesh.lines import closer
-from solver.parameters import Friction, Length, Stress
+from solver.model.friction import FRICTION
+from solver.parameters import Length, Stress
 from solver.scenes.material_parameters import MaterialParameters
 from studies.scenes.shape_tables import ArcTable, LineTable, Shape
 from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
@@ -147,19 +148,32 @@ Load = Annotated[
 ]
 
 
-class ContactTable(SceneTable):
+class PairTable(SceneTable):
     """Two surfaces that may touch; see `solver.ContactPair`. Its label is ``name``."""
 
     name: Label
     slave: Side
     master: Side
-    friction: Friction = 0.0
-    cohesion: Annotated[float, Interval(ge=0.0, le=1e7)] = 0.0
-    shear_limit: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.0
     sliding: Literal["auto", "small", "finite"] = "auto"
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
+    friction_law: str = "coulomb"
+
+
+def _contact() -> type[PairTable]:
+    """Return the table of a pair with the words and the parameters of the laws of friction."""
+    found = FRICTION.parameters().items()
+    known: dict[str, Any] = {name: (hint, field.default) for name, (hint, field) in found}
+    known["friction_law"] = (Literal[tuple(FRICTION)], "coulomb")
+    made: type[PairTable] = create_model("ContactTable", __base__=PairTable, **known)
+    return made
+
+
+if TYPE_CHECKING:
+    ContactTable = PairTable
+else:
+    ContactTable = _contact()
 
 
 class SingularTable(SceneTable):

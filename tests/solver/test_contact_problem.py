@@ -11,6 +11,7 @@ from solver.contact.complementarity import solve_contact
 from solver.contact.given_bound import given_bound
 from solver.contact.lemke import lemke
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem
+from solver.model.friction import BoundLines
 
 
 def half_plane_compliance(n, coupling, seed):
@@ -37,10 +38,19 @@ def instance(seed, friction, *, rigid=0, frictional=True, n=12, coupling=0.3):
     return ContactProblem(
         W=W[:m, :m],
         offset=offset,
-        friction=np.full(n, friction),
+        lines=lines(n, friction),
         A=A[:m, :rigid],
         balance=balance[:rigid],
     )
+
+
+def lines(n, friction, cohesion=None, limit=np.inf):
+    """Coulomb's bound at n points, with cohesion and a limit [N] of each."""
+    of = [(friction, 0.0)]
+    if cohesion is not None:
+        of = [(friction + 1.0, 0.0), (friction, cohesion)]
+    slope, level = zip(*[*of, (0.0, limit)], strict=True)
+    return BoundLines(*(np.stack([np.broadcast_to(v, n) for v in each]) for each in (slope, level)))
 
 
 def natural_residual(problem, solution):
@@ -51,11 +61,8 @@ def natural_residual(problem, solution):
     N = F[:n]
     worst = [np.abs(N - np.maximum(0.0, N - stiffness[:n] * motion[:n])).max()]
     if problem.frictional:
-        bound = problem.friction * np.maximum(N, 0.0)
-        if problem.cohesion is not None:
-            bound += np.minimum(problem.cohesion, np.maximum(N, 0.0))
-        if problem.limit is not None:
-            bound = np.minimum(bound, problem.limit)
+        slope, level = problem.lines
+        bound = (slope * np.maximum(N, 0.0) + level).min(axis=0)
         wanted = np.clip(F[n:] - stiffness[n:] * motion[n:], -bound, bound)
         worst.append(np.abs(F[n:] - wanted).max())
     worst.append(np.abs(problem.balance + problem.A.T @ F).max(initial=0.0))
@@ -96,7 +103,7 @@ def test_frictional_solutions_keep_to_their_limits(friction, rigid):
     for seed in range(60):
         problem = instance(seed, friction, rigid=rigid)
         limit = np.random.default_rng(seed + 1000).uniform(0.01, 0.2, problem.n) * friction
-        problem = replace(problem, limit=limit)
+        problem = replace(problem, lines=lines(problem.n, friction, limit=limit))
         solution = solve_contact(problem, np.full(problem.n, OPEN))
         assert solution is not None
         assert natural_residual(problem, solution) < 1e-8
@@ -118,18 +125,39 @@ def test_frictional_solutions_keep_to_their_cohesion(friction, rigid, limited):
     for seed in range(60):
         problem = instance(seed, friction, rigid=rigid)
         spread = np.random.default_rng(seed + 2000)
-        problem = replace(problem, cohesion=spread.uniform(0.01, 0.1, problem.n))
-        if limited:
-            problem = replace(problem, limit=spread.uniform(0.02, 0.12, problem.n))
+        cohesion = spread.uniform(0.01, 0.1, problem.n)
+        limit = spread.uniform(0.02, 0.12, problem.n) if limited else np.inf
+        problem = replace(problem, lines=lines(problem.n, friction, cohesion, limit))
         solution = solve_contact(problem, np.full(problem.n, OPEN))
         assert solution is not None
         assert natural_residual(problem, solution) < 1e-8
         N, T = solution.forces[: problem.n], solution.forces[problem.n :]
         assert not T[N <= 0].any()
-        at_limit += limited and np.isclose(np.abs(T), problem.limit).any()
+        at_limit += limited and np.isclose(np.abs(T), limit).any()
         seen |= set(solution.status.tolist())
     assert seen == {OPEN, STICK, FORWARD, BACKWARD}
     assert at_limit > 15 or not limited
+
+
+@pytest.mark.parametrize("rigid", [0, 1, 2])
+def test_frictional_solutions_keep_to_a_bound_of_many_lines(rigid):
+    """Tangents of 0.1 (1 - exp(-8 N)): points slip on several of them."""
+    seen, on = set(), set()
+    load = np.append(np.geomspace(0.01, 0.5, 8), np.inf)
+    slope = np.append(0.8, 0.8 * np.exp(-8 * load))
+    level = np.append(0.0, 0.1 - np.exp(-8 * load) * (0.1 + 0.8 * np.append(load[:-1], 0.0)))
+    for seed in range(60):
+        problem = instance(seed, 0.8, rigid=rigid)
+        many = BoundLines(*(np.tile(of[:, None], problem.n) for of in (slope, level)))
+        problem = replace(problem, lines=many)
+        solution = solve_contact(problem, np.full(problem.n, OPEN))
+        assert solution is not None
+        assert natural_residual(problem, solution) < 1e-8
+        seen |= set(solution.status.tolist())
+        slips = solution.status > STICK
+        on |= set(many.piece(solution.forces[: problem.n])[slips].tolist())
+    assert seen == {OPEN, STICK, FORWARD, BACKWARD}
+    assert len(on) > 5
 
 
 def test_a_limit_that_is_not_reached_changes_no_number():
@@ -137,7 +165,8 @@ def test_a_limit_that_is_not_reached_changes_no_number():
         problem = instance(seed, 0.4, rigid=seed % 3)
         start = np.full(problem.n, STICK)
         free = solve_contact(problem, start)
-        limited = solve_contact(replace(problem, limit=np.full(problem.n, 1e3)), start)
+        limited = replace(problem, lines=lines(problem.n, 0.4, limit=1e3))
+        limited = solve_contact(limited, start)
         assert np.array_equal(free.forces, limited.forces)
         assert np.array_equal(free.status, limited.status)
 
@@ -173,7 +202,7 @@ def test_a_load_that_pulls_a_floating_body_off_has_no_solution():
     pulled = ContactProblem(
         W=problem.W,
         offset=problem.offset,
-        friction=problem.friction,
+        lines=problem.lines,
         A=problem.A,
         balance=-problem.balance,
     )
@@ -185,7 +214,7 @@ def test_no_contact_points_balance_no_load_only():
         return ContactProblem(
             W=np.zeros((0, 0)),
             offset=np.zeros(0),
-            friction=np.zeros(0),
+            lines=BoundLines.none(0),
             A=np.zeros((0, k)),
             balance=np.zeros(k),
         )
@@ -228,7 +257,7 @@ def test_two_points_at_one_place_do_not_hold_a_body_that_may_tilt():
             [[1.87780333174076, -1.373420995404054], [-1.373420995404054, 1.17402163736985]]
         ),
         offset=np.array([0.21327155, 0.45899312]),
-        friction=np.zeros(2),
+        lines=BoundLines.none(2),
         A=np.full((2, 2), [1.0, 6.405920704482398]),
         balance=np.array([-1.0, -6.405920704482398]),
     )

@@ -28,6 +28,7 @@ from solver import (
 from solver.loading import stepper
 from solver.loading.slide import spent
 from solver.mesh import grid, mapped
+from solver.model.friction import Coulomb, lines_of
 from solver.model.rigid import arc
 
 pytestmark = pytest.mark.solves
@@ -143,22 +144,27 @@ def test_bodies_that_overlap_part_without_friction() -> None:
 
 
 def test_friction_that_is_almost_spent_is_told_with_its_bodies() -> None:
-    def pair(share: float) -> tuple[Any, Any]:
-        normal = np.array([1.0, 3.0, 0.0])
-        contact = SimpleNamespace(normal=normal, tangential=-0.3 * share * normal)
-        return SimpleNamespace(friction=0.3, slave=0, master=1), contact
+    area = np.array([1.0, 2.0, 1.0])
+    interface = SimpleNamespace(
+        slave=0, master=1, pairing=lambda u, time, finite: SimpleNamespace(area=area)
+    )
 
-    for share, told in (
-        (0.9, ""),
-        (0.97, "; just before, friction between pad and plate bears 97%"),
-    ):
-        interface, contact = pair(share)
-        system: Any = SimpleNamespace(interfaces=[interface], all_names=["pad", "plate"])
-        assert spent(system, [contact]).startswith(told)
-        assert bool(spent(system, [contact])) is bool(told)
-    smooth = SimpleNamespace(friction=0.0, slave=0, master=1)
-    system = SimpleNamespace(interfaces=[smooth], all_names=["pad", "plate"])
-    assert spent(system, [contact]) == ""
+    def found(law: Coulomb, share: float) -> str:
+        normal = np.array([1.0, 3.0, 0.0])
+        contact = SimpleNamespace(normal=normal, tangential=-0.3 * share * normal, finite=False)
+        at: Any = SimpleNamespace(n=3)
+        system: Any = SimpleNamespace(
+            interfaces=[interface], all_names=["pad", "plate"],
+            bound=lambda pair, pairing, start, time: lines_of(law, at),
+        )  # fmt: skip
+        state: Any = SimpleNamespace(contacts=[contact], u=(), time=1.0)
+        return spent(system, state)
+
+    told = "; just before, friction between pad and plate bears 97%"
+    assert found(Coulomb(friction=0.3), 0.97).startswith(told)
+    assert found(Coulomb(friction=0.3), 0.9) == ""
+    assert found(Coulomb(friction=0.3, cohesion=0.1), 0.97) == ""
+    assert found(Coulomb(), 0.97) == ""
 
 
 @pytest.mark.parametrize("overlap", [1e-7, 1e-5, 1e-3])

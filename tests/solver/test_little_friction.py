@@ -11,7 +11,7 @@ import pytest
 from solver import ModelError, Status, System
 from solver.contact.complementarity import solve_contact
 from solver.contact.problem import OPEN, ContactProblem
-from solver.model.model import LEAST_FRICTION
+from solver.model.friction import LEAST_FRICTION
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_model import model
 from solver.scenes.rolling_parameters import RollingParameters
@@ -91,7 +91,7 @@ def test_a_body_that_friction_alone_holds_is_solved_in_the_units_of_friction(fri
         problem = ContactProblem(
             W=plain.W,
             offset=plain.offset,
-            friction=plain.friction,
+            lines=plain.lines,
             A=A,
             balance=np.append(plain.balance, push),
         )
@@ -110,7 +110,7 @@ def test_friction_within_rounding_is_none():
     for friction, solved in ((LEAST_FRICTION, 0.0), (2 * LEAST_FRICTION, 2 * LEAST_FRICTION)):
         parameters = replace(COARSE, friction=friction)
         (interface,) = System(model(parameters)).interfaces
-        assert interface.friction == solved
+        assert interface.rough == (solved > 0.0)
         assert parameters.frictionless == (solved == 0.0)
         turned = model(parameters).body("wheel").axle.rotation
         assert (turned is None) == (solved > 0.0)

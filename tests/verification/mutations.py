@@ -18,12 +18,13 @@ import solver.loading.step
 import solver.loading.stepper
 from solver.contact import candidates, complementarity
 from solver.contact.problem import OPEN, STICK, ContactSolution
+from solver.contact.system import System
 from solver.fem import kinematics, substructure
 from solver.fem.discretisation import Discretisation
 from solver.fem.wheel import Wheel
 from solver.loading.control import Tolerances
 from solver.materials import PlasticState
-from solver.model.model import effective_friction
+from solver.model.friction import BoundLines
 
 Patch = pytest.MonkeyPatch
 Fault = Callable[[Patch], None]
@@ -52,10 +53,12 @@ class Mutation:
 
 def friction_times(factor: float) -> Fault:
     def fault(patch: Patch) -> None:
-        def scaled(mu: float) -> float:
-            return factor * effective_friction(mu)
+        bound = System.bound
 
-        patch.setattr(solver.contact.interface, "effective_friction", scaled)
+        def scaled(*args: Any) -> BoundLines:
+            return BoundLines(*(factor * of for of in bound(*args)))
+
+        patch.setattr(System, "bound", scaled)
 
     return fault
 

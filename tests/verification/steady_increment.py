@@ -157,6 +157,7 @@ class SteadyIncrement:
             gap=now.gap,
             rates=np.stack([closing, np.where(faces, slip, np.nan)]),
             finite=interface.finite,
+            slipped=np.zeros_like(slip),
         )
 
     def solve(self, *, from_touch: bool) -> Converged:

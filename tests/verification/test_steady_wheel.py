@@ -15,6 +15,7 @@ import pytest
 
 from solver.contact.problem import OPEN, STICK
 from solver.errors import LimitLoad
+from solver.model.friction import Coulomb
 from solver.results.audit.steady import audit_pass
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import rim_of
@@ -45,7 +46,7 @@ def wheel(pressure=4.7, size=2.0, share=0.0, friction=FRICTION, creepage=None, h
     load = RollingWheel(
         place,
         rim_of(parameters),
-        friction=friction,
+        friction=Coulomb(friction=friction),
         force=parameters.force,
         drive=drive,
         creepage=creepage or 0.0,

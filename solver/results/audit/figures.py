@@ -39,8 +39,8 @@ _DECLARED = [
     declare("audit_surface_shear", "largest contact shear / shear yield stress"),
     declare(
         "audit_friction_over_strength",
-        "friction times contact pressure / shear yield stress: above 1 the surface shears instead "
-        "of slipping",
+        "largest shear that friction allows under the contact pressure / shear yield stress: above "
+        "1 the surface shears instead of slipping",
     ),
     declare("audit_yield", "largest stress beyond the yield surface / yield stress"),
     declare(

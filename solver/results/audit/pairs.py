@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from solver.contact.system import LEAST
-from solver.model.model import effective_friction
+from solver.model.friction import ContactPlaces, lines_of
 from solver.results.audit.surfaces import Surfaces
 
 if TYPE_CHECKING:
@@ -92,7 +92,8 @@ class AuditedPair:
     def __init__(self, system: System, number: int, converged: Converged) -> None:
         self._system = system
         self._pair: ContactPair = system.model.contacts[number]
-        contact, self._start = converged.state.contacts[number], converged.start.contacts[number]
+        self._number = number
+        contact, self._start = converged.state.contacts[number], converged.start
         self.normal, self.tangential = contact.normal, contact.tangential
         self._state = converged.state
         self._closed = _closed(converged.state, number)
@@ -193,16 +194,16 @@ class AuditedPair:
             'sliding = "finite"'
         )
 
-    @property
+    @cached_property
     def _bound(self) -> Array:
-        mu = effective_friction(self._pair.friction)
-        limit = np.full(len(self.normal), np.inf)
-        if np.isfinite(self._pair.shear_limit):
-            limit = self._pair.shear_limit * self.touching.strength * self.touching.area
-        normal = np.maximum(self.normal, 0.0)
-        # cohesion acts in full where the pressure is larger than it
-        cohesion = np.minimum(self._pair.cohesion * self.touching.area, normal)
-        return np.minimum(mu * normal + cohesion, limit)
+        """The largest tangential forces (n,), under the area and strength found here [N]."""
+        places = ContactPlaces(
+            n=len(self.normal),
+            find_strength=lambda: self.touching.strength,
+            find_plastic_strain=lambda: self._system.plastic_strain(self._number, self._start),
+            find_slip=lambda: self._start.contacts[self._number].slipped,
+        )
+        return lines_of(self._pair.law, places).over(self.touching.area).least(self.normal)
 
     @cached_property
     def figures(self) -> dict[str, float]:
@@ -247,7 +248,8 @@ class AuditedPair:
         shear: nothing may slip below the bound, and friction opposes slip. Vertices new in contact
         are left out.
         """
-        judged = self._closed & self._start.touching & (self.touching.area > 0)
+        before = self._start.contacts[self._number].touching
+        judged = self._closed & before & (self.touching.area > 0)
         bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
         least = max(_STILL * self.approach, self.rounding)
         should = float(bound @ np.maximum(np.abs(slip), least))

@@ -149,17 +149,20 @@ def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
 
 
 def _strength(system: System, loaded: Converged) -> dict[str, float]:
-    """Return contact shear, and friction times pressure, / shear yield stress."""
+    """Return contact shear, and the most that friction bears, / shear yield stress."""
     shear, friction = 0.0, 0.0
     for k, interface in enumerate(system.interfaces):
-        pressure, tangential = contact_pressure(system, loaded.state, k)
+        state, start = loaded.state, loaded.start
+        pressure, tangential = contact_pressure(system, state, k)
+        pairing = interface.pairing(state.u, state.time, finite=state.contacts[k].finite)
+        bound = system.bound(k, pairing, start, state.time).least(pressure)
         for number, _, _ in interface.sides:
             law = system.parts[number].law(loaded.state.time)
             if law.elastic:
                 continue
             strength = float(law.shear_strength(loaded.responses[number].state).max())
             shear = max(shear, float(np.abs(tangential).max()) / strength)
-            friction = max(friction, interface.friction * float(pressure.max()) / strength)
+            friction = max(friction, float(bound.max()) / strength)
     return {"audit_surface_shear": shear, "audit_friction_over_strength": friction}
 
 

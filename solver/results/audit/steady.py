@@ -184,7 +184,7 @@ def _of_contact(material: Material, found: Pass) -> dict[str, float]:
             np.abs(touching.tangential) - np.nan_to_num(touching.bound)
         ),
         "audit_surface_shear": _largest(np.abs(touching.shear)) / strength,
-        "audit_friction_over_strength": touching.friction * _largest(touching.pressure) / strength,
+        "audit_friction_over_strength": _largest(touching.most_shear) / strength,
     }
 
 

@@ -84,7 +84,7 @@ class PairState:
     slip : (n,) mean slip of the increment [mm]
     way : (n,) mean motion of the slave along the master since the bodies were at rest [mm]
     strength : (n,) mean shear yield stress of the weaker body under the hat, at the temperature of
-        the state; inf where the pair has no limit of shear [MPa]
+        the state; inf between elastic bodies [MPa]
     edge : (n,) mean length of the edges at a vertex [mm]
     point_gap : (n_points,) gap of the deformed bodies at points of the slave, inf where no master
         faces it [mm]
@@ -189,12 +189,12 @@ class Surfaces:
         ``mean`` is that under the hats of values at points, ``on_slave`` gives these.
         """
         weaker = np.full(len(self.slave.edges) + 1, np.inf)
-        if np.isinf(self.pair.shear_limit):
-            return weaker
         for (name, _), chain, at_points in (
             (self.pair.slave, self.slave, on_slave), (self.pair.master, self.master, partner.of),
         ):  # fmt: skip
             body = self._system.model.body(name)
+            if body.material.elastic:
+                continue
             left = np.ones((1, len(chain.nodes)))
             for load in body.every_load:
                 if isinstance(load, Temperature) and load.yield_drop:
