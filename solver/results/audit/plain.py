@@ -239,7 +239,7 @@ class PlainBody:
             x = points[..., first : first + 2 * _CHORDS - 1 : 2].reshape(2, -1)
             force = load.push(x, along)
             if force is not None:
-                total += share * self.moments(self._depth(x) * force, x)
+                total += share * self.moments(self._depth(x) * np.broadcast_to(force, x.shape), x)
         return total
 
     def _on_volume(self, load: Load) -> Array:
@@ -248,7 +248,8 @@ class PlainBody:
             return np.zeros((3, 2))
         basis = CellBasis(self.body.mesh, self.part.basis.elem, intorder=_VOLUME_DEGREE)
         x = np.asarray(basis.global_coordinates())
-        force = np.asarray(load.body_force(x.reshape(2, -1))).reshape(x.shape)
+        given = np.asarray(load.body_force(x.reshape(2, -1)))
+        force = np.broadcast_to(given, (2, x[0].size)).reshape(x.shape)
         force = force * basis.dx * self._depth(x)
         nodal = np.array([(force * np.asarray(b[0])).sum(axis=2) for b in basis.basis])
         at = self.part.X[:, basis.element_dofs]
