@@ -144,6 +144,8 @@ def load_own_parts() -> None:
     """
     for path in own_files():
         name = f"residua_parts_{path.stem}"
+        if getattr(sys.modules.get(name), "__file__", "") == str(path):
+            continue  # it runs now, and asks for parts itself
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None or not path.is_file():
             raise ModelError(SETTING, str(path), "must name Python files")

@@ -277,9 +277,11 @@ def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None)
 
 def _made(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
     """Return the mesh of a body as its shape or its file has it."""
+    from solver.mesh.elements import known_elements
+
     if table.mesh is None:
-        cells = "tri" if (table.element or "").startswith("tri") else "quad"
-        return mesh_of(table.shape, cells)
+        kind = known_elements().get(table.element or "")  # the body refuses one that is unknown
+        return mesh_of(table.shape, kind.cells if kind else "quad")
     if meshes is None:
         raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")
     return meshes[table.mesh].mesh(table.part)
