@@ -34,10 +34,13 @@ class Parts(Generic[T]):
     Parameters
     ----------
     kind : the parameter that names one of them, such as ``hardening``
+    alike : whether a parameter that several parts have must be declared alike; false where each
+        part has a table of its own
     """
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, *, alike: bool = True) -> None:
         self.kind = kind
+        self._alike = alike
         self._known: dict[str, type[T]] = {}
 
     def word(self, word: str) -> Callable[[C], C]:
@@ -57,7 +60,8 @@ class Parts(Generic[T]):
             ):
                 raise ModelError(self.kind, word, f"is the word of {before.__qualname__} already")
             self._known[word] = part
-            self.parameters()  # refuses those that do not go together
+            if self._alike:
+                self.parameters()  # refuses those that do not go together
             return part
 
         return named
@@ -159,6 +163,8 @@ def load_own_parts() -> None:
     """
     for path in own_files():
         name = f"residua_parts_{path.stem}"
+        if getattr(sys.modules.get(name), "__file__", "") == str(path):
+            continue  # it runs now, and asks for parts itself
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None or not path.is_file():
             raise ModelError(SETTING, str(path), "must name Python files")

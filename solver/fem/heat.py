@@ -10,7 +10,6 @@ import numpy as np
 from solver.errors import ModelError
 from solver.fem.loads import Superposed
 from solver.materials.heated import Heated
-from solver.model.loads import Temperature
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,16 +30,14 @@ class Heat:
 
     @classmethod
     def of(cls, part: Nodes, x: NDArray[np.float64]) -> Heat | None:
-        """Return what the temperatures of a body do at places (2, n); None if they only expand."""
-        loads = [load for load in part.body.every_load
-                 if isinstance(load, Temperature) and load.softens]  # fmt: skip
-        if not loads:
+        """Return what the loads of a body take at places (2, n); None if nothing."""
+        both = [(load, load.softening(x)) for load in part.body.every_load]
+        lost = [(load, shares) for load, shares in both if shares is not None]
+        if not lost:
             return None
-        rises = [load.at(x) for load in loads]
-        both = list(zip(loads, rises, strict=True))
         return cls(
-            Superposed.of(x.shape[1], ((load, load.modulus_drop * rise) for load, rise in both)),
-            Superposed.of(x.shape[1], ((load, load.yield_drop * rise) for load, rise in both)),
+            Superposed.of(x.shape[1], ((load, modulus) for load, (modulus, _) in lost)),
+            Superposed.of(x.shape[1], ((load, strength) for load, (_, strength) in lost)),
         )
 
     def law(self, cold: Law, time: float) -> Law:

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import CellBasis
 
 from solver.errors import ModelError
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
+from solver.model.loads import checked
 from solver.tensors import to_mandel
 
 if TYPE_CHECKING:
@@ -23,8 +24,11 @@ if TYPE_CHECKING:
     from solver.model.motion import TravellingPressure
 
     Array = NDArray[np.float64]
-    Push = Callable[[Array, Array], Array]
+    Push = Callable[[Array, Array], Array | None]
 
+_DEGREE = 7
+"""Polynomial degree up to which forces per volume are integrated exactly, and tractions on straight
+edges."""
 _SAME = 1e-9
 """Ratio of the difference to the size of what is given, below which it is rounding."""
 
@@ -65,17 +69,34 @@ class Superposed:
 
 
 def nodal_forces(part: Nodes) -> Superposed:
-    """Return the nodal forces (n,) of the pressures and tractions on a body [N]."""
-    loads = [load for load in part.body.every_load if isinstance(load, Pressure | Traction)]
-    return Superposed.of(part.n, ((load, _tractions(part, load.boundary, _push(load), 4))
-                                  for load in loads))  # fmt: skip
+    """Return the nodal forces (n,) of the loads on a body [N]."""
+    each: list[tuple[Load, Array]] = []
+    for load in part.body.every_load:
+        own = [_tractions(part, b, load.push, (_DEGREE + 1) // 2) for b in load.boundaries]
+        own.append(_body_forces(part, load))
+        given = [force for force in own if force is not None]
+        if given:
+            each.append((load, sum(given[1:], given[0])))
+    return Superposed.of(part.n, each)
 
 
-def _push(load: Pressure | Traction) -> Push:
-    if isinstance(load, Pressure):
-        return lambda x, t: load.value * np.stack([-t[1], t[0]])
-    force = np.array([[load.x], [load.y]])
-    return lambda x, t: force * np.linalg.norm(t, axis=0)
+def _body_forces(part: Nodes, load: Load) -> Array | None:
+    """Return the nodal forces (n,) of the force per volume of a load [N]; None where it has none.
+
+    The points of the stress, which may be few, do not matter here.
+    """
+    if load.body_force(part.X) is None:
+        return None
+    basis = CellBasis(part.body.mesh, part.basis.elem, intorder=_DEGREE)
+    x = np.asarray(basis.global_coordinates())
+    flat = x.reshape(2, -1)
+    given = checked(f"{load.name}.body_force", load.body_force(flat), flat.shape, "N/mm3")
+    force = given.reshape(x.shape) * basis.dx * part.measure(x)
+    nodes = part.same[basis.element_dofs]
+    nodal = np.zeros((part.X.shape[1], 2))
+    for own, (shape, *_) in zip(nodes, basis.basis, strict=True):
+        np.add.at(nodal, own, (force * np.asarray(shape)).sum(axis=2).T)
+    return nodal.ravel()
 
 
 def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
@@ -84,7 +105,7 @@ def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
     Loads on one boundary add up. Where boundaries meet, each must prescribe the same at all times;
     a support prescribes no displacement. Raises `ModelError` where they do not.
     """
-    loads = [load for load in part.body.every_load if isinstance(load, Displacement)]
+    loads = [load for load in part.body.every_load if load.components]
     each, held = [(load, np.zeros(part.n)) for load in loads], np.zeros(part.n, dtype=bool)
     for axis in (0, 1):
         courses = _courses(part, loads, axis)
@@ -99,14 +120,15 @@ def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
     return Superposed.of(part.n, each), held
 
 
-def _courses(part: Nodes, loads: Sequence[Displacement], axis: int) -> list[_Course]:
+def _courses(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Course]:
     """Return what supports and loads prescribe along an axis, one for each boundary."""
     still = [b for b, axes in part.body.supports.items() if "xy"[axis] in axes]
-    moved: dict[str, list[Displacement]] = {}
+    moved: dict[str, list[Load]] = {}
     for load in loads:
         if axis in load.components:
-            moved.setdefault(load.boundary, []).append(load)
-    both: list[tuple[str, str, list[Displacement]]] = [("supports", b, []) for b in still]
+            for boundary in load.boundaries:
+                moved.setdefault(boundary, []).append(load)
+    both: list[tuple[str, str, list[Load]]] = [("supports", b, []) for b in still]
     both += [("displacement", b, own) for b, own in moved.items()]
     return [
         _Course(f"{kind}.{boundary}", 2 * part.boundary_nodes(boundary) + axis, tuple(own), axis)
@@ -123,7 +145,7 @@ class _Course:
 
     name: str
     dofs: NDArray[np.int64]
-    loads: tuple[Displacement, ...]
+    loads: tuple[Load, ...]
     axis: int
 
     def at(self, times: Array) -> Array:
@@ -169,15 +191,15 @@ def eigenstrains(part: Nodes) -> Superposed:
     An initial stress s is that of the eigenstrain ``-C^-1 s`` in a body that has not moved.
     """
     x = part.points.reshape(2, -1)
+    shape = (4, x.shape[1])
     each: list[tuple[Load, Array]] = []
     for load in part.body.every_load:
-        if isinstance(load, Temperature):
-            strain = np.zeros((4, x.shape[1]))
-            strain[:3] = load.expansion * load.at(x)
-            each.append((load, strain))
-        elif isinstance(load, InitialStress):
+        strain, stress = load.eigenstrain(x), load.initial_stress(x)
+        if strain is not None:
+            each.append((load, to_mandel(checked(f"{load.name}.eigenstrain", strain, shape, "1"))))
+        if stress is not None:
+            stress = checked(f"{load.name}.initial_stress", stress, shape, "MPa")
             compliance = np.linalg.inv(part.body.material.stiffness(4))
-            stress = load.at(x)
             if part.body.kinematics == "plane_stress":
                 _check_plane(stress)
             each.append((load, -compliance @ to_mandel(stress)))
@@ -192,20 +214,14 @@ def _check_plane(stress: Array) -> None:
         raise ModelError("initial_stress.zz", worst, "must be zero in plane stress [MPa]")
 
 
-def travelling_forces(
-    part: Nodes, travelling: TravellingPressure, time: float
-) -> NDArray[np.float64]:
+def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) -> Array:
     """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
-
-    def push(x: Array, t: Array) -> Array:
-        pressure, ratio = travelling.at(time, x[0], part.period)
-        return pressure * (np.stack([-t[1], t[0]]) - ratio * t)
-
-    return _tractions(part, travelling.boundary, push, 8)
+    force = _tractions(part, travelling.boundary, travelling.pushing(time, part.period), 8)
+    return np.zeros(part.n) if force is None else force
 
 
-def _tractions(part: Nodes, boundary: str, push: Push, points: int) -> Array:
-    """Return the nodal forces (n,) of a traction [N].
+def _tractions(part: Nodes, boundary: str, push: Push, points: int) -> Array | None:
+    """Return the nodal forces (n,) of a traction [N]; None where ``push`` gives none.
 
     ``push`` gives the force (2, n) for positions and tangents (2, n), the body on their left; it is
     a force per area times the length of the tangent.
@@ -215,8 +231,11 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int) -> Array:
     force = np.zeros((2, part.X.shape[1]))
     for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
         N = shape_functions(np.array(xi), edges.shape[1])
-        t = X @ shape_derivatives(np.array(xi), edges.shape[1])
-        pushed = weight * push(X @ N, t) * part.measure(X @ N)
+        x, t = X @ N, X @ shape_derivatives(np.array(xi), edges.shape[1])
+        given = push(x, t)
+        if given is None:
+            return None
+        pushed = weight * checked(f"push on {boundary}", given, t.shape, "N/mm") * part.measure(x)
         for k, value in enumerate(N):
             for component in (0, 1):
                 np.add.at(force[component], edges[:, k], pushed[component] * value)

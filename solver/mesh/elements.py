@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
+import numpy as np
 from skfem import Element, ElementQuad1, ElementQuad2, ElementQuadS2, ElementTriP1, ElementTriP2
+from skfem.refdom import RefQuad, RefTri
 
 from solver.errors import ModelError
+from solver.parts import load_own_parts
+
+_NODES = {"tri": (3, 6), "quad": (4, 8, 9)}
+"""Nodes of an element: corners, those of the sides, one in the middle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -15,47 +22,80 @@ class ElementType:
 
     Attributes
     ----------
-    element : scalar scikit-fem element
-    cells : ``quad`` or ``tri``
+    element : scalar scikit-fem element whose unknowns are values at its nodes: 3 or 6 of a
+        triangle, 4, 8 or 9 of a quadrilateral
     order : polynomial degree the default integration is exact for
     full_order : the same for full integration
-    quadratic : whether edges carry a midside node
     mean_dilatation : whether the volumetric strain is averaged over the element (B-bar)
     """
 
     element: Element
-    cells: str
     order: int
     full_order: int
-    quadratic: bool
     mean_dilatation: bool = False
+
+    def __post_init__(self) -> None:
+        shape = self.element
+        name = type(shape).__name__
+        if shape.refdom not in (RefQuad, RefTri):
+            raise ModelError("element", name, "must be of quadrilaterals or triangles")
+        nodes = np.array(shape.doflocs, dtype=float).T
+        counts = _NODES[self.cells]
+        if nodes.shape[1] not in counts or shape.nodal_dofs != 1 or shape.facet_dofs > 1:
+            allowed = f"must have {', '.join(map(str, counts[:-1]))} or {counts[-1]} nodes"
+            raise ModelError("element", name, allowed)
+        values = np.array([shape.lbasis(nodes, i)[0] for i in range(nodes.shape[1])])
+        if not np.allclose(values, np.eye(nodes.shape[1])):
+            raise ModelError("element", name, "must have values at its nodes as unknowns")
+        for field in ("order", "full_order"):
+            if self.cells == "tri" and getattr(self, field) not in (1, 2, 4):
+                allowed = "must be 1, 2 or 4 on a triangle, whose points then carry a polynomial"
+                raise ModelError(field, getattr(self, field), allowed)
+
+    @property
+    def cells(self) -> str:
+        """``quad`` or ``tri``."""
+        return "quad" if self.element.refdom is RefQuad else "tri"
+
+    @property
+    def quadratic(self) -> bool:
+        """Whether edges carry a midside node."""
+        return bool(self.element.facet_dofs)
 
 
 ELEMENTS: dict[str, ElementType] = {
-    "quad8": ElementType(
-        element=ElementQuadS2(), cells="quad", order=3, full_order=5, quadratic=True
-    ),
-    "quad9": ElementType(
-        element=ElementQuad2(), cells="quad", order=5, full_order=5, quadratic=True
-    ),
-    "quad4": ElementType(
-        element=ElementQuad1(),
-        cells="quad",
-        order=3,
-        full_order=3,
-        quadratic=False,
-        mean_dilatation=True,
-    ),
-    "tri6": ElementType(element=ElementTriP2(), cells="tri", order=2, full_order=4, quadratic=True),
-    "tri3": ElementType(
-        element=ElementTriP1(), cells="tri", order=1, full_order=1, quadratic=False
-    ),
+    "quad8": ElementType(element=ElementQuadS2(), order=3, full_order=5),
+    "quad9": ElementType(element=ElementQuad2(), order=5, full_order=5),
+    "quad4": ElementType(element=ElementQuad1(), order=3, full_order=3, mean_dilatation=True),
+    "tri6": ElementType(element=ElementTriP2(), order=2, full_order=4),
+    "tri3": ElementType(element=ElementTriP1(), order=1, full_order=1),
 }
+"""The elements by name."""
+
+
+def add_element(name: str, kind: ElementType) -> None:
+    """Add an element under its name; a file of one's own does so (see `solver.parts`).
+
+    Raises
+    ------
+    ModelError
+        when another element has the name
+    """
+    before = ELEMENTS.setdefault(name, kind)
+    same = type(before.element) is type(kind.element)
+    if not same or replace(before, element=kind.element) != kind:
+        raise ModelError("element", name, "is the name of another element already")
+
+
+def known_elements() -> Mapping[str, ElementType]:
+    """Return the elements by name, those of files of one's own too."""
+    load_own_parts()
+    return ELEMENTS
 
 
 def element_type(name: str) -> ElementType:
     """Return the element called ``name`` or raise `ModelError`."""
-    try:
-        return ELEMENTS[name]
-    except KeyError:
-        raise ModelError("element", name, "must be one of " + ", ".join(ELEMENTS)) from None
+    known = known_elements()
+    if name not in known:
+        raise ModelError("element", name, "must be one of " + ", ".join(known))
+    return known[name]

@@ -33,7 +33,7 @@ class Body:
     mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
     material : its law, a `Material` or a law of your own (`solver.materials.Law`)
     kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
-    element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6`` or ``tri3``
+    element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6``, ``tri3`` or one of your own
     full_integration : integrate by the element's ``full_order``: ``quad8`` with 3x3 points, not 2x2
     thickness : of plane bodies [mm]
     supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``

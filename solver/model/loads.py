@@ -1,7 +1,10 @@
 """Loads of a body, each with its own course over time.
 
-Every load is given at load factor one. Its factor at a time is that of its amplitude; without an
-amplitude time is the load factor.
+A kind of load is a class of `Load`, which gives what it needs to give: a force on a boundary, a
+force per volume, a strain without stress, a stress present before loading, a prescribed
+displacement, or a loss of stiffness and strength. The bodies are loaded with whatever the loads
+give; nothing else knows the kinds. Every load is given at load factor one. Its factor at a time is
+that of its amplitude; without an amplitude time is the load factor.
 """
 
 from __future__ import annotations
@@ -9,32 +12,37 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
+from solver.parts import Parts
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Field = Callable[[Array], Array]
+Array = NDArray[np.float64]
+Field = Callable[[Array], Array]
 
 _ALWAYS = Amplitude.constant(1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Load:
-    """What all loads have.
+    """What all loads have, and what a kind of load may give: it overrides what it gives.
+
+    Positions x are (2, n) [mm]. What a kind does not give is None.
 
     Attributes
     ----------
     amplitude : load factor over time; when absent, time is the load factor
+    varies : whether a kind changes with time, and has an amplitude
+    outside : whether the boundaries of a kind must lie on the outside of the body
     """
 
     amplitude: Amplitude | None = None
+    varies: ClassVar[bool] = True
+    outside: ClassVar[bool] = True
 
     def factor(self, time: float) -> float:
         """Return the load factor at a time."""
@@ -50,22 +58,53 @@ class Load:
         """The boundaries of the body that it acts on."""
         return ()
 
-    @property
-    def outside(self) -> bool:
-        """Whether these must lie on the outside of the body."""
-        return True
-
-    @property
-    def varies(self) -> bool:
-        """Whether it changes with time."""
-        return True
-
     def check(self) -> None:
         """Raise `ModelError` for a value that is not allowed."""
 
+    def push(self, x: Array, along: Array) -> Array | None:
+        """Return the forces (2, n) on pieces of its boundaries, per depth of the body [N/mm].
+
+        Parameters
+        ----------
+        x : positions of the pieces
+        along : (2, n) from start to end of the pieces, the body on their left [mm]: their outward
+            normal times their length is ``(along[1], -along[0])``
+        """
+        del x, along
+        return None
+
+    def body_force(self, x: Array) -> Array | None:
+        """Return the force per volume (2, n) at positions x [N/mm3]."""
+        del x
+        return None
+
+    def eigenstrain(self, x: Array) -> Array | None:
+        """Return the strain without stress, xx, yy, zz, xy (4, n), at positions x."""
+        del x
+        return None
+
+    def initial_stress(self, x: Array) -> Array | None:
+        """Return the stress present before loading, xx, yy, zz, xy (4, n), at positions x [MPa]."""
+        del x
+        return None
+
+    def softening(self, x: Array) -> tuple[Array, Array] | None:
+        """Return the shares of Young's modulus and yield stress lost, (n,) each, at positions x."""
+        del x
+        return None
+
+    @property
+    def components(self) -> dict[int, float]:
+        """Prescribed displacements of its boundaries: component 0 (x) or 1 (y) -> [mm]."""
+        return {}
+
+
+LOADS: Parts[Load] = Parts("kind", alike=False)
+"""Kinds of load by the word that scene files have for them."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _OnBoundary(Load):
+class BoundaryLoad(Load):
     """A load on a named boundary."""
 
     boundary: str
@@ -76,8 +115,9 @@ class _OnBoundary(Load):
         return (self.boundary,)
 
 
+@LOADS.word("pressure")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Pressure(_OnBoundary):
+class Pressure(BoundaryLoad):
     """A pressure on a boundary, positive when it pushes: ``value`` [MPa]."""
 
     value: float
@@ -86,9 +126,15 @@ class Pressure(_OnBoundary):
         """Raise `ModelError` for a pressure that is not finite."""
         _finite(f"pressure.{self.boundary}", self.value, "MPa")
 
+    def push(self, x: Array, along: Array) -> Array:
+        """Return the forces (2, n) on pieces of the boundary [N/mm]."""
+        del x
+        return self.value * np.stack([-along[1], along[0]])
 
+
+@LOADS.word("traction")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Traction(_OnBoundary):
+class Traction(BoundaryLoad):
     """A force per area on a boundary, in fixed directions: ``x`` and ``y`` [MPa]."""
 
     x: float = 0.0
@@ -99,18 +145,20 @@ class Traction(_OnBoundary):
         for axis in ("x", "y"):
             _finite(f"traction.{self.boundary}.{axis}", getattr(self, axis), "MPa")
 
+    def push(self, x: Array, along: Array) -> Array:
+        """Return the forces (2, n) on pieces of the boundary [N/mm]."""
+        del x
+        return np.array([[self.x], [self.y]]) * np.linalg.norm(along, axis=0)
 
+
+@LOADS.word("displacement")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Displacement(_OnBoundary):
+class Displacement(BoundaryLoad):
     """A prescribed displacement of a boundary: ``x`` and ``y`` [mm], None where it is free."""
 
     x: float | None = None
     y: float | None = None
-
-    @property
-    def outside(self) -> bool:
-        """Facets inside a body may be moved as well."""
-        return False
+    outside: ClassVar[bool] = False
 
     @property
     def components(self) -> dict[int, float]:
@@ -126,6 +174,7 @@ class Displacement(_OnBoundary):
             _finite(f"displacement.{self.boundary}.{'xy'[axis]}", value, "mm")
 
 
+@LOADS.word("temperature")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Temperature(Load):
     """A rise of temperature, which lets the body expand, and may soften it.
@@ -150,17 +199,26 @@ class Temperature(Load):
         if not callable(self.rise):
             _finite("temperature.rise", self.rise, "K")
 
-    @property
-    def softens(self) -> bool:
-        """Whether it changes the elastic constants or the yield stress."""
-        return bool(self.modulus_drop or self.yield_drop)
-
     def at(self, x: Array) -> Array:
         """Return the rise of temperature (n,) at positions (2, n) [K]."""
         rise = self.rise(x) if callable(self.rise) else self.rise
-        return _field("temperature.rise", rise, (x.shape[1],), "K")
+        return checked("temperature.rise", rise, (x.shape[1],), "K")
+
+    def eigenstrain(self, x: Array) -> Array:
+        """Return the thermal strain xx, yy, zz, xy (4, n) at positions (2, n)."""
+        strain = np.zeros((4, x.shape[1]))
+        strain[:3] = self.expansion * self.at(x)
+        return strain
+
+    def softening(self, x: Array) -> tuple[Array, Array] | None:
+        """Return the shares of Young's modulus and yield stress lost, (n,) each; None without."""
+        if not (self.modulus_drop or self.yield_drop):
+            return None
+        rise = self.at(x)
+        return self.modulus_drop * rise, self.yield_drop * rise
 
 
+@LOADS.word("initial_stress")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InitialStress(Load):
     """Stress present before any load, for instance from manufacture.
@@ -170,11 +228,17 @@ class InitialStress(Load):
 
     Attributes
     ----------
-    stress : a function (positions (2, n) [mm]) -> components xx, yy, zz, xy (4, n) [MPa]
+    xx, yy, zz, xy : components of an even stress [MPa]
+    stress : in place of them, a function (positions (2, n) [mm]) -> xx, yy, zz, xy (4, n) [MPa]
     """
 
-    stress: Field
+    xx: float = 0.0
+    yy: float = 0.0
+    zz: float = 0.0
+    xy: float = 0.0
+    stress: Field | None = None
     amplitude: Amplitude | None = _ALWAYS
+    varies: ClassVar[bool] = False
 
     @classmethod
     def on_grid(cls, x: Array, y: Array, stress: Array) -> InitialStress:
@@ -206,21 +270,23 @@ class InitialStress(Load):
 
         return cls(stress=between)
 
-    @property
-    def varies(self) -> bool:
-        """It is there from the beginning."""
-        return False
-
     def check(self) -> None:
-        """Raise `ModelError` where the stress is no function, or has an amplitude."""
-        if not callable(self.stress):
+        """Raise `ModelError` where the stress is neither even nor a function of position."""
+        even = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
+        for name, value in even.items():
+            _finite(f"initial_stress.{name}", value, "MPa")
+        if self.stress is not None and not callable(self.stress):
             raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
+        if self.stress is not None and any(even.values()):
+            raise ModelError("initial_stress", even, "must not be given beside a function, stress")
         if self.amplitude is not _ALWAYS:
             raise ModelError("initial_stress.amplitude", self.amplitude, "must not be given")
 
-    def at(self, x: Array) -> Array:
+    def initial_stress(self, x: Array) -> Array:
         """Return xx, yy, zz, xy (4, n) at positions (2, n) [MPa]."""
-        return _field("initial_stress.stress", self.stress(x), (4, x.shape[1]), "MPa")
+        even = np.array([[self.xx], [self.yy], [self.zz], [self.xy]])
+        stress = even if self.stress is None else self.stress(x)
+        return checked("initial_stress.stress", stress, (4, x.shape[1]), "MPa")
 
 
 def _finite(field: str, value: object, unit: str) -> None:
@@ -228,7 +294,8 @@ def _finite(field: str, value: object, unit: str) -> None:
         raise ModelError(field, value, f"must be finite [{unit}]")
 
 
-def _field(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:
+def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:
+    """Return an array of this shape that a load gives, or raise `ModelError`."""
     found = np.asarray(value, dtype=float)
     try:
         found = np.broadcast_to(found, shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -74,3 +75,14 @@ class TravellingPressure:
             away -= period * np.round(away / period)
         inside = 1 - (away / self.half_width) ** 2
         return amplitude * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio
+
+    def pushing(
+        self, time: float, period: float = 0.0
+    ) -> Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
+        """Return what it pushes with at a time, as `solver.model.loads.Load.push` does."""
+
+        def push(x: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+            pressure, ratio = self.at(time, x[0], period)
+            return pressure * (np.stack([-along[1], along[0]]) - ratio * along)
+
+        return push

@@ -17,7 +17,6 @@ from solver.loading.outcome import Tally
 from solver.loading.program import Lap, Program
 from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
-from solver.model.loads import InitialStress
 from solver.results import saved
 from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
@@ -104,8 +103,8 @@ class Solution:
         rest = begun.rest(begun.balanced(system.initial())).now
         x = system.positions(body)
         loads = system.model.body(body).every_load
-        fields = [load.at(x) for load in loads if isinstance(load, InitialStress)]
-        given = sum(fields, np.zeros((4, x.shape[1])))
+        fields = (load.initial_stress(x) for load in loads)
+        given = sum((each for each in fields if each is not None), np.zeros((4, x.shape[1])))
         return x, given, to_tensor(system.response(body, rest).stress)
 
     def plastic_strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:

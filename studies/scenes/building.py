@@ -14,6 +14,7 @@ from solver.loading.program import Lap, Program, Stage, load_and_release
 from solver.mesh import within
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FRICTION
+from solver.model.loads import LOADS
 from solver.scenes.material_parameters import MaterialParameters
 from studies.errors import StudyError, nearest
 from studies.scenes import tables
@@ -123,12 +124,12 @@ class Builder:
             for boundary, held in table.supports.items()
             if self._named(f"{where}.supports.{boundary}", name, boundary)
         }
-        loads = tuple(
+        loads = [
             self._load(k, load)
             for k, load in enumerate(self.scene.loads)
             if load.body == name
             and self._named(f"loads[{k}].boundary", name, getattr(load, "boundary", None))
-        )
+        ]
         law = laws.get(table.material)
         if law is None:
             return None
@@ -142,7 +143,7 @@ class Builder:
                 element=table.element or usual_element(mesh),
                 thickness=self.scene.thickness,
                 supports=supports,
-                loads=loads,
+                loads=tuple(filter(None, loads)),
             ),
         )
 
@@ -189,18 +190,10 @@ class Builder:
 
     # -- what acts ---------------------------------------------------------------------------
 
-    def _load(self, k: int, table: Any) -> Load:
-        from solver.model import loads
-
+    def _load(self, k: int, table: tables.LoadTable) -> Load | None:
         where = f"loads[{k}]"
-        given = table.model_dump(exclude={"kind", "body", "amplitude"}, exclude_unset=True)
-        if isinstance(table, tables.InitialStressTable):
-            even = np.array([[table.xx], [table.yy], [table.zz], [table.xy]])
-            return loads.InitialStress(stress=lambda x: np.tile(even, x.shape[1]))
-        kinds = {"pressure": loads.Pressure, "traction": loads.Traction,
-                 "displacement": loads.Displacement, "temperature": loads.Temperature}  # fmt: skip
-        made: Load = kinds[table.kind](**given, amplitude=self._amplitude(where, table.amplitude))
-        return made
+        amplitude = self._amplitude(where, getattr(table, "amplitude", None))
+        return self.tried(where, lambda: load_of(table, amplitude))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
@@ -267,6 +260,13 @@ def _place(names: list[str]) -> Any:
     return words
 
 
+def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
+    """Return the load of a table."""
+    kind = LOADS[table.kind]
+    given = table.model_dump(exclude={"kind", "body", "amplitude"}, exclude_unset=True)
+    return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
+
+
 def usual_element(mesh: Mesh) -> str:
     """Return the element of a body that names none."""
     return "quad8" if mesh.t.shape[0] == 4 else "tri6"
@@ -279,9 +279,11 @@ def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None)
 
 def _made(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
     """Return the mesh of a body as its shape or its file has it."""
+    from solver.mesh.elements import known_elements
+
     if table.mesh is None:
-        cells = "tri" if (table.element or "").startswith("tri") else "quad"
-        return mesh_of(table.shape, cells)
+        kind = known_elements().get(table.element or "")  # the body refuses one that is unknown
+        return mesh_of(table.shape, kind.cells if kind else "quad")
     if meshes is None:
         raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")
     return meshes[table.mesh].mesh(table.part)

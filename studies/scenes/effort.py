@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from solver.errors import ModelError
 from solver.scenes.effort import Effort, per_place
 from studies.errors import StudyError
 from studies.scenes import tables
-from studies.scenes.building import mesh_of_body, usual_element
+from studies.scenes.building import load_of, mesh_of_body, usual_element
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -48,8 +50,7 @@ def effort_of(
         sides = [side.split(".") for pair in scene.contacts for side in (pair.slave, pair.master)]
         own = {side[1] for side in sides if side[0] == name}
         material = scene.materials[body.material]
-        kept = ("displacement", "temperature")
-        driven = any(load.kind in kept and load.body == name for load in scene.loads)
+        driven = any(_changes(load) for load in scene.loads if load.body == name)
         if getattr(material, "yield_stress", None) is None and own and not driven:
             # reduced to its contact surfaces
             unknowns += 2 * sum(2 * size.edges.get(boundary, 0) + 1 for boundary in own)
@@ -57,6 +58,12 @@ def effort_of(
             unknowns += 2 * size.nodes
     total = sum(increments)
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
+
+
+def _changes(table: tables.LoadTable) -> bool:
+    """Whether a load moves a boundary or softens the body, which then is not reduced."""
+    load = load_of(table)
+    return bool(load.components) or load.softening(np.zeros((2, 1))) is not None
 
 
 _SIZES: WeakKeyDictionary[Description, dict[str, _MeshSize]] = WeakKeyDictionary()

@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from collections.abc import Callable
+from types import NoneType, UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from annotated_types import Interval
@@ -12,7 +23,9 @@ from pydantic import Field, StringConstraints, create_model
 
 from solver.mesh.lines import closer
 from solver.model.friction import FRICTION
+from solver.model.loads import LOADS, Load
 from solver.parameters import Length, Stress
+from solver.parts import declared
 from solver.scenes.material_parameters import MaterialParameters
 from studies.scenes.shape_tables import ArcTable, LineTable, Shape
 from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
@@ -90,62 +103,40 @@ class RigidTable(SceneTable):
 # -- what acts -----------------------------------------------------------------------------------
 
 
-class _LoadTable(SceneTable):
+class LoadTable(SceneTable):
+    """What all loads have."""
+
     body: str
-    amplitude: Amplitude | None = None
 
 
-class PressureTable(_LoadTable):
-    """A pressure on a boundary, positive when it pushes [MPa]."""
-
-    kind: Literal["pressure"]
-    boundary: str
-    value: float
-
-
-class TractionTable(_LoadTable):
-    """A force per area in fixed directions [MPa]."""
-
-    kind: Literal["traction"]
-    boundary: str
-    x: float = 0.0
-    y: float = 0.0
+def _load(word: str, kind: type[Load]) -> type[LoadTable]:
+    """Return the table of a kind of load: its parameters."""
+    known: dict[str, Any] = {"amplitude": (Amplitude | None, None)} if kind.varies else {}
+    known["kind"] = (Literal[word], ...)
+    for name, (hint, field) in declared(kind).items():
+        told = _told(hint)
+        if told is not None and name != "amplitude":
+            known[name] = (told, ... if field.default is dataclasses.MISSING else field.default)
+    made: type[LoadTable] = create_model(f"{kind.__name__}Table", __base__=LoadTable, **known)
+    made.__doc__ = kind.__doc__
+    return made
 
 
-class DisplacementTable(_LoadTable):
-    """A prescribed displacement of a boundary [mm]; what is left out is free."""
-
-    kind: Literal["displacement"]
-    boundary: str
-    x: float | None = None
-    y: float | None = None
-
-
-class TemperatureTable(_LoadTable):
-    """An even rise of temperature [K], which expands and softens the body."""
-
-    kind: Literal["temperature"]
-    rise: float
-    expansion: float
-    modulus_drop: float = 0.0
-    yield_drop: float = 0.0
+def _told(hint: Any) -> Any:
+    """Return what a file can say of a parameter; None where only a function can be given."""
+    if get_origin(hint) not in (Union, UnionType):
+        return None if get_origin(hint) is Callable else hint
+    told = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
+    return None if told == (NoneType,) else Union[told]  # noqa: UP007
 
 
-class InitialStressTable(SceneTable):
-    """An even stress before any load [MPa]."""
-
-    kind: Literal["initial_stress"]
-    body: str
-    xx: float = 0.0
-    yy: float = 0.0
-    zz: float = 0.0
-    xy: float = 0.0
-
-
-Load = Annotated[
-    PressureTable | TractionTable | DisplacementTable | TemperatureTable | InitialStressTable,
-    Field(discriminator="kind"),
-]
+if TYPE_CHECKING:
+    AnyLoad = LoadTable
+else:
+    AnyLoad = Annotated[
+        Union[tuple(_load(word, kind) for word, kind in LOADS.all().items())],  # noqa: UP007
+        Field(discriminator="kind"),
+    ]
 
 
 class PairTable(SceneTable):
@@ -309,7 +300,7 @@ class SceneFile(SceneTable):
     contacts: tuple[ContactTable, ...] = ()
     singular: tuple[SingularTable, ...] = ()
     allow: tuple[Literal["large_strain"], ...] = ()
-    loads: tuple[Load, ...] = ()
+    loads: tuple[AnyLoad, ...] = ()
     stages: tuple[StageTable, ...] = ()
     loading: LoadingTable | None = None
     results: ResultsTable = ResultsTable()

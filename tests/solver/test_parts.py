@@ -70,6 +70,18 @@ def test_parts_that_share_a_parameter_declare_it_alike() -> None:
         shapes().word("wide")(Wide)
 
 
+def test_parts_with_tables_of_their_own_declare_what_they_like() -> None:
+    parts: Parts[object] = Parts("shape", alike=False)
+
+    @dataclass(frozen=True, kw_only=True)
+    class Wide:
+        side: Size = described(5.0, "side")
+
+    parts.word("square")(Square)
+    parts.word("wide")(Wide)
+    assert parts.made("wide", SimpleNamespace(side=1.0)) == Wide(side=1.0)
+
+
 ASKED = """
 from solver.parts import Parts, own_digest
 import solver.parts
@@ -79,6 +91,8 @@ print(*parts, len(own_digest()))
 OWN = """
 from dataclasses import dataclass
 from solver.parts import SHAPES
+
+assert not list(SHAPES)  # it may ask for parts while it runs
 
 @SHAPES.word("oval")
 @dataclass(frozen=True)

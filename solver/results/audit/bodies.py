@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.system import LEAST
-from solver.model.loads import Displacement
 from solver.results.audit.law import increment_error
 
 if TYPE_CHECKING:
@@ -95,10 +95,27 @@ class AuditedBody:
         """Return the resultant of the loads (2,) [N]."""
         time, travelling = self._converged.state.time, self.plain.body.travelling
         if travelling is None:
-            return self.plain.applied(time)
+            return np.asarray(self._declared[0])
         share, _, ratio = travelling.now(time)
         whole = np.pi / 2 * travelling.half_width * travelling.peak * share
         return whole * self.plain.body.thickness * np.array([ratio, -1.0])
+
+    @cached_property
+    def _declared(self) -> Array:
+        return self.plain.applied(self._converged.state.time)
+
+    def misapplied(self) -> Array:
+        """Return the moments about x and y (2, 2) of nodal forces less those declared / size [N].
+
+        They tell of loads without a resultant, such as centrifugal forces. Loads that move, and the
+        copies of a periodic body, are left out.
+        """
+        body, whole = self.plain.body, self.plain.part
+        if body.axle or body.travelling or body.periodic:
+            return np.zeros((2, 2))
+        force = whole.external(self._converged.state.time).reshape(-1, 2)
+        moments = self.plain.moments(force.T, whole.X) - self._declared
+        return np.asarray(moments[1:] / body.box.max())
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
@@ -107,8 +124,8 @@ class AuditedBody:
         held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
         each = [(boundary, "xy".index(axis)) for boundary, axes in body.supports.items()
                 for axis in axes]  # fmt: skip
-        each += [(load.boundary, axis) for load in body.every_load
-                 if isinstance(load, Displacement) for axis in load.components]  # fmt: skip
+        for load in body.every_load:
+            each += itertools.product(load.boundaries, load.components)
         for boundary, axis in each:
             held[self.plain.part.boundary_nodes(boundary), axis] = True
         return held

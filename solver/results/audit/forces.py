@@ -122,8 +122,9 @@ def reactions(
 ) -> float:
     """Return how far loads, contact and reactions of a body are from balance, over the force level.
 
-    The resultant of pressures comes from the shape of their boundary, that of a wheel from the
-    amplitude of its axle; reactions come from the stress where supports hold.
+    The resultant of pressures comes from the shape of their boundary, that of forces per volume
+    from points of its own, that of a wheel from the amplitude of its axle; reactions come from the
+    stress where supports hold. First moments of nodal forces are compared with those of the loads.
     """
     worst = 0.0
     for body in bodies:
@@ -138,5 +139,5 @@ def reactions(
             total = total + body.applied() - held.sum(axis=0)
             if body.plain.body.kinematics == "axisymmetric":
                 total[0] = 0.0  # radial forces balance round the axis
-        worst = max(worst, float(np.abs(total).max()))
+        worst = max(worst, float(np.abs(total).max()), float(np.abs(body.misapplied()).max()))
     return worst / (converged.state.force_scale or 1.0)

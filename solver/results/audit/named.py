@@ -185,7 +185,7 @@ class NamedPlacesCheck:
                 self._out.add(name, self._field(name)[j, increment], value,
                               max(abs(value), self._least["gap"]))  # fmt: skip
         else:
-            own = own - self._source.plain(body.name).applied(state.time)
+            own = own - self._source.plain(body.name).applied(state.time)[0]
             if body.kinematics == "axisymmetric":
                 own[0] = np.nan  # radial forces are in balance round the axis
         share = LIMIT / MEASURED if measured else 1.0

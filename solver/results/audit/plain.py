@@ -13,12 +13,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import CellBasis
 
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.mesh.edges import shape_functions
 from solver.mesh.elements import element_type
-from solver.model.loads import InitialStress, Pressure, Temperature, Traction
 from solver.tensors import SQRT2, to_mandel, to_tensor
 
 if TYPE_CHECKING:
@@ -29,12 +29,15 @@ if TYPE_CHECKING:
     from solver.materials.state import PlasticState
     from solver.model.amplitude import Amplitude
     from solver.model.body import Body
+    from solver.model.loads import Load
 
     Array = NDArray[np.float64]
 
 
 _CHORDS = 64
-"""Chords of a curved edge."""
+"""Chords of an edge."""
+_VOLUME_DEGREE = 10
+"""Polynomial degree up to which forces per volume are integrated exactly."""
 
 
 def load_factor(amplitude: Amplitude | None, time: float) -> float:
@@ -143,11 +146,12 @@ class PlainBody:
         """Return the Mandel strain (4, n_points) of heat and of making, without stress."""
         out, elasticity = np.zeros((4, self.points.shape[1])), self.body.material.elasticity
         for load in self.body.every_load:
-            if isinstance(load, Temperature):
-                rise = load_factor(load.amplitude, time) * load.at(self.points)
-                out[:3] += load.expansion * rise
-            elif isinstance(load, InitialStress):
-                nu, stress = elasticity.poisson_ratio, to_mandel(load.at(self.points))
+            factor = load_factor(load.amplitude, time)
+            strain, stress = load.eigenstrain(self.points), load.initial_stress(self.points)
+            if strain is not None:
+                out += factor * to_mandel(strain)
+            if stress is not None:
+                nu, stress = elasticity.poisson_ratio, factor * to_mandel(stress)
                 out[:3] += nu / elasticity.youngs_modulus * stress[:3].sum(axis=0)
                 out -= (1 + nu) / elasticity.youngs_modulus * stress
         return out
@@ -156,10 +160,11 @@ class PlainBody:
         """Return the shares of Young's modulus and of the yield stress that heat leaves."""
         stiff, strong = np.ones((2, self.points.shape[1]))
         for load in self.body.every_load:
-            if isinstance(load, Temperature) and load.softens:
-                rise = load_factor(load.amplitude, time) * load.at(self.points)
-                stiff -= load.modulus_drop * rise
-                strong -= load.yield_drop * rise
+            lost = load.softening(self.points)
+            if lost is not None:
+                factor = load_factor(load.amplitude, time)
+                stiff -= factor * lost[0]
+                strong -= factor * lost[1]
         return stiff, strong
 
     def law(self, time: float) -> Law:
@@ -206,26 +211,49 @@ class PlainBody:
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in (x, y)], axis=1)
 
     def applied(self, time: float) -> Array:
-        """Return the resultant (2,) of pressures and tractions at a time [N].
+        """Return the resultant [N] of the loads at a time and its moments [N mm] (3, 2).
 
-        A pressure p on a chord from A to B pushes with p times the depth and the length of AB,
-        against its normal; a traction with the depth and the length. Curved edges have many chords.
+        Moments are forces times x and times y from the middle of the body. A pressure p on a chord
+        from A to B pushes with p times the depth and the length of AB, against its normal; edges
+        have many chords.
         """
-        total = np.zeros(2)
+        total = np.zeros((3, 2))
         for load in self.body.every_load:
-            if not isinstance(load, Pressure | Traction):
-                continue
-            edges = self.part.X[:, edges_of(self.part, load.boundary)]
-            places = np.linspace(-1.0, 1.0, 1 + (_CHORDS if edges.shape[-1] > 2 else 1))
-            points = edges @ shape_functions(places, edges.shape[-1]).T
-            along = np.diff(points, axis=-1)
-            depth = self._depth((points[..., 1:] + points[..., :-1]) / 2)
-            if isinstance(load, Pressure):
-                force = load.value * np.array([-along[1], along[0]])
-            else:
-                force = np.multiply.outer([load.x, load.y], np.linalg.norm(along, axis=0))
-            total += load_factor(load.amplitude, time) * (depth * force).sum(axis=(1, 2))
+            own = sum((self._on_boundary(load, b) for b in load.boundaries), np.zeros((3, 2)))
+            total += load_factor(load.amplitude, time) * (own + self._on_volume(load))
         return total
+
+    def moments(self, force: Array, x: Array) -> Array:
+        """Return forces (2, n) times 1, x and y, added up (3, 2), at places (2, n)."""
+        arm = x - self.part.X.mean(axis=1, keepdims=True)
+        return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
+
+    def _on_boundary(self, load: Load, boundary: str) -> Array:
+        """Return the moments (3, 2) of the forces on a boundary, by Simpson's rule on chords."""
+        edges = self.part.X[:, edges_of(self.part, boundary)]
+        places = np.linspace(-1.0, 1.0, 1 + 2 * _CHORDS)
+        points = edges @ shape_functions(places, edges.shape[-1]).T
+        along = (points[..., 2::2] - points[..., :-2:2]).reshape(2, -1)
+        total = np.zeros((3, 2))
+        for first, share in ((0, 1 / 6), (1, 2 / 3), (2, 1 / 6)):
+            x = points[..., first : first + 2 * _CHORDS - 1 : 2].reshape(2, -1)
+            force = load.push(x, along)
+            if force is not None:
+                total += share * self.moments(self._depth(x) * np.broadcast_to(force, x.shape), x)
+        return total
+
+    def _on_volume(self, load: Load) -> Array:
+        """Return the moments (3, 2) of the force per volume, each element's at its nodes."""
+        if load.body_force(self.points) is None:
+            return np.zeros((3, 2))
+        basis = CellBasis(self.body.mesh, self.part.basis.elem, intorder=_VOLUME_DEGREE)
+        x = np.asarray(basis.global_coordinates())
+        given = np.asarray(load.body_force(x.reshape(2, -1)))
+        force = np.broadcast_to(given, (2, x[0].size)).reshape(x.shape)
+        force = force * basis.dx * self._depth(x)
+        nodal = np.array([(force * np.asarray(b[0])).sum(axis=2) for b in basis.basis])
+        at = self.part.X[:, basis.element_dofs]
+        return self.moments(nodal.swapaxes(0, 1).reshape(2, -1), at.reshape(2, -1))
 
     def elastic_energy(self, stress: Array, time: float) -> float:
         """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.model.loads import Displacement
 from solver.results.audit.plain import PlainBody, load_factor
 from solver.results.audit.recomputed import Acting
 from solver.results.audit.tractions import Tractions
@@ -65,11 +65,9 @@ class OfStates:
                 declared["xy".index(each), self.plain(name).part.boundary_nodes(boundary)] = 0.0
         moved: dict[tuple[str, int], float] = {}  # displacements of one boundary add up
         for load in body.every_load:
-            if isinstance(load, Displacement):
-                factor = load_factor(load.amplitude, self._time(stage))
-                for axis, value in load.components.items():
-                    key = load.boundary, axis
-                    moved[key] = moved.get(key, 0.0) + factor * value
+            factor = load_factor(load.amplitude, self._time(stage))
+            for key in itertools.product(load.boundaries, load.components):
+                moved[key] = moved.get(key, 0.0) + factor * load.components[key[1]]
         for (boundary, axis), value in moved.items():
             declared[axis, self.plain(name).part.boundary_nodes(boundary)] = value
         return fields.displacement, declared

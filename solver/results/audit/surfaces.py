@@ -17,7 +17,6 @@ from solver.contact.overlap import largest_overlap
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.model.loads import Temperature
 from solver.results.audit.plain import load_factor
 
 if TYPE_CHECKING:
@@ -196,10 +195,10 @@ class Surfaces:
             if body.material.elastic:
                 continue
             left = np.ones((1, len(chain.nodes)))
-            for load in body.every_load:
-                if isinstance(load, Temperature) and load.yield_drop:
-                    rise = load.at(self._system.full(name).X[:, chain.nodes])
-                    left -= load_factor(load.amplitude, time) * load.yield_drop * rise
+            for load in body.every_load if name in self._system.names else ():  # not a rigid one
+                lost = load.softening(self._system.full(name).X[:, chain.nodes])
+                if lost is not None:
+                    left -= load_factor(load.amplitude, time) * lost[1]
             strength = body.material.shear_yield_stress
             weaker = np.fmin(weaker, strength * mean(at_points(left)[0], partner.faces))
         return weaker

@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -531,9 +532,7 @@ def test_pressure_at_the_end_of_coarse_arcs_is_as_stored() -> None:
 def test_an_element_of_ones_own_is_named_and_written_like_any_other(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    plain = ElementType(
-        element=ElementQuad1(), cells="quad", order=3, full_order=3, quadratic=False
-    )
+    plain = ElementType(element=ElementQuad1(), order=3, full_order=3)
     monkeypatch.setitem(ELEMENTS, "quad4_plain", plain)
     records = {}
     for element in ("quad4", "quad4_plain"):
@@ -549,3 +548,11 @@ def test_an_element_of_ones_own_is_named_and_written_like_any_other(
     assert np.shape(mesh().faces[0]) == np.shape(records["quad4"].mesh().faces[0])
     differ = records["quad4_plain"].scalars["least"] - records["quad4"].scalars["least"]
     assert differ != 0.0, "dilatation is averaged in one of them"
+
+
+def test_a_shape_is_meshed_with_the_cells_of_the_element(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever its name."""
+    monkeypatch.setitem(ELEMENTS, "six", replace(ELEMENTS["tri6"], order=4))
+    tables = blocks()
+    tables["bodies"]["upper"]["element"] = "six"
+    built(tables)

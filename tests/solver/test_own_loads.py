@@ -1,0 +1,164 @@
+"""Kinds of load of one's own: forces per volume and on boundaries, integrated and audited."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import solver.fem.loads
+from solver import Body, ContactPair, Material, Model, ModelError, System, solve
+from solver.fem.discretisation import Discretisation
+from solver.mesh import grid
+from solver.mesh.elements import ELEMENTS, element_type
+from solver.mesh.grids import mapped, merged
+from solver.model.loads import Array, BoundaryLoad, Load
+
+pytestmark = pytest.mark.solves
+
+E, NU = 2e5, 0.3
+A, B = 20.0, 60.0
+STEEL = Material(youngs_modulus=E, poisson_ratio=NU)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Turning(Load):
+    """Centrifugal force: ``level`` [N/mm4] times x and, where it acts in the plane, times y."""
+
+    level: float
+    plane: float = 1.0
+
+    def body_force(self, x: Array) -> Array:
+        return self.level * x * [[1.0], [self.plane]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Weight(Load):
+    """A weight per volume along -y [N/mm3]."""
+
+    weight: Any
+
+    def body_force(self, x: Array) -> Array:
+        return np.array(self.weight) * [[0.0], [-1.0]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Water(BoundaryLoad):
+    """A pressure that grows with the depth below y = 0, ``weight`` [N/mm3]."""
+
+    weight: float
+
+    def push(self, x: Array, along: Array) -> Array:
+        return -self.weight * x[1] * np.stack([-along[1], along[0]])
+
+
+def block(element: str = "quad8", load: Load | None = None, **own: Any) -> Body:
+    cells = element_type(element).cells
+    mesh = grid(np.linspace(0.0, 4.0, 5), np.linspace(-6.0, 0.0, 7), cells=cells)
+    own = {"supports": {"left": "x", "bottom": "y"}, "loads": (load,) if load else ()} | own
+    return Body(name="block", mesh=mesh, material=STEEL, element=element, **own)
+
+
+def ring(load: Load) -> Body:
+    """Return a whole ring, held on the lines x = 0 and y = 0, which stay straight."""
+    flat = grid(np.linspace(A, B, 11), np.linspace(0.0, 2 * np.pi, 33))
+    mesh = merged(mapped(flat, lambda X: X[0] * np.stack([np.cos(X[1]), np.sin(X[1])])))
+    lines = {"up": lambda x: abs(x[0]) < 1e-9, "across": lambda x: abs(x[1]) < 1e-9}
+    return Body(
+        name="ring", mesh=mesh.with_boundaries(lines, boundaries_only=False), material=STEEL,
+        kinematics="plane_stress", supports={"up": "x", "across": "y"}, loads=(load,),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_nodal_forces_of_a_force_per_volume_have_its_resultant(
+    element: str, kinematics: Any
+) -> None:
+    body = block(element, Turning(level=3.0), kinematics=kinematics, thickness=2.0)
+    force = Discretisation(body).external(2.0).reshape(-1, 2).sum(axis=0)
+    depth = 2 * np.pi * np.array([4.0**3 / 3, 4.0**2 / 2]) if kinematics == "axisymmetric" else (
+        2.0 * np.array([4.0**2 / 2, 4.0]))  # fmt: skip
+    assert force == pytest.approx(2 * 3.0 * depth * [6.0, -18.0], rel=1e-12)
+
+
+def test_a_turning_ring_has_the_stress_of_its_closed_form() -> None:
+    """Hoop stress at both edges (Timoshenko and Goodier, Theory of Elasticity, article 32)."""
+    level = 0.01
+    found = solve(Model(bodies=(ring(Turning(level=level)),)))
+    x, y = found.nodes("ring")
+    stress = found.stress("ring", "loaded")[1]
+    for radius, other in ((A, B), (B, A)):
+        hoop = (3 + NU) / 4 * level * (other**2 + (1 - NU) / (3 + NU) * radius**2)
+        at = np.isclose(x, radius) & (abs(y) < 1e-9)
+        assert stress[at] == pytest.approx(hoop, rel=0.01)
+    assert found.audit().passed
+
+
+def test_a_block_under_its_weight_bears_what_is_above() -> None:
+    walls = {"left": "x", "right": "x", "bottom": "y"}
+    found = solve(Model(bodies=(block(load=Weight(weight=0.5), supports=walls),)))
+    stress, y = found.stress("block", "loaded"), found.nodes("block")[1]
+    assert stress[1] == pytest.approx(0.5 * y, abs=1e-9)
+    assert found.audit().passed
+    constrained = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
+    assert found.loaded.energy.external == pytest.approx(0.5**2 * 4 * 6**3 / (6 * constrained))
+
+
+def test_a_pressure_that_varies_is_integrated_and_audited() -> None:
+    water = Water(boundary="right", weight=2.0)
+    found = solve(Model(bodies=(block(load=water),)))
+    force = found.system.full("block").external(1.0).reshape(-1, 2)
+    assert force.sum(axis=0) == pytest.approx([-2.0 * 6**2 / 2, 0.0])
+    assert force[:, 0] @ found.nodes("block")[1] == pytest.approx(2.0 * 6**3 / 3)
+    assert found.audit().passed
+
+
+def test_a_condensed_body_has_its_force_per_volume() -> None:
+    upper = block(load=Weight(weight=20.0), supports={"left": "x"})
+    lower = replace(block(), name="lower", mesh=block().mesh.translated((0.0, -6.0)))
+    pair = ContactPair(slave=("block", "bottom"), master=("lower", "top"))
+    whole, reduced = (
+        solve(Model(bodies=(replace(upper, condense=own), lower), contacts=(pair,)))
+        for own in (False, True)
+    )
+    assert reduced.audit().passed
+    assert not reduced.system.parts[0].meshed
+    for name in ("block", "lower"):
+        assert reduced.stress(name, "loaded") == pytest.approx(
+            whole.stress(name, "loaded"), abs=1e-9
+        )
+
+
+BODIES = {
+    "weight": block(load=Weight(weight=0.5)),
+    "turning shaft": block(load=Turning(level=3.0, plane=0.0), kinematics="axisymmetric"),
+    "turning ring": ring(Turning(level=0.01)),
+}
+
+
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
+def test_a_force_per_volume_doubled_in_the_solver_alone_is_found(
+    body: Body, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also one without a resultant: it has first moments."""
+    assert solve(Model(bodies=(body,))).audit().passed
+    own = solver.fem.loads._body_forces
+
+    def doubled(part: Any, load: Load) -> Array | None:
+        force = own(part, load)
+        return None if force is None else 2 * force
+
+    monkeypatch.setattr(solver.fem.loads, "_body_forces", doubled)
+    broken = solve(Model(bodies=(body,))).audit()
+    assert any("audit_reactions" in each for each in broken.violations), broken.violations
+
+
+@pytest.mark.parametrize(
+    ("weight", "allowed"), [([1.0, 2.0, 3.0], "of the shape"), (np.nan, "finite at all points")]
+)
+def test_a_force_that_is_none_is_refused(weight: Any, allowed: str) -> None:
+    with pytest.raises(ModelError, match=rf"weight\.body_force = .*{allowed}"):
+        System(Model(bodies=(block(load=Weight(weight=weight)),)))

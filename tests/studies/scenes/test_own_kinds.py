@@ -1,0 +1,99 @@
+"""Loads and elements of one's own in scene files, by the words that examples give them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.architecture.sources import ROOT
+
+pytestmark = pytest.mark.processes
+
+SHAFT = """
+name = "shaft"
+kinematics = "axisymmetric"
+
+[materials.steel]
+youngs_modulus = 2e5
+poisson_ratio = 0.3
+
+[bodies.shaft]
+material = "steel"
+shape = { kind = "rectangle", x = [0, 100], y = [0, 5], size = 2.5 }
+element = "ELEMENT"
+supports = { bottom = "y", top = "y" }
+
+[[loads]]
+body = "shaft"
+kind = "centrifugal"
+speed = SPEED
+
+[[stages]]
+name = "turning"
+increments = 1
+
+[outputs.largest]
+of = "stress.xx"
+body = "shaft"
+stage = "turning"
+"""
+RUN = """
+import json, sys, tempfile, tomllib
+from pathlib import Path
+import meshio
+from solver.results.export import write_vtu
+from studies.errors import SceneError
+from studies.scenes.description import Description
+from studies.scenes.scene import file_scene
+try:
+    scene = file_scene(Description("shaft.toml", tomllib.loads(sys.stdin.read()), {}), built=True)
+except SceneError as error:
+    print(json.dumps({"error": str(error)}))
+    sys.exit()
+record = list(scene.path(scene.parameters(), [0.0], lambda done: None))[-1]
+with tempfile.TemporaryDirectory() as folder:
+    write_vtu(record.mesh(), Path(folder))
+    cells = meshio.read(Path(folder) / "0-turning.vtu").cells[0].type
+print(json.dumps({"status": record.status.name, "message": record.message, "cells": cells,
+                  "largest": record.scalars["largest"]}))
+"""
+
+
+def run(text: str, *examples: str) -> dict[str, object]:
+    own = os.pathsep.join(str(ROOT / "examples" / name) for name in examples)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", RUN], input=text, capture_output=True, text=True,
+        env=os.environ | {"RESIDUA_PARTS": own, "PYTHONPATH": str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("element", ["quad8", "quad8_mean"])
+def test_a_load_and_an_element_of_ones_own_are_named_in_a_scene_file(element: str) -> None:
+    text = SHAFT.replace("ELEMENT", element).replace("SPEED", "3000.0")
+    found = run(text, "own_load.py", "own_element.py")
+    assert found["status"] == "OK", found["message"]
+    assert found["cells"] == "quad8"
+    level = (3 - 2 * 0.3) / (8 * 0.7) * 7.85e-9 * 3000.0**2  # plane strain
+    assert found["largest"] == pytest.approx(level * 100.0**2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("speed", "element", "examples", "words"),
+    [
+        ("-1.0", "quad8", ["own_load.py"], "loads[0].speed = -1.0: must be at least 0"),
+        ("1.0\nspeeed = 1.0", "quad8", ["own_load.py"], "amplitude, kind, density, speed"),
+        ("1.0", "quad8", [], "loads[0].kind = 'centrifugal': must be one of"),
+        ("1.0", "quad8_mean", ["own_load.py"], "bodies.shaft.element = 'quad8_mean': must be one"),
+    ],
+)
+def test_what_is_not_declared_is_refused(
+    speed: str, element: str, examples: list[str], words: str
+) -> None:
+    text = SHAFT.replace("ELEMENT", element).replace("SPEED", speed)
+    assert words in str(run(text, *examples)["error"])
