@@ -9,7 +9,6 @@ like those of the package.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import importlib.util
 import os
 import sys
@@ -121,14 +120,6 @@ def own_files() -> tuple[Path, ...]:
     return tuple(Path(each).resolve() for each in given.split(os.pathsep) if each)
 
 
-def own_digest() -> str:
-    """Return a digest of the files of one's own; empty where there are none."""
-    files = own_files()
-    if not files:
-        return ""
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
-
-
 @cache
 def load_own_parts() -> None:
     """Run the files of one's own, once in a process.
@@ -138,16 +129,18 @@ def load_own_parts() -> None:
     ModelError
         naming the file that cannot be read or run
     """
-    for path in own_files():
-        name = f"residua_parts_{path.stem}"
+    for k, path in enumerate(own_files()):
+        name = f"residua_parts_{k}_{path.stem}"
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None or not path.is_file():
             raise ModelError(SETTING, str(path), "must name Python files")
+        if name in sys.modules:  # it runs, and has come back here
+            raise ImportError("it imports scenes, which are made of its parts")
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
         try:
             spec.loader.exec_module(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             del sys.modules[name]
             raise ModelError(SETTING, str(path), f"must run: {error}") from error
 

@@ -7,7 +7,8 @@ any law one for plane stress, `Heated` lowers the stiffness and strength of any 
 `wrapped.Wrapped`, which passes on what a wrapper does not change.
 """
 
-from solver.materials.chaboche import BackStress, Chaboche
+from solver.materials.back_stress import ArmstrongFrederick, BackStress
+from solver.materials.chaboche import Chaboche
 from solver.materials.curves import Curve, Table, Voce
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening import LinearHardening
@@ -21,6 +22,7 @@ from solver.materials.tresca import TrescaMaterial
 from solver.materials.yield_surface import Tresca, VonMises, YieldSurface
 
 __all__ = [
+    "ArmstrongFrederick",
     "BackStress",
     "Chaboche",
     "Curve",

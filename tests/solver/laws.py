@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from solver.materials import (
-    BackStress,
+    ArmstrongFrederick,
     Chaboche,
     Elasticity,
     Law,
@@ -35,8 +35,12 @@ CURVES = {
     "table": Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0)),
 }
 BACK_STRESSES = {
-    "prager": (BackStress(5000.0),),
-    "fading": (BackStress(60_000.0, 600.0), BackStress(4000.0, 20.0), BackStress(500.0)),
+    "prager": (ArmstrongFrederick(5000.0),),
+    "fading": (
+        ArmstrongFrederick(60_000.0, 600.0),
+        ArmstrongFrederick(4000.0, 20.0),
+        ArmstrongFrederick(500.0),
+    ),
 }
 LAYERED = Layered.of_curve(
     STEEL, strain=(350.0 / 2e5, 0.003, 0.01), stress=(350.0, 430.0, 500.0), slope=2000.0

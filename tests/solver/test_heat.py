@@ -10,7 +10,7 @@ import pytest
 
 from solver import Body, Material, Model, ModelError, PathControl, Solution, Temperature, solve
 from solver.materials import (
-    BackStress,
+    ArmstrongFrederick,
     Chaboche,
     Elasticity,
     Heated,
@@ -41,7 +41,7 @@ def curve(e: float, r: float) -> Voce:
 
 
 def fading(e: float, r: float) -> Chaboche:
-    back = BackStress(e * 60_000.0, 600.0 * e / r), BackStress(e * 4000.0)
+    back = ArmstrongFrederick(e * 60_000.0, 600.0 * e / r), ArmstrongFrederick(e * 4000.0)
     return Chaboche(elasticity=elastic(e), curve=curve(e, r), back_stresses=back)
 
 
@@ -116,7 +116,7 @@ def test_prager_hardening_has_one_meaning_under_changing_temperature(plane: bool
     prager = linear(1.0, 1.0, "kinematic")
     flat = Voce(yield_stress=RE, saturation=0.0, rate=1.0)
     unfading = Chaboche(elasticity=elastic(1.0), curve=flat,
-                        back_stresses=(BackStress(prager.plastic_modulus),))  # fmt: skip
+                        back_stresses=(ArmstrongFrederick(prager.plastic_modulus),))  # fmt: skip
     laws: list[Law] = [prager, unfading]
     if plane:
         laws = [PlaneStress(law) for law in laws]

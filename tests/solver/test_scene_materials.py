@@ -9,6 +9,7 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.materials import (
+    ArmstrongFrederick,
     Chaboche,
     Layered,
     Material,
@@ -50,7 +51,7 @@ def test_each_word_stands_for_its_law() -> None:
     assert isinstance(chaboche, Chaboche)
     assert voce.curve == Voce(yield_stress=350.0, saturation=100.0, rate=50.0)
     assert table.curve == Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0))
-    assert chaboche.back_stresses == BACK
+    assert chaboche.back_stresses == tuple(ArmstrongFrederick(*each) for each in BACK)
     assert not (voce.back_stresses or table.back_stresses)
     hard = laws["tresca, isotropic"]
     assert isinstance(hard, TrescaMaterial)
