@@ -98,7 +98,7 @@ class BackStress(ABC):
     def misfit(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
         """Return the error (n_components, n_points) of an increment with this rule [MPa]."""
         off = new - old
-        at = np.flatnonzero(growth > 0)  # elsewhere plastic flow has no direction
+        at = np.flatnonzero((growth > 0) & flow.any(axis=0))  # elsewhere flow has no direction
         dp = growth[at]
         off[:, at] = new[:, at] - self.evolve(old[:, at], dp, flow[:, at] / dp)
         return off

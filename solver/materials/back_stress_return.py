@@ -112,15 +112,20 @@ def general_return(
 
     1. unknowns: relative stress xi and growth dp; N = 3/2 xi / q, with q its von Mises stress
     2. ``xi - s + 2 G dp N + sum of X(dp, N) = 0`` and ``q - R(p + dp) = 0``
-    3. Newton's method from ``xi = s - sum of X``, dp = 0; a step that does not lessen the residual,
-       or makes dp negative, is halved
+    3. Newton's method from the flow without hardening; a step that does not lessen the residual, or
+       makes dp negative, is halved
     4. the derivative of xi and dp by s, from the same equations, makes the tangent
 
     Where no solution is found dp is NaN, and the increment does not converge.
     """
     n, count = s.shape
-    scale = von_mises(s)
-    found = np.concatenate([s - back.sum(axis=0), np.zeros((1, count))])
+    scale, xi = von_mises(s), s - back.sum(axis=0)
+    q = von_mises(xi)
+    growth = q - curve.flow_stress(accumulated)
+    for rule, X in zip(rules, back, strict=True):
+        growth += np.maximum(von_mises(X) - rule.limit, 0.0)  # heat may have left more
+    growth /= 3 * G
+    found = np.concatenate([xi / q * curve.flow_stress(accumulated + growth), [growth]])
     least, share = np.full(count, np.inf), np.ones(count)
     step, going = np.zeros_like(found), np.arange(count)
 

@@ -21,6 +21,7 @@ from solver.materials import (
     Voce,
 )
 from solver.mesh import grid
+from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
 
 E, RE, ALPHA = 2e5, 400.0, 1.2e-5
 PAIRS = ((1.0, 1.0), (0.7, 0.7), (0.8, 0.5), (0.6, 0.9))
@@ -45,12 +46,18 @@ def fading(e: float, r: float) -> Chaboche:
     return Chaboche(elasticity=elastic(e), curve=curve(e, r), back_stresses=back)
 
 
+def own(e: float, r: float) -> Chaboche:
+    back = BurletCailletaud(e * 60_000.0, 600.0 * e / r, 0.1), OhnoWang(e * 4000.0, r * 100.0)
+    return Chaboche(elasticity=elastic(e), curve=curve(e, r), back_stresses=back)
+
+
 LAWS: dict[str, Any] = {
     **{h: lambda e, r, h=h: linear(e, r, h) for h in ("none", "isotropic", "kinematic", "mixed")},
     "plane stress": lambda e, r: PlaneStress(linear(e, r, "mixed")),
     "projected": lambda e, r: linear(e, r, "mixed").in_plane_stress(),
     "tresca": lambda e, r: TrescaMaterial(elasticity=elastic(e), curve=curve(e, r)),
     "fading": fading,
+    "rules of one's own": own,
     "layers": lambda e, r: Layered(
         elasticity=elastic(e), weights=(0.4, 0.5), yields=(r * RE, r * 600.0)
     ),
