@@ -108,7 +108,8 @@ class Parts(Generic[T]):
         return part(**{name: getattr(values, name) for name in declared(part)})
 
 
-def declared(part: type[Any]) -> dict[str, tuple[Any, dataclasses.Field[Any]]]:
+@cache
+def declared(part: type[Any]) -> Mapping[str, tuple[Any, dataclasses.Field[Any]]]:
     """Return the parameters of a part, in their order: name -> annotation and field."""
     hints = typing.get_type_hints(part, include_extras=True)
     return {f.name: (hints[f.name], f) for f in dataclasses.fields(part) if f.init}

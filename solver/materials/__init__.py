@@ -1,8 +1,9 @@
 """Material laws: (strain, state) -> (stress, tangent, new state, yielding).
 
 `Law` is the contract. `Material` is the law of the scenes: von Mises, linear hardening. `Chaboche`
-hardens along a `Voce` or `Table` curve and by back stresses that fade, `Layered` by layers that
-yield one after the other, `TrescaMaterial` yields by the largest shear stress. `PlaneStress` makes
+hardens along a `Curve`, such as `Voce` or `Table`, and by `BackStress`es that fade, such as
+`ArmstrongFrederick`; `Layered` by layers that yield one after the other; `TrescaMaterial` yields by
+the largest shear stress. `PlaneStress` makes
 any law one for plane stress, `Heated` lowers the stiffness and strength of any law; both are
 `wrapped.Wrapped`, which passes on what a wrapper does not change.
 """
