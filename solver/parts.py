@@ -16,7 +16,7 @@ import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from solver.errors import ModelError
 
@@ -108,9 +108,16 @@ class Parts(Generic[T]):
         return part(**{name: getattr(values, name) for name in declared(part)})
 
 
-@cache
-def declared(part: type[Any]) -> Mapping[str, tuple[Any, dataclasses.Field[Any]]]:
+Declared = Mapping[str, tuple[Any, dataclasses.Field[Any]]]
+
+
+def declared(part: type[Any]) -> Declared:
     """Return the parameters of a part, in their order: name -> annotation and field."""
+    return _declared(cast("Any", part))
+
+
+@cache
+def _declared(part: Any) -> Declared:
     hints = typing.get_type_hints(part, include_extras=True)
     return {f.name: (hints[f.name], f) for f in dataclasses.fields(part) if f.init}
 
