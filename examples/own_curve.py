@@ -6,7 +6,9 @@ import numpy as np
 
 from solver import Body, Displacement, Model, solve
 from solver.materials import Chaboche, Elasticity
+from solver.materials.hardening_rules import HARDENING, GrowingRule
 from solver.mesh import grid
+from solver.parameters import described
 
 
 @dataclass(frozen=True)
@@ -27,14 +29,29 @@ class Swift:
         return self.n * self.k * (self.e0 + p) ** (self.n - 1)
 
 
-E, curve = 2e5, Swift(k=900.0, e0=0.002, n=0.2)
-law = Chaboche(elasticity=Elasticity(youngs_modulus=E, poisson_ratio=0.3), curve=curve)
-bar = Body(
-    name="bar", mesh=grid(np.linspace(0, 10, 3), np.linspace(0, 2, 2)), material=law,
-    kinematics="plane_stress", supports={"left": "x", "bottom": "y"},
-    loads=(Displacement(boundary="right", x=0.2),),
-)  # fmt: skip
-stress = solve(Model(bodies=(bar,))).stress("bar", "loaded")[0]
-plastic = 0.2 / 10 - stress / E  # what is not elastic of a strain of 2 %
-assert np.allclose(stress, curve.flow_stress(plastic), rtol=1e-9), stress
-print(f"stress at a strain of 2 %: {stress[0]:.2f} MPa")
+@HARDENING.word("swift")
+@dataclass(frozen=True, kw_only=True)
+class SwiftHardening(GrowingRule):
+    """The same by a word, with parameters, for studies and scene files."""
+
+    swift_strain: float = described(0.002, "e0 of swift hardening")
+    swift_exponent: float = described(0.2, "n of swift hardening")
+
+    def flow_curve(self, elasticity, yield_stress):
+        """Return the curve that begins at the yield stress."""
+        k = yield_stress / self.swift_strain**self.swift_exponent
+        return Swift(k, self.swift_strain, self.swift_exponent)
+
+
+if __name__ == "__main__":
+    E, curve = 2e5, Swift(k=900.0, e0=0.002, n=0.2)
+    law = Chaboche(elasticity=Elasticity(youngs_modulus=E, poisson_ratio=0.3), curve=curve)
+    bar = Body(
+        name="bar", mesh=grid(np.linspace(0, 10, 3), np.linspace(0, 2, 2)), material=law,
+        kinematics="plane_stress", supports={"left": "x", "bottom": "y"},
+        loads=(Displacement(boundary="right", x=0.2),),
+    )  # fmt: skip
+    stress = solve(Model(bodies=(bar,))).stress("bar", "loaded")[0]
+    plastic = 0.2 / 10 - stress / E  # what is not elastic of a strain of 2 %
+    assert np.allclose(stress, curve.flow_stress(plastic), rtol=1e-9), stress
+    print(f"stress at a strain of 2 %: {stress[0]:.2f} MPa")

@@ -19,6 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if reason := stranger():
         return complain(reason, BAD_INPUT)
     from residua.arguments import parser  # imports the neighbours, which are known now
+    from solver.errors import ModelError
+    from solver.parts import load_own_parts
     from studies.errors import (
         CatalogueDamaged,
         FileDiffers,
@@ -30,8 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     options = parser().parse_args(arguments)
     try:
+        load_own_parts()
         return options.command(options)
-    except StudyError as error:
+    except (ModelError, StudyError) as error:
         return complain(error, BAD_INPUT)
     except (CatalogueDamaged, FileDiffers, GridLost, StoreBusy, StoreFull) as error:
         return complain(error, FAILED)

@@ -9,7 +9,6 @@ like those of the package.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import importlib.util
 import os
 import sys
@@ -17,7 +16,7 @@ import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar, cast
 
 from solver.errors import ModelError
 
@@ -79,6 +78,8 @@ class Parts(Generic[T]):
 
     def all(self) -> Mapping[str, type[T]]:
         """Return word -> class, those of files of one's own too."""
+        if _RUNNING:
+            raise ImportError("it imports scenes, which are made of its parts")
         load_own_parts()
         return self._known
 
@@ -126,14 +127,26 @@ class Parts(Generic[T]):
         """Return the names of the parameters of a part."""
         return frozenset(declared(self[word]))
 
+    def unused(self, word: str) -> frozenset[str]:
+        """Return the names of the parameters that only other parts have."""
+        return frozenset(self.parameters()) - self.used(word)
+
     def made(self, word: str, values: Any) -> T:
         """Return the part of a word with its parameters, attributes of ``values``."""
         part = self[word]
         return part(**{name: getattr(values, name) for name in declared(part)})
 
 
-def declared(part: type[Any]) -> dict[str, tuple[Any, dataclasses.Field[Any]]]:
+Declared = Mapping[str, tuple[Any, dataclasses.Field[Any]]]
+
+
+def declared(part: type[Any]) -> Declared:
     """Return the parameters of a part, in their order: name -> annotation and field."""
+    return _declared(cast("Any", part))
+
+
+@cache
+def _declared(part: Any) -> Declared:
     hints = typing.get_type_hints(part, include_extras=True)
     return {f.name: (hints[f.name], f) for f in dataclasses.fields(part) if f.init}
 
@@ -142,14 +155,6 @@ def own_files() -> tuple[Path, ...]:
     """Return the files of one's own that ``RESIDUA_PARTS`` names."""
     given = os.environ.get(SETTING, "")
     return tuple(Path(each).resolve() for each in given.split(os.pathsep) if each)
-
-
-def own_digest() -> str:
-    """Return a digest of the files of one's own; empty where there are none."""
-    files = own_files()
-    if not files:
-        return ""
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 
 @cache
@@ -161,20 +166,27 @@ def load_own_parts() -> None:
     ModelError
         naming the file that cannot be read or run
     """
-    for path in own_files():
-        name = f"residua_parts_{path.stem}"
-        if getattr(sys.modules.get(name), "__file__", "") == str(path):
-            continue  # it runs now, and asks for parts itself
+    for k, path in enumerate(own_files()):
+        name = f"residua_parts_{k}_{path.stem}"
+        if name in _RUNNING:
+            continue
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None or not path.is_file():
             raise ModelError(SETTING, str(path), "must name Python files")
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
+        _RUNNING.append(name)
         try:
             spec.loader.exec_module(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             del sys.modules[name]
             raise ModelError(SETTING, str(path), f"must run: {error}") from error
+        finally:
+            _RUNNING.remove(name)
+
+
+_RUNNING: list[str] = []
+"""Files of one's own that run now."""
 
 
 def _file(part: type[Any]) -> str:

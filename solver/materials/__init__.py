@@ -1,13 +1,15 @@
 """Material laws: (strain, state) -> (stress, tangent, new state, yielding).
 
 `Law` is the contract. `Material` is the law of the scenes: von Mises, linear hardening. `Chaboche`
-hardens along a `Voce` or `Table` curve and by back stresses that fade, `Layered` by layers that
-yield one after the other, `TrescaMaterial` yields by the largest shear stress. `PlaneStress` makes
+hardens along a `Curve`, such as `Voce` or `Table`, and by `BackStress`es that fade, such as
+`ArmstrongFrederick`; `Layered` by layers that yield one after the other; `TrescaMaterial` yields by
+the largest shear stress. `PlaneStress` makes
 any law one for plane stress, `Heated` lowers the stiffness and strength of any law; both are
 `wrapped.Wrapped`, which passes on what a wrapper does not change.
 """
 
-from solver.materials.chaboche import BackStress, Chaboche
+from solver.materials.back_stress import ArmstrongFrederick, BackStress
+from solver.materials.chaboche import Chaboche
 from solver.materials.curves import Curve, Table, Voce
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening import LinearHardening
@@ -21,6 +23,7 @@ from solver.materials.tresca import TrescaMaterial
 from solver.materials.yield_surface import Tresca, VonMises, YieldSurface
 
 __all__ = [
+    "ArmstrongFrederick",
     "BackStress",
     "Chaboche",
     "Curve",

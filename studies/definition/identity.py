@@ -1,7 +1,8 @@
 """Names made from content: the same parameters and the same solver give the same id.
 
 A change of the solver that may change a number, a name or a unit changes every id, so that no old
-run is taken for a new one; a change of a scene of the user's own changes the ids of its runs. A
+run is taken for a new one, and so does a change of files with parts of one's own; a change of a
+scene of the user's own changes the ids of its runs. A
 change of comments and docstrings alone changes none (`studies.definition.meaning`).
 """
 
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import solver
-from solver.parts import own_digest
+from solver.parts import own_files
 
 if TYPE_CHECKING:
     from solver.scenes import Scene
@@ -107,16 +108,16 @@ def solver_hash() -> str:
     """Return the digest of all that decides what a run's file holds.
 
     These are the sources of the solver, and the modules that lay its records out as data sets,
-    each with its place: to move a file changes the digest. Files with parts of one's own count too.
+    each with its place: to move a file changes the digest. Files with parts of one's own count
+    where there are any (`solver.parts`), wherever they are.
     """
     from studies.definition.meaning import meaning  # `residua --help` makes no id
 
     root, here = Path(solver.__file__).parent, Path(__file__).parents[1]
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
+    files |= {f"parts/{k}": path for k, path in enumerate(own_files())}
     digests = {name: _digest(meaning(path.read_bytes()).encode()) for name, path in files.items()}
-    if own := own_digest():
-        digests["parts"] = own
     return _digest(json.dumps(digests, sort_keys=True).encode())
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from solver.materials import (
-    BackStress,
+    ArmstrongFrederick,
     Chaboche,
     Elasticity,
     Law,
@@ -22,6 +22,7 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
+from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
 
 HARDENING = ["none", "isotropic", "kinematic", "mixed"]
 
@@ -35,8 +36,17 @@ CURVES = {
     "table": Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0)),
 }
 BACK_STRESSES = {
-    "prager": (BackStress(5000.0),),
-    "fading": (BackStress(60_000.0, 600.0), BackStress(4000.0, 20.0), BackStress(500.0)),
+    "prager": (ArmstrongFrederick(5000.0),),
+    "fading": (
+        ArmstrongFrederick(60_000.0, 600.0),
+        ArmstrongFrederick(4000.0, 20.0),
+        ArmstrongFrederick(500.0),
+    ),
+    "burlet cailletaud": (
+        BurletCailletaud(60_000.0, 600.0, 0.1),
+        BurletCailletaud(4000.0, 20.0, 0.1),
+    ),
+    "ohno wang": (OhnoWang(60_000.0, 100.0), OhnoWang(4000.0, 200.0)),
 }
 LAYERED = Layered.of_curve(
     STEEL, strain=(350.0 / 2e5, 0.003, 0.01), stress=(350.0, 430.0, 500.0), slope=2000.0
@@ -127,7 +137,7 @@ LAWS: dict[str, tuple[Law, int]] = {
     "tresca, wrapped": (PlaneStress(TrescaMaterial(elasticity=STEEL, curve=SOFT)), 4),
     **{f"curve {c}": (Chaboche(elasticity=STEEL, curve=CURVES[c]), 6) for c in CURVES},
     **{f"back stresses {b} {n}": (chaboche(b), n) for b in BACK_STRESSES for n in (4, 6)},
-    "back stresses, wrapped": (PlaneStress(chaboche("fading")), 4),
+    **{f"{b}, wrapped": (PlaneStress(chaboche(b)), 4) for b in BACK_STRESSES if b != "prager"},
     "layered 4": (LAYERED, 4),
     "layered 6": (LAYERED, 6),
     "layered, wrapped": (PlaneStress(LAYERED), 4),

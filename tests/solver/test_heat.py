@@ -10,7 +10,7 @@ import pytest
 
 from solver import Body, Material, Model, ModelError, PathControl, Solution, Temperature, solve
 from solver.materials import (
-    BackStress,
+    ArmstrongFrederick,
     Chaboche,
     Elasticity,
     Heated,
@@ -21,6 +21,7 @@ from solver.materials import (
     Voce,
 )
 from solver.mesh import grid
+from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
 
 E, RE, ALPHA = 2e5, 400.0, 1.2e-5
 PAIRS = ((1.0, 1.0), (0.7, 0.7), (0.8, 0.5), (0.6, 0.9))
@@ -41,7 +42,12 @@ def curve(e: float, r: float) -> Voce:
 
 
 def fading(e: float, r: float) -> Chaboche:
-    back = BackStress(e * 60_000.0, 600.0 * e / r), BackStress(e * 4000.0)
+    back = ArmstrongFrederick(e * 60_000.0, 600.0 * e / r), ArmstrongFrederick(e * 4000.0)
+    return Chaboche(elasticity=elastic(e), curve=curve(e, r), back_stresses=back)
+
+
+def own(e: float, r: float) -> Chaboche:
+    back = BurletCailletaud(e * 60_000.0, 600.0 * e / r, 0.1), OhnoWang(e * 4000.0, r * 100.0)
     return Chaboche(elasticity=elastic(e), curve=curve(e, r), back_stresses=back)
 
 
@@ -51,6 +57,7 @@ LAWS: dict[str, Any] = {
     "projected": lambda e, r: linear(e, r, "mixed").in_plane_stress(),
     "tresca": lambda e, r: TrescaMaterial(elasticity=elastic(e), curve=curve(e, r)),
     "fading": fading,
+    "rules of one's own": own,
     "layers": lambda e, r: Layered(
         elasticity=elastic(e), weights=(0.4, 0.5), yields=(r * RE, r * 600.0)
     ),
@@ -116,7 +123,7 @@ def test_prager_hardening_has_one_meaning_under_changing_temperature(plane: bool
     prager = linear(1.0, 1.0, "kinematic")
     flat = Voce(yield_stress=RE, saturation=0.0, rate=1.0)
     unfading = Chaboche(elasticity=elastic(1.0), curve=flat,
-                        back_stresses=(BackStress(prager.plastic_modulus),))  # fmt: skip
+                        back_stresses=(ArmstrongFrederick(prager.plastic_modulus),))  # fmt: skip
     laws: list[Law] = [prager, unfading]
     if plane:
         laws = [PlaneStress(law) for law in laws]

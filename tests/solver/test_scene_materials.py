@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.materials import (
+    ArmstrongFrederick,
     Chaboche,
     Layered,
     Material,
@@ -17,8 +19,10 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
+from solver.materials.hardening_rules import HARDENING
 from solver.scenes.punch import PunchParameters
 from solver.scenes.rolling_parameters import RollingParameters
+from tests.architecture.sources import ROOT
 
 CURVE = ((0.0, 350.0), (0.002, 420.0), (0.02, 480.0))
 BACK = ((60_000.0, 600.0), (4000.0, 20.0))
@@ -50,7 +54,7 @@ def test_each_word_stands_for_its_law() -> None:
     assert isinstance(chaboche, Chaboche)
     assert voce.curve == Voce(yield_stress=350.0, saturation=100.0, rate=50.0)
     assert table.curve == Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0))
-    assert chaboche.back_stresses == BACK
+    assert chaboche.back_stresses == tuple(ArmstrongFrederick(*each) for each in BACK)
     assert not (voce.back_stresses or table.back_stresses)
     hard = laws["tresca, isotropic"]
     assert isinstance(hard, TrescaMaterial)
@@ -58,6 +62,17 @@ def test_each_word_stands_for_its_law() -> None:
     assert isinstance(linear, Material)
     assert hard.curve == Voce(yield_stress=350.0, modulus=linear.isotropic_modulus)
     assert PunchParameters(**LAWS["layered"]).material(elastic=True).elastic
+
+
+def test_the_page_of_materials_lists_each_word_with_its_parameters() -> None:
+    _, *rows = [
+        [re.findall(r"`(\w+)`", cell) for cell in line.split("|")]
+        for line in (ROOT / "docs/materials.md").read_text().splitlines()
+        if line.startswith("| `")
+    ]
+    assert {row[1][0]: frozenset(row[3]) for row in rows} == {
+        word: HARDENING.used(word) for word in HARDENING
+    }
 
 
 def test_a_curve_that_another_rule_of_the_sweep_needs_is_no_mistake() -> None:

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from solver import Body, Model, PathControl, Solution, solve
 from solver.materials import (
-    BackStress,
+    ArmstrongFrederick,
     Chaboche,
     Elasticity,
     Law,
@@ -88,7 +88,8 @@ class Bar:
         own = float(law.curve.flow_stress(np.array([p]))[0])
         if isinstance(law, TrescaMaterial):
             return own
-        parts = (c * (-math.expm1(-g * p) / g if g else p) for c, g in law.back_stresses)
+        rules = ((rule.modulus, rule.recall) for rule in law.back_stresses)
+        parts = (c * (-math.expm1(-g * p) / g if g else p) for c, g in rules)
         return own + sum(parts)
 
     @property
@@ -161,7 +162,7 @@ def _law(kind: str, elasticity: Elasticity, rng: np.random.Generator) -> Law:
     if kind.startswith("tresca"):
         curve = voce if kind == "tresca, voce" else Voce(yield_stress=YIELD)
         return TrescaMaterial(elasticity=elasticity, curve=curve)
-    back = (BackStress(float(10 ** rng.uniform(3, 5)), rate), BackStress(500.0))
+    back = (ArmstrongFrederick(float(10 ** rng.uniform(3, 5)), rate), ArmstrongFrederick(500.0))
     return Chaboche(
         elasticity=elasticity, curve=voce, back_stresses=back if kind == "chaboche" else ()
     )

@@ -1,0 +1,155 @@
+"""Rules by which the centre of a yield surface moves: parts of `Chaboche`.
+
+A rule of one's own is a class of `BackStress` with a modulus, a limit, its stress in tension and
+`evolve`. The return mapping and the tangent need no more (`solver.materials.back_stress_return`).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.materials.attribute import attribute
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_STEP = 1e-5
+"""Step of the central differences, which are exact to its square; |normal| is 1.2."""
+_STRAIN = 1e-4
+"""Plastic strain over which a back stress changes: not less than that of first yield."""
+
+
+class BackStress(ABC):
+    """A part X of the centre of the yield surface: dX = 2/3 C d(plastic strain) - recall.
+
+    Stresses are deviators (n_components, n_points), Mandel [MPa].
+    """
+
+    __slots__ = ()
+
+    @attribute
+    def modulus(self) -> float:
+        """C [MPa]: initial slope in tension."""
+        raise NotImplementedError(f"{type(self).__name__} must give its modulus")
+
+    @attribute
+    def limit(self) -> float:
+        """The stress that it tends to in tension [MPa]; inf where it grows without bound."""
+        raise NotImplementedError(f"{type(self).__name__} must give its limit")
+
+    @attribute
+    def symmetric(self) -> bool:
+        """Whether the derivative of `evolve` by plastic strain is."""
+        return False
+
+    @abstractmethod
+    def in_tension(self, accumulated: Array) -> Array:
+        """Return its share (n_points,) of the stress of a tension test [MPa]."""
+
+    @abstractmethod
+    def evolve(self, old: Array, growth: Array, normal: Array) -> Array:
+        """Return the back stress at the end of an increment: one step of backward Euler.
+
+        Parameters
+        ----------
+        old : back stress at its beginning, in heat perhaps beyond the limit
+        growth : (n_points,) dp, of the accumulated plastic strain
+        normal : (n_components, n_points) N; the plastic strain grows by dp N, and N : N = 3/2
+        """
+
+    def slopes(self, old: Array, growth: Array, normal: Array) -> tuple[Array, Array]:
+        """Return the derivatives of `evolve` by dp and by N, for Newton's method and the tangent.
+
+        They are central differences; a rule may give its own.
+
+        Returns
+        -------
+        by_growth, by_normal
+            (n_components, n_points) and (n_components, n_components, n_points)
+        """
+        h = _STEP * (growth + _STRAIN)
+        more, less = (self.evolve(old, growth + step, normal) for step in (h, -h))
+        turns = _STEP * np.eye(len(normal))[:, :, None]
+        turned = [
+            self.evolve(old, growth, normal + turn) - self.evolve(old, growth, normal - turn)
+            for turn in turns
+        ]
+        return (more - less) / (2 * h), np.stack(turned, axis=1) / (2 * _STEP)
+
+    def heat(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
+        """Return the stored work that recall turns into heat (n_points,) [N mm/mm3].
+
+        Stored is 3/4 X:X / C; ``flow`` is the growth of plastic strain.
+        """
+        del growth
+        if not self.modulus:
+            return np.zeros(old.shape[1])
+        recalled = old + 2 / 3 * self.modulus * flow - new
+        return np.asarray(1.5 / self.modulus * (new * recalled).sum(axis=0))
+
+    def misfit(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
+        """Return the error (n_components, n_points) of an increment with this rule [MPa]."""
+        off = new - old
+        at = np.flatnonzero((growth > 0) & flow.any(axis=0))  # elsewhere flow has no direction
+        dp = growth[at]
+        off[:, at] = new[:, at] - self.evolve(old[:, at], dp, flow[:, at] / dp)
+        return off
+
+
+@dataclass(frozen=True, slots=True)
+class ArmstrongFrederick(BackStress):
+    """Armstrong and Frederick's rule: dX = 2/3 C d(plastic strain) - gamma X dp.
+
+    Attributes
+    ----------
+    modulus : C [MPa], initial slope in tension
+    recall : gamma, how fast it forgets; 0 is Prager's rule. In tension it tends to C / gamma
+    """
+
+    modulus: float
+    recall: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("modulus", "recall"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ModelError(name, value, "must be finite and not negative")
+
+    @property
+    def limit(self) -> float:
+        """C / gamma [MPa]."""
+        if not self.modulus:
+            return 0.0
+        return self.modulus / self.recall if self.recall else math.inf
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether it does not fade."""
+        return not self.recall
+
+    def in_tension(self, accumulated: Array) -> Array:
+        """Return C / gamma (1 - exp(-gamma p)) (n_points,) [MPa]."""
+        C, gamma, p = self.modulus, self.recall, accumulated
+        return C * (-np.expm1(-gamma * p) / gamma if gamma else p)
+
+    def evolve(self, old: Array, growth: Array, normal: Array) -> Array:
+        """Return (X + 2/3 C dp N) / (1 + gamma dp)."""
+        return (old + 2 / 3 * self.modulus * growth * normal) / (1 + self.recall * growth)
+
+    def heat(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
+        """Return 3 gamma / (2 C) X:X dp (n_points,) [N mm/mm3]."""
+        del old, flow
+        factor = 1.5 * self.recall / self.modulus if self.modulus else 0.0
+        return np.asarray(factor * (new**2).sum(axis=0) * growth)
+
+    def misfit(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
+        """Return the error of the rule, summed over an increment."""
+        return new - old - 2 / 3 * self.modulus * flow + self.recall * growth * new

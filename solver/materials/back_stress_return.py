@@ -1,0 +1,212 @@
+"""Return to a von Mises surface that grows along a curve and is moved by back stresses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from solver.materials.radial_return import SQRT23
+from solver.materials.scalar import multiplier
+from solver.tensors import identity, von_mises
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.back_stress import ArmstrongFrederick, BackStress
+    from solver.materials.curves import Curve
+
+    Array = NDArray[np.float64]
+
+_ROUNDING = 8 * float(np.finfo(float).eps)
+"""Ratio of residual to trial stress at which nothing is left to gain."""
+_SMALL = 1e-10
+"""The same where rounding of a rule lets it gain no more."""
+_MAX_ITERATIONS = 100
+
+
+class FlowStep(NamedTuple):
+    """An increment of flow at points.
+
+    ``growth`` dp (n,); ``flow`` plastic strain (n_components, n); ``back`` the new back stresses
+    (n_back, n_components, n) [MPa]; ``softening`` elastic stiffness minus tangent (n_components,
+    n_components, n) [MPa].
+    """
+
+    growth: Array
+    flow: Array
+    back: Array
+    softening: Array
+
+
+def fading_return(
+    s: Array,
+    back: Array,
+    accumulated: Array,
+    rules: Sequence[ArmstrongFrederick],
+    curve: Curve,
+    G: float,
+) -> FlowStep:
+    """Return the flow from a trial deviator (n_components, n) by one scalar equation a point.
+
+    With the back stresses X at the beginning, the direction of flow is that of
+
+        xi(dp) = s - sum of X / (1 + gamma dp)
+
+    and ``sqrt(3/2) |xi| = R(p + dp) + (3 G + sum of C / (1 + gamma dp)) dp`` gives dp.
+    """
+    constants = [(rule.modulus, rule.recall) for rule in rules]
+    C, gamma = np.reshape(constants, (-1, 2)).T[:, :, None]
+
+    def relative(growth: Array) -> tuple[Array, Array, Array]:
+        fade = 1 + gamma * growth
+        xi = s - (back / fade[:, None]).sum(axis=0)
+        turn = (back * (gamma / fade**2)[:, None]).sum(axis=0)
+        return fade, xi, turn
+
+    def excess(growth: Array) -> tuple[Array, Array]:
+        fade, xi, turn = relative(growth)
+        q, p = von_mises(xi), accumulated + growth
+        stiff = 3 * G + (C / fade).sum(axis=0)
+        slope = 3 * G + (C / fade**2).sum(axis=0) + curve.slope(p)
+        slope -= 1.5 * (xi * turn).sum(axis=0) / q
+        return q - curve.flow_stress(p) - stiff * growth, -slope
+
+    first, _ = excess(np.zeros(s.shape[1]))
+    # what heat has left of a back stress beyond C / gamma fades in favour of the excess
+    for X, (modulus, recall) in zip(back, constants, strict=True):
+        if recall:
+            first = first + np.maximum(von_mises(X) - modulus / recall, 0.0)
+    growth = multiplier(excess, first / (3 * G) * (1 + 1e-9), von_mises(s))
+    _, xi, turn = relative(growth)
+    size = np.sqrt((xi**2).sum(axis=0))
+    u, slope = xi / size, -excess(growth)[1]
+    flow = growth * u / SQRT23
+    grown = back + 2 / 3 * C[..., None] * flow
+
+    aside = turn - (u * turn).sum(axis=0) * u
+    along = u[:, None] * u[None]
+    mixed = aside[:, None] * u[None]
+    shrunk = 2 * G * growth / (SQRT23 * size)
+    softening = (
+        2
+        * G
+        * (
+            shrunk * (_projection(len(s))[:, :, None] - along + mixed / (SQRT23 * slope))
+            + 3 * G / slope * along
+        )
+    )
+    return FlowStep(growth, flow, grown / (1 + gamma * growth)[:, None], softening)
+
+
+def general_return(
+    s: Array,
+    back: Array,
+    accumulated: Array,
+    rules: Sequence[BackStress],
+    curve: Curve,
+    G: float,
+) -> FlowStep:
+    """Return the flow from a trial deviator (n_components, n) for any rules.
+
+    1. unknowns: relative stress xi and growth dp; N = 3/2 xi / q, with q its von Mises stress
+    2. ``xi - s + 2 G dp N + sum of X(dp, N) = 0`` and ``q - R(p + dp) = 0``
+    3. Newton's method from the flow without hardening; a step that does not lessen the residual, or
+       makes dp negative, is halved
+    4. the derivative of xi and dp by s, from the same equations, makes the tangent
+
+    Where no solution is found dp is NaN, and the increment does not converge.
+    """
+    n, count = s.shape
+    scale, xi = von_mises(s), s - back.sum(axis=0)
+    q = von_mises(xi)
+    growth = q - curve.flow_stress(accumulated)
+    for rule, X in zip(rules, back, strict=True):
+        growth += np.maximum(von_mises(X) - rule.limit, 0.0)  # heat may have left more
+    growth /= 3 * G
+    found = np.concatenate([xi / q * curve.flow_stress(accumulated + growth), [growth]])
+    least, share = np.full(count, np.inf), np.ones(count)
+    step, going = np.zeros_like(found), np.arange(count)
+
+    def at(points: NDArray[np.int64], x: Array) -> _Equations:
+        own = s[:, points], back[:, :, points], accumulated[points]
+        return _Equations(*own, x[:n], x[n], rules, curve, G)
+
+    for _ in range(_MAX_ITERATIONS):
+        trial = found[:, going] - share[going] * step[:, going]
+        size = np.sqrt((at(going, trial).residual() ** 2).sum(axis=0))
+        better = (size < least[going]) & (trial[n] >= 0)
+        some = going[better]
+        found[:, some], least[some] = trial[:, better], size[better]
+        share[going] = np.where(better, 1.0, 0.5 * share[going])
+        small = least[going] <= np.where(better, _ROUNDING, _SMALL) * scale[going]
+        going = going[~small]
+        if not len(going):
+            break
+        here = at(going, found[:, going])
+        step[:, going] = _solved(here.slope(), here.residual()[:, None])[:, 0]
+    found[n, least > _SMALL * scale] = np.nan
+
+    end = at(np.arange(count), found)
+    by_s = _solved(end.slope(), np.repeat(np.eye(n + 1, n)[:, :, None], count, axis=2))
+    turned = np.einsum("ijp,jkp->ikp", end.turning, by_s[:n])
+    turned = end.normal[:, None] * by_s[n] + end.growth * turned
+    softening = 4 * G**2 * np.einsum("ijp,jk->ikp", turned, _projection(n))
+    return FlowStep(end.growth, end.growth * end.normal, end.moved(), softening)
+
+
+class _Equations:
+    """The equations of `general_return` at points, for values of its unknowns."""
+
+    def __init__(
+        self, s: Array, back: Array, accumulated: Array, xi: Array, growth: Array,
+        rules: Sequence[BackStress], curve: Curve, G: float,
+    ) -> None:  # fmt: skip
+        self._s, self._back, self._p, self._rules = s, back, accumulated + growth, rules
+        self._xi, self._curve, self._G = xi, curve, G
+        self.growth, self._q = growth, von_mises(xi)
+        self.normal = 1.5 * xi / self._q
+
+    def moved(self) -> Array:
+        """Return the back stresses (n_back, n_components, n) [MPa]."""
+        each = zip(self._rules, self._back, strict=True)
+        return np.stack([rule.evolve(X, self.growth, self.normal) for rule, X in each])
+
+    def residual(self) -> Array:
+        """Return what the equations lack (n_components + 1, n) [MPa]."""
+        flow = 2 * self._G * self.growth * self.normal
+        aside = self._xi - self._s + flow + self.moved().sum(axis=0)
+        return np.concatenate([aside, [self._q - self._curve.flow_stress(self._p)]])
+
+    @property
+    def turning(self) -> Array:
+        """Derivative of N by xi (n_components, n_components, n) [1/MPa]."""
+        N = self.normal
+        return (1.5 * np.eye(len(N))[:, :, None] - N[:, None] * N[None]) / self._q
+
+    def slope(self) -> Array:
+        """Return the derivative of the residual (n_components + 1, n_components + 1, n)."""
+        n, count = self._xi.shape
+        one = np.eye(n)[:, :, None]
+        by_growth = 2 * self._G * self.normal
+        by_normal = 2 * self._G * self.growth * one
+        for rule, X in zip(self._rules, self._back, strict=True):
+            more, turn = rule.slopes(X, self.growth, self.normal)
+            by_growth, by_normal = by_growth + more, by_normal + turn
+        out = np.empty((n + 1, n + 1, count))
+        out[:n, :n] = one + np.einsum("ijp,jkp->ikp", by_normal, self.turning)
+        out[:n, n], out[n, :n] = by_growth, self.normal
+        out[n, n] = -self._curve.slope(self._p)
+        return out
+
+
+def _solved(matrices: Array, right: Array) -> Array:
+    """Return the solutions (n, m, n_points) of systems (n, n, n_points) with m right sides each."""
+    found = np.linalg.solve(np.moveaxis(matrices, -1, 0), np.moveaxis(right, -1, 0))
+    return np.asarray(np.moveaxis(found, 0, -1), dtype=float)
+
+
+def _projection(n_components: int) -> Array:
+    one = identity(n_components)
+    return np.eye(n_components) - np.outer(one, one) / 3.0

@@ -1,0 +1,279 @@
+"""Hardening rules by the word that scenes and scene files name them with.
+
+A rule is a frozen dataclass whose fields are its parameters. It gives the law of a material; one
+that lets the yield surface grow and not move gives its curve, and goes with any yield condition.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+
+import numpy as np
+from annotated_types import Interval, Unit
+
+from solver.errors import ModelError
+from solver.materials.back_stress import ArmstrongFrederick, BackStress
+from solver.materials.chaboche import Chaboche
+from solver.materials.curves import Table, Voce
+from solver.materials.layered import Layered
+from solver.materials.material import Hardening, Material
+from solver.parameters import Fraction, HardeningRatio, described
+from solver.parts import Parts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.curves import Curve
+    from solver.materials.elasticity import Elasticity
+    from solver.materials.law import Law
+
+Pairs = tuple[tuple[float, float], ...]
+
+
+class HardeningRule(ABC):
+    """How a material hardens once it has yielded."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
+        """Return the law of a material that yields by von Mises.
+
+        Raises
+        ------
+        ModelError
+            naming the parameter that is wrong
+        """
+
+
+HARDENING: Parts[HardeningRule] = Parts("hardening")
+"""The rules by word. The order is that of their parameters in files and tables."""
+
+
+class GrowingRule(HardeningRule):
+    """The yield surface grows along a curve and does not move."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return how the yield surface grows."""
+
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
+        """Return the law of von Mises with this curve."""
+        return Chaboche(elasticity=elasticity, curve=self.flow_curve(elasticity, yield_stress))
+
+
+class MovingRule(HardeningRule):
+    """The yield surface moves by back stresses, and does not grow unless `flow_curve` says so."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def parts(self, yield_stress: float) -> tuple[BackStress, ...]:
+        """Return the rules of the back stresses."""
+
+    def flow_curve(self, yield_stress: float) -> Curve:
+        """Return how the yield surface grows."""
+        return Voce(yield_stress=yield_stress)
+
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
+        """Return Chaboche's law with these back stresses and this curve."""
+        parts, curve = self.parts(yield_stress), self.flow_curve(yield_stress)
+        return Chaboche(elasticity=elasticity, curve=curve, back_stresses=parts)
+
+
+class LinearRule(HardeningRule):
+    """The rule of `Material` that has this word; steady passes know no others."""
+
+    __slots__ = ()
+    word: ClassVar[Hardening]
+
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Material:
+        """Return the closed-form law; yield stress inf makes it elastic."""
+        return Material(
+            youngs_modulus=elasticity.youngs_modulus,
+            poisson_ratio=elasticity.poisson_ratio,
+            yield_stress=yield_stress,
+            hardening=self.word,
+            **asdict(cast("Any", self)),
+        )
+
+
+class LinearGrowingRule(LinearRule, GrowingRule):
+    """A rule of `Material` by which the yield surface does not move."""
+
+    __slots__ = ()
+
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return the yield stress with the linear growth of `Material`."""
+        modulus = self.law(elasticity, yield_stress).isotropic_modulus
+        return Voce(yield_stress=yield_stress, modulus=modulus)
+
+
+# -- the rules of the package --------------------------------------------------------------------
+
+
+@HARDENING.word("none")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoHardening(LinearGrowingRule):
+    """The yield surface stays."""
+
+    word: ClassVar[Hardening] = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sloped(LinearRule):
+    hardening_ratio: HardeningRatio = described(
+        0.024, "slope Eu of the uniaxial hardening branch / Young's modulus"
+    )
+
+
+@HARDENING.word("isotropic")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IsotropicHardening(_Sloped, LinearGrowingRule):
+    """The yield surface grows linearly."""
+
+    word: ClassVar[Hardening] = "isotropic"
+
+
+@HARDENING.word("kinematic")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KinematicHardening(_Sloped):
+    """The yield surface moves linearly."""
+
+    word: ClassVar[Hardening] = "kinematic"
+
+
+@HARDENING.word("mixed")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MixedHardening(_Sloped):
+    """The yield surface grows and moves linearly."""
+
+    word: ClassVar[Hardening] = "mixed"
+    isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Saturating:
+    saturation: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
+        0.0, "growth of the yield stress in the end, with voce and chaboche hardening"
+    )
+    saturation_rate: Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")] = described(
+        10.0, "how fast it grows: as 1 - exp(-rate * plastic strain)"
+    )
+
+    def voce(self, yield_stress: float) -> Voce:
+        return Voce(
+            yield_stress=yield_stress, saturation=self.saturation, rate=self.saturation_rate
+        )
+
+
+@HARDENING.word("voce")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoceHardening(_Saturating, GrowingRule):
+    """The yield surface grows, and saturates."""
+
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return Voce's curve."""
+        if not self.saturation:
+            raise ModelError("saturation", self.saturation, "must be given with voce hardening")
+        return self.voce(yield_stress)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Measured:
+    curve: Pairs = described(
+        (), "points [plastic strain, stress in MPa] of the tension curve, with table and layered "
+        "hardening; the first is [0, yield_stress]",
+    )  # fmt: skip
+
+    def points(
+        self, yield_stress: float, word: str
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return plastic strain and stress of the points."""
+        strain, stress = np.reshape(_pairs("curve", self.curve), (-1, 2)).T
+        begins = bool(self.curve) and (strain[0], stress[0]) == (0.0, yield_stress)
+        rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
+        if not (begins and rises):
+            raise ModelError(
+                "curve", self.curve,
+                f"must be points [plastic strain, stress in MPa] with {word} hardening: the "
+                "first [0, yield_stress], strain increasing, stress not falling",
+            )  # fmt: skip
+        return strain, stress
+
+
+@HARDENING.word("table")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableHardening(_Measured, GrowingRule):
+    """The yield surface grows along measured points."""
+
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return the lines between the points."""
+        strain, stress = self.points(yield_stress, "table")
+        return Table(plastic_strain=tuple(strain.tolist()), stress=tuple(stress.tolist()))
+
+
+@HARDENING.word("chaboche")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChabocheHardening(_Saturating, MovingRule):
+    """The yield surface moves by back stresses that fade, and may grow as with voce."""
+
+    back_stresses: Pairs = described(
+        (), "[modulus C in MPa, recall gamma] of each, with chaboche hardening"
+    )
+
+    def parts(self, yield_stress: float) -> tuple[BackStress, ...]:
+        """Return Armstrong and Frederick's rule with each pair of constants."""
+        if not self.back_stresses:
+            allowed = (
+                "must be given with chaboche hardening: [modulus C in MPa, recall gamma] of each"
+            )
+            raise ModelError("back_stresses", self.back_stresses, allowed)
+        found = []
+        for k, pair in enumerate(_pairs("back_stresses", self.back_stresses), start=1):
+            try:
+                found.append(ArmstrongFrederick(*pair))
+            except ModelError as error:
+                field = f"back_stresses.{k}.{error.field}"
+                raise ModelError(field, error.value, error.allowed) from None
+        return tuple(found)
+
+    def flow_curve(self, yield_stress: float) -> Curve:
+        """Return Voce's curve."""
+        return self.voce(yield_stress)
+
+
+@HARDENING.word("layered")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayeredHardening(_Measured, HardeningRule):
+    """Layers yield one after the other."""
+
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
+        """Return Besseling's law."""
+        strain, stress = self.points(yield_stress, "layered")
+        total = strain + stress / elasticity.youngs_modulus
+        try:
+            return Layered.of_curve(elasticity, total.tolist(), stress.tolist())
+        except ModelError as error:
+            raise ModelError("curve", self.curve, error.allowed) from None
+
+
+def _pairs(name: str, value: Pairs) -> Pairs:
+    """Return the pairs of numbers that a parameter must be."""
+    known = isinstance(value, tuple) and all(
+        isinstance(pair, Sequence) and len(pair) == 2 and all(map(_finite, pair)) for pair in value
+    )
+    if not known:
+        raise ModelError(name, value, "must be pairs of finite numbers")
+    return value
+
+
+def _finite(value: object) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(cast("float", value))

@@ -1,0 +1,126 @@
+"""Words of one's own, from files that RESIDUA_PARTS names: in studies, scene files and ids."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.sources import ROOT
+
+BAR = """
+name = "bar"
+kinematics = "plane_stress"
+
+[parameters]
+rule = { default = "none", choices = ["none", "swift", "threshold"] }
+
+[materials.steel]
+youngs_modulus = 2e5
+poisson_ratio = 0.3
+yield_stress = 350.0
+hardening = "$rule"
+swift_exponent = 0.3
+
+[bodies.bar]
+material = "steel"
+shape = { kind = "rectangle", x = [0, 4], y = [0, 1], size = 0.5 }
+supports = { left = "x", bottom = "y" }
+
+[[loads]]
+body = "bar"
+kind = "pressure"
+boundary = "right"
+value = -420.0
+
+[loading]
+factor = 1.0
+step = 0.01
+
+[outputs.strain]
+of = "plastic_strain"
+body = "bar"
+stage = "loaded"
+"""
+STUDY = """
+name = "own"
+scene = "bar.toml"
+[sweep]
+rule = ["swift", "threshold"]
+"""
+SWIFT = 0.002 * ((420.0 / 350.0) ** (1 / 0.3) - 1)
+"""Plastic strain at which 350 MPa (1 + p / 0.002)^0.3 is 420 MPa."""
+WORDS = "none, isotropic, kinematic, mixed, voce, table, chaboche, layered"
+RUN_ID = """
+from studies import Study
+study = Study.from_dict({"name": "a", "scene": "ball", "sweep": {"load_ratio": [1.0]}})
+print(next(iter(study.cases())).id)
+"""
+
+
+def called(folder: Path, parts: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Python with these files of parts, in a folder with the examples."""
+    for name in ("own_curve.py", "own_back_stress.py"):
+        (folder / name).write_text((ROOT / "examples" / name).read_text())
+    paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": paths, "RESIDUA_PARTS": parts},
+    )  # fmt: skip
+
+
+BOTH = os.pathsep.join(["own_curve.py", "own_back_stress.py"])
+
+
+@pytest.mark.processes
+def test_a_study_of_a_scene_file_is_computed_with_words_of_ones_own(tmp_path: Path) -> None:
+    (tmp_path / "bar.toml").write_text(BAR)
+    (tmp_path / "study.toml").write_text(STUDY)
+    command = ["-m", "residua", "run", "study.toml", "--out", "out", "--workers", "1"]
+    done = called(tmp_path, BOTH, *command)
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in done.stdout.splitlines()]
+    strain = {row[0]: float(row[2]) for row in rows if row[:1] in (["swift"], ["threshold"])}
+    assert strain["swift"] == pytest.approx(SWIFT, rel=1e-3)
+    # 350 MPa and 70 MPa of the back stress: 40 MPa without recall, the rest fading
+    assert strain["threshold"] == pytest.approx(40 / 6e4 - math.log(1 - 30 / 100) / 600, rel=0.02)
+    again = called(tmp_path, BOTH, *command)
+    assert "0 computed" in again.stdout
+    refused = called(tmp_path, "own_curve.py", *command)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    known = " or ".join([", ".join(f"'{word}'" for word in WORDS.split(", ")), "'swift'"])
+    assert f"hardening = 'threshold': must be {known} (at rule = threshold)" in refused.stderr
+
+
+@pytest.mark.processes
+def test_ids_of_runs_follow_what_a_file_of_parts_computes(tmp_path: Path) -> None:
+    def run_id(text: str = "") -> str:
+        own = tmp_path / "mine.py"
+        own.write_text(text)
+        done = called(tmp_path, str(own) if text else "", "-c", RUN_ID)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    text = (ROOT / "examples/own_curve.py").read_text()
+    none, first, same, other = map(
+        run_id, ["", text, text + "# a comment\n", text.replace("0.002,", "0.003,")]
+    )
+    assert len({none, first, other}) == 3
+    assert same == first
+
+
+@pytest.mark.processes
+def test_a_word_is_listed_with_its_parameters_and_a_bad_file_is_one_line(tmp_path: Path) -> None:
+    listed = called(tmp_path, BOTH, "-m", "residua", "scenes", "punch")
+    assert f"one of {WORDS}, swift, threshold" in listed.stdout
+    assert "n of swift hardening" in listed.stdout
+    (tmp_path / "bad.py").write_text("import solver.scenes\n")
+    refused = called(tmp_path, "bad.py", "-m", "residua", "scenes", "punch")
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith("residua: RESIDUA_PARTS = ")
+    assert line.endswith("must run: it imports scenes, which are made of its parts")
