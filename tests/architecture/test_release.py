@@ -7,6 +7,9 @@ import re
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 import solver
 from tests.architecture.sources import PROJECT, ROOT, tracked
@@ -32,16 +35,31 @@ def test_the_command_exists() -> None:
     assert callable(getattr(importlib.import_module(module), function))
 
 
-def test_constraints_pin_every_dependency() -> None:
-    pins = dict(
-        line.split("==")
-        for line in (ROOT / "constraints.txt").read_text().splitlines()
-        if not line.startswith("#")
-    )
+def pins() -> dict[str, Version]:
+    """Name of each distribution -> the version that the tests run with."""
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    given = [line.split("==") for line in lines if not line.startswith("#")]
+    return {canonicalize_name(name): Version(version) for name, version in given}
+
+
+def required() -> list[Requirement]:
+    """Return what the distribution and its extras require."""
     extras = PROJECT["project"]["optional-dependencies"].values()
-    required = [*PROJECT["project"]["dependencies"], *(name for extra in extras for name in extra)]
-    names = {re.split(r"[<>=;\[ ]", requirement)[0].lower() for requirement in required}
-    assert names <= {name.lower() for name in pins}
+    named = [*PROJECT["project"]["dependencies"], *(name for extra in extras for name in extra)]
+    return [Requirement(each) for each in named]
+
+
+def test_constraints_pin_every_dependency() -> None:
+    assert {canonicalize_name(each.name) for each in required()} <= pins().keys()
+
+
+@pytest.mark.parametrize("each", required(), ids=lambda each: each.name)
+def test_a_lower_bound_is_a_version_that_the_tests_run_with(each: Requirement) -> None:
+    (bound,) = each.specifier
+    pinned = pins()[canonicalize_name(each.name)]
+    assert bound.operator == ">="
+    assert pinned >= Version(bound.version)
+    assert pinned.release[:2] == Version(bound.version).release[:2]
 
 
 @pytest.mark.parametrize("page", [p for p in tracked() if p.suffix == ".md"], ids=str)
