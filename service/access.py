@@ -45,7 +45,7 @@ def needed(request: Request) -> Scope | None:
 
 
 class Gate:
-    """Middleware that turns away before anything of a request is looked at or read.
+    """Middleware that turns away before anything of a request is read.
 
     What the caller may do is left in ``request.state.caller``: a `Scope`, or None for a stranger.
     """

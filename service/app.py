@@ -42,7 +42,7 @@ from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 
 BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
-"""How the description of the service announces that keys are asked; `Gate` does the asking."""
+"""How the description of the service announces that keys are required; `Gate` requires them."""
 
 DESCRIPTION = """Elastic-plastic contact studies: post one, watch it, fetch its data set.
 
@@ -52,7 +52,7 @@ OPEN_STREAMS_SECONDS = 2
 """Time that open event streams are given when the service stops."""
 
 WAITING_CONNECTIONS = 256
-"""Connections that are taken in one go, before their number is looked at."""
+"""Connections that are taken in one go, before they are counted."""
 
 
 def create_app(settings: Settings) -> FastAPI:

@@ -50,7 +50,7 @@ class Connection(H11Protocol):
         self._watch()
 
     def pause_writing(self) -> None:
-        """Wait for the client to read what it asked for."""
+        """Wait for the client to read the answer."""
         super().pause_writing()
         self.answer = self.loop.call_later(self.settings.answer_seconds, self.transport.abort)
 

@@ -191,7 +191,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 
 
 def on_plain_error(request: Request, exc: Exception) -> Problem:
-    """Answer an error that is told in one sentence."""
+    """Answer with an error of one sentence."""
     status = status_of(exc)
     later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
     told = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}

@@ -1,4 +1,4 @@
-"""Studies looked at before they are accepted.
+"""Studies examined before they are accepted.
 
 To check and name every run of a large study takes seconds of computing, and the memory that goes
 with it.

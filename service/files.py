@@ -29,7 +29,7 @@ RANGE = re.compile(rb"bytes=(?:(?P<first>\d{1,18})-(?P<last>\d{0,18})|-\d{1,18})
 
 
 class PartlyFile(FileResponse):
-    """A file of which one part may be asked for, or only whether it has changed.
+    """A file of which a client may request one part, or only whether it has changed.
 
     A range that is malformed, or of several parts, is ignored as HTTP permits (RFC 9110, 14.2):
     the framework's own answer to it would be no problem document.

@@ -1,4 +1,4 @@
-"""Scene files looked at before they are kept; nothing of what callers send is executed."""
+"""Scene files examined before they are kept; nothing of what callers send is executed."""
 
 from __future__ import annotations
 

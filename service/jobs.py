@@ -182,7 +182,7 @@ class Jobs:
         message: str,
         standing: StudyState = StudyState.RUNNING,
     ) -> None:
-        """Write the end of a job that stands where told; one dismissed meanwhile stays so."""
+        """Write the end of a job in the given state; one dismissed meanwhile stays so."""
         with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET state = ?, message = ?, finished = ?,"

@@ -25,7 +25,7 @@ OTHER = "other"
 
 
 class Metrics(Collector):
-    """The figures of one service, read from its queue and its catalogue when they are asked for."""
+    """The figures of one service, read from its queue and its catalogue at each request."""
 
     def __init__(self, jobs: Jobs, store: Store, runner: Runner) -> None:
         self.jobs = jobs

@@ -31,7 +31,7 @@ def summary(job: Job) -> StudySummary:
 
 @dataclass(slots=True)
 class Detail:
-    """One answer: what it was made of, when that was looked at, and who looks at it now."""
+    """One answer: what it was made of, when that was read, and who reads it now."""
 
     state: object = None
     content: bytes = b""
@@ -42,7 +42,7 @@ class Detail:
 class Details:
     """Studies with the states of their runs, as JSON; what has not changed is not made anew.
 
-    Many may follow one study: one look serves all who asked before it.
+    Many may follow one study: one reading serves all requests before it.
     """
 
     def __init__(self, jobs: Jobs, store: Store) -> None:

@@ -1,7 +1,7 @@
 """Processes of the service's own, and how the two sides talk.
 
 A process gets its order as the first line of its standard input; the end of that input means
-"stop", whether the service asked for it or died. It sends lines of JSON on its standard output.
+"stop", whether the service stops it or died. It sends lines of JSON on its standard output.
 It inherits the lock of the data directory and holds it until it ends: a service that starts after
 a crash waits for it.
 """

@@ -26,7 +26,7 @@ from studies.errors import StoreFull
 log = logging.getLogger(__name__)
 
 SILENCE_SECONDS = 20.0
-"""Time after which a process that says nothing is told of."""
+"""Time after which a process that reports nothing is logged."""
 
 SMALL = 100
 """Most runs of a study for which a place is kept."""
@@ -69,7 +69,7 @@ class Runner:
     settings, jobs : how to compute, and what
     pool : the workers, and the lock of the store
     starter : of the processes that compute
-    restore : makes a queue anew that is gone or damaged; it is told which studies are computed
+    restore : makes a queue anew that is gone or damaged; it takes the studies that are computed
     """
 
     settings: Settings
@@ -87,7 +87,7 @@ class Runner:
         return self._task is not None and not self._task.done() and not self._stopping.is_set()
 
     def computes(self, job_id: str) -> bool:
-        """Tell whether a process may still work on a study, although it was asked to stop."""
+        """Tell whether a process may still work on a study, although it was stopped."""
         return job_id in self._studies
 
     @contextlib.asynccontextmanager
@@ -236,7 +236,7 @@ class Runner:
         return await self.starter.give(order)
 
     def _plain(self, text: str) -> str:
-        """Return what is told of a study without the path of the data directory."""
+        """Return a message about a study without the path of the data directory."""
         return text.replace(str(self.settings.data.resolve()), "the data directory")
 
     async def _unwanted(self, job: Job) -> bool:

@@ -16,7 +16,7 @@ ContentId = Annotated[
 
 
 class Window(BaseModel):
-    """Which part of a list is asked for."""
+    """The part of a list that is requested."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -25,14 +25,14 @@ class Window(BaseModel):
 
 
 class StudyFilter(Window):
-    """Which studies are asked for."""
+    """The studies that are requested."""
 
     status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
 
 
 class RunFilter(Window):
-    """Which runs are asked for, by any parameter; a number matches only when it is equal."""
+    """The runs that are requested, by any parameter; a number matches only when it is equal."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -19,10 +19,10 @@ OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""
 
 KEPT = 100
-"""Scenes of callers whose parameters may be asked for, the newest."""
+"""Scenes of callers whose parameters a request may name, the newest."""
 
 PLAIN = ("scene", "status", *Window.model_fields)
-"""What may be asked for beside the parameters of the scenes."""
+"""What a request may name beside the parameters of the scenes."""
 
 
 def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:

@@ -78,8 +78,6 @@ class Parts(Generic[T]):
 
     def all(self) -> Mapping[str, type[T]]:
         """Return word -> class, those of files of one's own too."""
-        if _RUNNING:
-            raise ImportError("it imports scenes, which are made of its parts")
         load_own_parts()
         return self._known
 
@@ -113,7 +111,11 @@ class Parts(Generic[T]):
         ------
         ModelError
             when a class that it inherits from has a field of one of these names
+        ImportError
+            while a file of one's own runs: its parts are not known yet
         """
+        if _RUNNING:
+            raise ImportError("it imports scenes, which are made of its parts")
         cls.__annotations__[self.kind] = Literal[tuple(self)]
         for name, (hint, field) in self.parameters().items():
             if name in getattr(cls, "__dataclass_fields__", {}):

@@ -1,4 +1,4 @@
-"""What can go wrong with a study, told apart; words for what is allowed."""
+"""Errors of studies, a class for each kind; words for what is allowed."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ async def health(
 ) -> Health:
     """Tell whether studies can be stored and computed; 503 when they cannot.
 
-    A caller without a key, where keys are asked, is told the status alone.
+    Without a key, where keys are required, the answer is the status alone.
     """
     writable, waiting = await probe.look(settings.data, jobs)
     ready = writable and waiting is not None and runner.alive

@@ -39,7 +39,7 @@ register_url_convertor("stem", Stem())
 
 @router.get("", responses=REFUSED)
 def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
-    """List the runs that match, in order of creation, whichever study asked for them.
+    """List the runs that match, in order of creation, whichever study they belong to.
 
     Beside the queries named below, every parameter of the scenes is one: `?traction=0.75`.
     """

@@ -269,7 +269,7 @@ class System:
     def pairing(self, state: State, pair: int) -> Pairing:
         """Return how the surfaces of a contact pair lie in a state, paired as its increment did.
 
-        Those of the state last asked for are kept.
+        Those of one state are kept.
         """
         for of, number, known in self._paired:
             if of is state and number == pair:

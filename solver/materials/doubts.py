@@ -1,4 +1,4 @@
-"""Numbers of a material that are allowed, but hardly meant."""
+"""Numbers of a material that are allowed, but look like mistakes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _UNITS = (("GPa", 1e3, 1.0), ("kPa", 1.0, 1e-3), ("Pa", 1.0, 1e-6))
 
 
 def doubts(laws: Mapping[str, Law]) -> tuple[str, ...]:
-    """Return a text for each body whose material yields at a strain that is surely not meant.
+    """Return a text for each body whose material yields at a strain that points to a wrong unit.
 
     It names the number that is probably in another unit than MPa.
 
@@ -38,7 +38,7 @@ def doubts(laws: Mapping[str, Law]) -> tuple[str, ...]:
 
 
 def _suspected(strength: float, E: float) -> str:
-    """Return the number that another unit explains: its name, its value, what was meant."""
+    """Return the number that another unit explains: its name, its value, the likely unit."""
     for unit, stiffer, weaker in _UNITS:
         meant, Re = E * stiffer, strength * weaker
         if _METALS[0] <= meant <= _METALS[1] and Re <= _YIELD_STRAIN * meant:

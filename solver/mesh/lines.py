@@ -25,7 +25,7 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> Arra
 
     Element sizes are smallest, smallest * ratio, ... up to ``largest``; all are then scaled by
     the one factor (below 1) that makes them fill ``length`` exactly, so the first one is never
-    larger than asked for.
+    larger than requested.
     """
     if not 0 < smallest <= length:
         raise ModelError("smallest", smallest, f"must be in (0, {length:g}] [mm]")

@@ -89,7 +89,7 @@ class BoundLines(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContactPlaces:
-    """What a law may ask of the n vertices of a slave; found only when it is asked for.
+    """What a law may ask of the n vertices of a slave; computed only where the law uses it.
 
     Attributes
     ----------

@@ -155,7 +155,7 @@ class Model:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What of the materials is hardly meant, such as a number in another unit than MPa."""
+        """Numbers of the materials that look like mistakes, such as a modulus in GPa."""
         return doubts({body.name: body.material for body in self.bodies})
 
     def body(self, name: str, field: str = "body") -> Body | RigidBody:

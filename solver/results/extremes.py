@@ -67,7 +67,7 @@ def residual_extremes(run: FinishedRun) -> Values:
     """Return the extreme residual stresses at the nodes of each body and of its contact surface.
 
     Of nodes with the same stress, as on a track that a pass leaves alike along x, the one nearest
-    to the middle of the contact is told; where there is no stress, none.
+    to the middle of the contact is taken; where there is no stress, none.
     """
     none = _ROUNDING * run.parameters.yield_stress
     found: dict[Quantity, list[Array]] = {each: [] for each in LARGEST + SMALLEST}

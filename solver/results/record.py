@@ -43,7 +43,7 @@ class Record:
     fields : variable name -> (dimension names, values); NaN outside the bodies
     scalars : variable name -> number, audit figures included
     symmetric : whether the bodies are one half of what is symmetric about x = 0
-    mesh : () -> fields at the nodes of the bodies, of a complete run; asked for before the next
+    mesh : () -> fields at the nodes of the bodies, of a complete run; to be called before the next
         run is computed
     """
 

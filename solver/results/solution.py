@@ -213,7 +213,7 @@ def solve(
         1; an exception that it raises stops the work. The logger ``solver`` tells each increment
         at level INFO
 
-    What of the model is hardly meant (`Model.doubts`) is told by the same logger, as a warning.
+    Numbers of the model that look like mistakes (`Model.doubts`) are warnings of the same logger.
 
     Raises
     ------

@@ -32,7 +32,7 @@ class Case:
 
     @property
     def parameters(self) -> Any:
-        """The scene's parameter object, built when asked for."""
+        """The scene's parameter object, built when requested."""
         return build(self.scene, self.values)
 
 

@@ -47,7 +47,7 @@ class _SweepAxis(NamedTuple):
 
 
 class Expansion:
-    """The runs of a sweep, built one after the other when they are asked for.
+    """The runs of a sweep, built one after the other when they are requested.
 
     Parameters
     ----------
@@ -154,8 +154,8 @@ class Expansion:
     def _located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
         """Return what the scene refused, named as the study file names it.
 
-        A value out of its own range is told with that range, and with its unit. Otherwise the
-        values of the sweep that come together there are told too, since another combination may do.
+        The error of a value out of its own range names that range, with its unit. Otherwise it
+        names the values of the sweep that come together there: another combination may do.
         """
         field, at, where = f"parameters.{error.field}", [], []
         for (name, axis), i in zip(self._axes.items(), index, strict=True):

@@ -12,7 +12,7 @@ _KEYS = ("start", "stop", "num")
 _SPACINGS = ("linear", "log")
 _MOST = 100_000
 _DIGITS = 12
-"""Digits that values are rounded to: 0.3 is meant, not 0.30000000000000004."""
+"""Digits that values are rounded to: 0.3, not 0.30000000000000004."""
 
 
 def spaced(name: str, content: Mapping[str, Any]) -> list[float]:

@@ -157,7 +157,7 @@ class Study(BaseModel):
 
     @cached_property
     def expansion(self) -> Expansion:
-        """The runs, built when they are asked for."""
+        """The runs, built when they are requested."""
         return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property

@@ -32,7 +32,7 @@ CONFIGURATION: Mapping[str, Any] = {
     # each back to the system, and a quarter of the time would go into clearing pages.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
-    # Every study has a topic of events of its own, and dask keeps what was told under each.
+    # Every study has a topic of events of its own, and dask keeps the messages under each.
     "distributed.admin.low-level-log-length": 1,
     # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
     "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],

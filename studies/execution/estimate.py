@@ -1,4 +1,4 @@
-"""What a study will cost, told before anything is computed, and bounds of it."""
+"""Estimate of what a study will cost, before anything is computed, and its bounds."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Estimate:
     bytes : on the disk, data set included
     basis : what the estimate rests on, in words
 
-    None stands for what cannot be told.
+    None stands for what cannot be estimated.
     """
 
     runs: int
@@ -85,7 +85,7 @@ class Bounds:
         self._refuse("runs", study.size)
 
     def check(self, estimate: Estimate) -> None:
-        """Refuse a study that asks for more; what cannot be told is not refused.
+        """Refuse a study that asks for more; what cannot be estimated is not refused.
 
         Raises
         ------

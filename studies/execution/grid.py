@@ -99,7 +99,7 @@ class Grid:
         others who use it get their turn, and `tasks` may be a long generator. A `function` that
         raises `Unfit` is called again later, on whichever worker is free.
 
-        When `should_stop` turns true, waiting tasks are dropped and running ones told to stop;
+        When `should_stop` turns true, waiting tasks are dropped and running ones stopped;
         the iteration ends when these have, or soon.
 
         Raises
@@ -272,7 +272,7 @@ class _HandedOut:
 
 
 def _drop(ticket: Ticket) -> None:
-    """Tell the scheduler that nobody wants a task any more; where it runs, it is told to stop."""
+    """Cancel a task that nobody needs any more; where it runs, it stops."""
     if ticket.future is not None:
         ticket.future.release()
         ticket.future = None

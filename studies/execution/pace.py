@@ -17,7 +17,7 @@ from studies.storage.store import Store
 
 _FIGURES = ("degrees_of_freedom", "increments", "cpu_seconds")
 _PAST = 1000
-"""Most past runs looked at, the latest ones."""
+"""Most past runs that count, the latest ones."""
 _ENOUGH = 8
 """Fewest past runs that a fit is made of."""
 _RATE, _AT, _EXPONENT = 15e-6, 14_000, 1.15

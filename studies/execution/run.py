@@ -73,7 +73,7 @@ class StudyOutcome:
     dataset : the combined data set
     anew : whether the data set was written anew; it is kept where it was made of the same runs
     wall_seconds : duration
-    stopped : whether it was asked to stop before all was computed
+    stopped : whether it was stopped before all was computed
     """
 
     study_id: str
@@ -110,7 +110,7 @@ def run_study(
     Parameters
     ----------
     study : what to compute: a study, or the content of a study file
-    store : where runs are kept, whichever study asked for them first
+    store : where runs are kept, whichever study they were computed for
     scene : with such content, a scene of one's own in place of the name of one
     workers : worker processes on this machine; by default one a core
     scheduler : a running dask scheduler, to be used instead; its workers must see the store
@@ -121,7 +121,7 @@ def run_study(
     limits : on time and memory
     priority : of studies that share a scheduler, the one with the higher number goes first
     on_event : called, in this thread, with everything that happens
-    should_stop : asked several times a second; once it is true the work stops, and finished
+    should_stop : called several times a second; once it is true the work stops, and finished
         runs stay
 
     Raises

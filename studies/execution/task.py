@@ -52,6 +52,10 @@ class PathTask:
     proof: Proof | None = None
     stale: Mapping[str, int] = field(default_factory=dict)
 
+    def __dask_tokenize__(self) -> tuple[Any, ...]:
+        """Return what tells this task from others: dask need not read what it is made of."""
+        return type(self).__name__, self.source, [case.id for case in self.path.cases]
+
     def stored(self, store: Store) -> dict[str, dict[str, Any]]:
         """Return, by id, the rows of the runs that this task has stored."""
         times = store.modified(case.id for case in self.path.cases)
@@ -60,7 +64,7 @@ class PathTask:
 
 
 class StopAsked(Exception):
-    """Raised inside a loading path to leave it, because the study was asked to stop."""
+    """Raised inside a loading path to leave it, because the study was stopped."""
 
 
 def walk(

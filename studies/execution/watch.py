@@ -11,7 +11,7 @@ from studies.errors import GridLost
 from studies.execution.limits import Limits
 
 _QUIET = 10.0
-"""Seconds without a worker that takes the work until this is told."""
+"""Seconds without a worker that takes the work until this is reported."""
 _BEGIN = 60.0
 """Seconds that a worker may take to load what it needs for its first task."""
 

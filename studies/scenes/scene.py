@@ -54,9 +54,6 @@ class FileScene(Scene):
     def __reduce__(self) -> tuple[Any, ...]:
         return file_scene, (self.description,)
 
-    def __dask_tokenize__(self) -> tuple[Any, ...]:
-        return type(self).__name__, self.id
-
 
 def file_scene(description: Description, *, built: bool = False) -> FileScene:
     """Return the scene of a description, the same object for the same content and words.
@@ -206,9 +203,6 @@ def _parameters(
     def reduced(self: Any) -> tuple[Any, ...]:
         return _again, (description, _values(self))
 
-    def token(self: Any) -> tuple[Any, ...]:
-        return "parameters", description.digest, tuple(_values(self).items())
-
     return make_dataclass(
         "Parameters",
         [
@@ -220,7 +214,6 @@ def _parameters(
         namespace={
             "__post_init__": checked,
             "__reduce__": reduced,
-            "__dask_tokenize__": token,
             "__module__": __name__,
         },
     )

@@ -50,7 +50,7 @@ def usual_dimensions(scene: Scene) -> tuple[str, ...]:
 def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.Dataset:
     """Return the data set of a run.
 
-    Of the study that asked for it nothing is in it but what it wants kept: with ``keep`` the fields
+    Of its study it holds nothing but what the study wants kept: with ``keep`` the fields
     at the nodes, where the run is complete.
     """
     sweep = usual_dimensions(scene)

@@ -32,7 +32,7 @@ def locked(directory: Path, file: TextIO) -> Iterator[None]:
                 f"{directory}: {who} computes here; "
                 "wait until it has ended, or name another directory"
             ) from None
-        with suppress(OSError):  # a full disk is told by whoever writes results
+        with suppress(OSError):  # a full disk is reported by whoever writes results
             os.ftruncate(file.fileno(), 0)
             os.write(file.fileno(), f"{os.getpid()}\n".encode())
         yield

@@ -48,7 +48,7 @@ class _Meant:
 
 
 def verified(path: Path, case: Case, outcome: Record | str, keep: str = "") -> dict[str, Any]:
-    """Return the catalogue's row of a run, read from a file that tells what is meant.
+    """Return the catalogue's row of a run, read from a file that says what it holds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A full disk, told apart from other failures, and kept away from the HDF5 library."""
+"""A full disk, distinguished from other failures, and kept away from the HDF5 library."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What is looked at: results read, printed, drawn, compared with published numbers."""
+"""Results read, printed and drawn."""

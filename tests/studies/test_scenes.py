@@ -87,7 +87,8 @@ def undeclared(record: Record) -> set[str]:
     unknown |= record.coordinates.keys() - QUANTITIES.keys() - LABEL_ATTRIBUTES.keys()
     for name, (dims, _) in record.fields.items():
         own = QUANTITIES[name].dims if name in QUANTITIES else dims
-        if dims not in (own, ("pass", *own)):
+        pairs = ("contact", "stage", "fraction") if own == ("stage", "s") else own
+        if dims not in (own, ("pass", *own), pairs):
             unknown.add(name)
     return unknown
 

@@ -313,7 +313,7 @@ class _Viewed:
     def _extreme(
         self, name: str, body: int, own: Array, stress: Array, places: Array, axes: tuple[str, ...]
     ) -> None:
-        """Compare extremes (4,), and the stress (4, n_nodes) where they are told to be."""
+        """Compare extremes (4,), and the stress (4, n_nodes) at the places that are stored."""
         told = self._stored(name)
         at = [self._stored(f"{name}_{axis}") for axis in axes]
         if told is None or any(one is None for one in at):

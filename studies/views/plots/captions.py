@@ -52,7 +52,7 @@ def setting(run: xr.Dataset) -> str:
     """Return the scene and what tells this run from others, in words.
 
     That is where it lies on the axes of the sweep, and its parameters other than the scene's
-    defaults. The two-dimensional state is told in any case.
+    defaults. The two-dimensional state is named in any case.
     """
     scene = run.attrs["scene"]
     known = parameters_of(scene_of(run.attrs))

@@ -1,4 +1,4 @@
-"""How lines are told apart, by colour and style, and what explains them: a legend or a bar."""
+"""How lines are distinguished, by colour and style, and what explains them: a legend or a bar."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_LINES = 12
 """Most lines that a legend tells apart; the values of a number have a bar of colours beyond."""
 
 STYLES: Sequence[Any] = ("-", "--", ":", "-.", (0, (8, 2, 1, 2, 1, 2)), (0, (1, 4)))
-"""Dashes that are told apart."""
+"""Dashes that can be distinguished."""
 
 _TICKS = 7
 """Values named at a bar of colours."""

@@ -52,7 +52,7 @@ def line_figure(
 
     The rest are passes, stations, stages, bodies, contacts.
 
-    Of more passes than can be told apart the first, the last and some between are drawn, and of
+    Of more passes than can be distinguished the first, the last and some between are drawn, and of
     several stations then the middle one.
 
     `zoom` shows only that length on either side of the contact's centre (of its edge, where half
@@ -124,7 +124,7 @@ def _placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
 
 
 def _told_apart(values: xr.DataArray, others: Sequence[Hashable], over: str | None) -> xr.DataArray:
-    """Return as many lines as can be told apart; dimensions with one value left are dropped.
+    """Return as many lines as can be distinguished; dimensions with one value left are dropped.
 
     Each value of the axis `over` keeps its lines.
     """

@@ -23,7 +23,7 @@ _CATEGORIES = (
     ("o", "#56B4E9"), ("s", "#0072B2"), ("D", "#E69F00"), ("^", "#D55E00"),
     ("P", "#999999"), ("v", "#CC79A7"), ("h", "#009E73"), ("*", "#000000"),
 )  # fmt: skip
-"""Marker and colour by flag value: colours told apart by every kind of eye (Okabe and Ito)."""
+"""Marker and colour by flag value: colours that every kind of eye distinguishes (Okabe and Ito)."""
 POINTS = 8.0
 """Size of a mark [points]."""
 

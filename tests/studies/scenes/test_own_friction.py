@@ -25,8 +25,8 @@ scene = built(tables)
 (pair,) = scene.model(scene.parameters()).contacts
 print(pair.law)
 (record,) = scene.path(scene.parameters(), [None], lambda share: None)
-_, shear = record.fields["pair_shear"]
-_, pressure = record.fields["pair_pressure"]
+_, shear = record.fields["contact_shear"]
+_, pressure = record.fields["contact_pressure"]
 print(record.status.name, float(np.abs(shear).max()) <= 8.0 < 0.2 * float(pressure.max()))
 p = PunchParameters(friction_law="saturating", friction=0.4)
 print(p.tau_max, sorted(p.idle & {"friction", "cohesion", "shear_limit"}))
