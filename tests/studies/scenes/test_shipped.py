@@ -1,0 +1,62 @@
+"""Scenes that the package brings as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from solver.scenes import SCENES
+from studies import Study, StudyError
+from studies.errors import SceneError
+from studies.scenes.description import Description
+from studies.scenes.registry import attributes, name_of, scene_named, scene_of
+from studies.scenes.scene import FileScene, file_scene, read_scene
+from studies.scenes.shipped import SHIPPED
+from studies.storage.shelf import keep, kept
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_scene_of_the_package_is_called_by_its_name(name: str) -> None:
+    scene = scene_named(name)
+    assert isinstance(scene, FileScene) and name not in SCENES
+    assert scene.name == name_of(scene) == name
+    assert attributes(scene) == {"scene": name}
+    assert scene_of(attributes(scene)) is scene
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_its_bodies_can_be_built(name: str) -> None:
+    assert file_scene(Description.read(SHIPPED[name], shipped=True), built=True).name == name
+
+
+def test_its_runs_follow_the_content_of_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = Study.from_dict({"name": "a", "scene": "rigid_punch", "sweep": {"friction": [0.1]}})
+    assert Study.known(study.to_dict()).id == study.id
+    text = SHIPPED["rigid_punch"].read_text()
+    assert study.problem.source == read_as("rigid_punch", text).source
+    changed = text.replace("[0, 10]", "[0, 9]")
+    assert changed != text
+    assert study.problem.source != read_as("rigid_punch", changed).source
+
+
+def read_as(name: str, text: str) -> FileScene:
+    import tomllib
+
+    return file_scene(Description(f"{name}.toml", tomllib.loads(text), {}, shipped=True))
+
+
+def test_nobody_else_gives_a_scene_its_name(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_bytes(SHIPPED["rigid_punch"].read_bytes())
+    with pytest.raises(SceneError, match="name = 'rigid_punch': a built-in scene has this name"):
+        read_scene(own)
+    with pytest.raises(StudyError, match=r"scene = 'rigid_punsh': .*rigid_punch"):
+        scene_named("rigid_punsh")
+
+
+def test_a_store_keeps_no_copy_of_it(tmp_path: Path) -> None:
+    scene = scene_named("rigid_punch")
+    assert isinstance(scene, FileScene)
+    keep(tmp_path, scene)
+    assert kept(tmp_path, scene.id) is None
