@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, make_dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
-from solver.parameters import by_accuracy, check, described
+from solver.parameters import Accuracy, by_accuracy, check, described
 from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
@@ -213,14 +213,15 @@ def _branch(description: Description) -> str:
 def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
     """Return the class of the scene's parameters, which checks itself as those of scenes do."""
     declared, levels = scene.declared, scene.accuracy
-
-    def usual(self: Any) -> Mapping[str, Any]:
-        numbers = levels.level(self.accuracy) if levels else {}
-        return {name: type(_default(declared[name]))(number) for name, number in numbers.items()}
+    usual: dict[str, dict[str, Any]] = {}
+    if levels:
+        for level in get_args(Accuracy):
+            numbers = levels.level(level).items()
+            usual[level] = {name: type(_default(declared[name]))(each) for name, each in numbers}
 
     def checked(self: Any) -> None:
         check(self)
-        for name, number in usual(self).items():
+        for name, number in usual[self.accuracy].items() if usual else ():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, number)
         try:
@@ -253,7 +254,6 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
         kw_only=True,
         namespace={
             "__post_init__": checked,
-            "usual": usual,
             "__reduce__": reduced,
             "__dask_tokenize__": token,
             "__module__": __name__,
