@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from solver.contact.system import System
 from solver.scenes import SCENES
 from studies import Study, StudyError
 from studies.errors import SceneError
@@ -30,6 +32,17 @@ def test_its_bodies_can_be_built(name: str) -> None:
     assert file_scene(Description.read(SHIPPED[name], shipped=True), built=True).name == name
 
 
+@pytest.mark.parametrize("changes", [{}, {"half_plane_size": 30.0, "growth": 1.4}])
+def test_the_work_of_the_rigid_punch_is_told_as_it_is(changes: dict[str, float]) -> None:
+    scene = scene_named("rigid_punch")
+    parameters = scene.parameters(accuracy="draft", **changes)
+    system = System(scene.model(parameters))
+    assert scene.effort is not None
+    told = scene.effort(parameters, [parameters.mean_pressure])
+    assert told.elements == sum(body.mesh.nelements for body in system.model.bodies)
+    assert told.unknowns == system.n_unknowns
+
+
 def test_its_runs_follow_the_content_of_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
     study = Study.from_dict({"name": "a", "scene": "rigid_punch", "sweep": {"friction": [0.1]}})
     assert Study.known(study.to_dict()).id == study.id
@@ -41,8 +54,6 @@ def test_its_runs_follow_the_content_of_its_file(monkeypatch: pytest.MonkeyPatch
 
 
 def read_as(name: str, text: str) -> FileScene:
-    import tomllib
-
     return file_scene(Description(f"{name}.toml", tomllib.loads(text), {}, shipped=True))
 
 
