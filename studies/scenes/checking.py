@@ -261,10 +261,13 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
         "rigid": [name for name in scene.rigid if name in scene.bodies],
         "stages": _twice([stage.name for stage in scene.stages]),
         "contacts": _twice([contact.name for contact in scene.contacts]),
+        "results.outputs": _twice(list(scene.results.outputs or ())),
+        "results.surfaces": _twice([side.partition(".")[0] for side in scene.results.surfaces]),
     }
     for field, names in groups.items():
         for name in names:
-            yield StudyError(field, name, "two have this name: each needs one of its own")
+            own = "two have this name: each needs one of its own"
+            yield StudyError(field, name, "stands twice" if field.startswith("results.") else own)
     taken = {*QUANTITIES, *RESERVED, *scene.declared}
     for name in scene.outputs:
         own = {name, f"{name}_x", f"{name}_y"}

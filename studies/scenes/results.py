@@ -41,7 +41,7 @@ def view_of(scene: tables.SceneFile) -> View:
         loaded=under_load[-1] if under_load else names[-1],
         unloaded=released,
         symmetric=scene.symmetric,
-        axis=Axis(*taken.axis.model_dump().values()),
+        axis=Axis(taken.axis.origin, taken.axis.along),
     )
 
 

@@ -358,7 +358,8 @@ class AccuracyTable(SceneTable):
 
     def level(self, accuracy: Accuracy) -> dict[str, int | float]:
         """Return the numbers of an accuracy."""
-        return {"draft": self.draft, "standard": self.standard, "fine": self.fine}[accuracy]
+        found: dict[str, int | float] = getattr(self, accuracy)
+        return found
 
 
 class CheckTable(SceneTable):

@@ -166,6 +166,16 @@ def test_wrong_places_and_words_are_told() -> None:
     assert "length 1" in told["results.axis.along"]
 
 
+def test_what_stands_twice_is_told() -> None:
+    tables = released()
+    tables["results"]["outputs"].append("stick")
+    tables["results"]["surfaces"].append("lower.top")
+    with pytest.raises(SceneError) as error:
+        built(tables)
+    found = [(each.field, each.value) for each in error.value.mistakes]
+    assert found == [("results.outputs", "stick"), ("results.surfaces", "lower")]
+
+
 def test_an_output_with_parameters_has_a_table_of_them() -> None:
     tables = released()
     tables["results"]["corner"] = {"half_width": "$wide/2"}
