@@ -266,8 +266,9 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
     }
     for field, names in groups.items():
         for name in names:
-            own = "two have this name: each needs one of its own"
-            yield StudyError(field, name, "stands twice" if field.startswith("results.") else own)
+            own_name = "two have this name: each needs one of its own"
+            allowed = "stands twice" if field.startswith("results.") else own_name
+            yield StudyError(field, name, allowed)
     taken = {*QUANTITIES, *RESERVED, *scene.declared}
     for name in scene.outputs:
         own = {name, f"{name}_x", f"{name}_y"}
