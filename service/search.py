@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from service.schemas import RunFilter, Window
-from solver.scenes import SCENES, Scene
+from solver.scenes import Scene
 from studies import StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
 from studies.errors import one_of
-from studies.scenes.registry import known_names, scene_named
+from studies.scenes.registry import built_in, known_names, scene_named
 from studies.storage.shelf import newest
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
@@ -41,7 +41,7 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     if which.status not in (None, *OUTCOMES):
         raise StudyError("status", which.status, one_of(which.status, OUTCOMES))
     posted = newest(directory, KEPT)
-    scenes: list[Scene] = [*SCENES.values(), *posted]
+    scenes: list[Scene] = [*built_in(), *posted]
     if which.scene is not None:
         own = [scene for scene in posted if scene.name == which.scene]
         names = [*known_names(), *(scene.name for scene in posted)]

@@ -106,11 +106,11 @@ def runs() -> dict[str, tuple[str, dict[str, Any]]]:
 
 def computed(name: str) -> Numbers:
     """Return all numbers of a run: coordinates, fields, scalars, and its status."""
-    from solver.scenes import SCENES
+    from studies.scenes.registry import scene_named
     from studies.scenes.scene import read_scene
 
     given, parameters = runs()[name]
-    scene = read_scene(ROOT / given) if given.endswith(".toml") else SCENES[given]
+    scene = read_scene(ROOT / given) if given.endswith(".toml") else scene_named(given)
     asked = scene.parameters(**parameters)
     value = getattr(asked, scene.branch) if scene.branch else None
     (record,) = scene.path(asked, [value], lambda share: None)

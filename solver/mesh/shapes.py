@@ -71,7 +71,7 @@ def rectangle(
         spread.lines(name, span, [(n.at[k], n.size, n.radius) for n in near])
         for k, (name, span) in enumerate((("x", x), ("y", y)))
     )
-    _few((len(along) - 1) * (len(up) - 1))
+    few((len(along) - 1) * (len(up) - 1))
     return grid(along, up, cells)
 
 
@@ -152,7 +152,7 @@ def ring(
         along += [(turn, side, each.radius / r) for turn in turns]
     out = _Spread(size, growth).lines("radii", (inner, outer), across)
     turn = _Spread(size / outer, growth).lines("angles", (start, end), along)
-    _few((len(out) - 1) * (len(turn) - 1))
+    few((len(out) - 1) * (len(turn) - 1))
     cx, cy = centre
     bent = mapped(
         grid(out, turn),
@@ -197,7 +197,7 @@ def fillet(
     spread = _Spread(size, growth)
     along_it = spread.lines("near", (0.0, float(marks[-1])), along, marks[1:3].tolist())
     across_it = spread.lines("near", (0.0, across), depth)
-    _few((len(along_it) - 1) * (len(across_it) - 1))
+    few((len(along_it) - 1) * (len(across_it) - 1))
 
     def place(X: Array) -> Array:
         s, t = X[0], X[1] / across
@@ -232,7 +232,7 @@ def disc(radius: float, centre: Pair = (0.0, 0.0), *, size: float) -> Mesh:
     R = radius
     n = max(2, 2 * round(np.pi * R / 4 / size))  # elements along a quarter of the rim
     m = max(1, round((1 - _CORE) * R / size))
-    _few(n * (n + 4 * m))
+    few(n * (n + 4 * m))
     square = np.linspace(-1.0, 1.0, n + 1)
 
     def core(X: Array) -> Array:
@@ -290,7 +290,7 @@ def ball(
     lines = ball_lines(radius, fine, size, growth)
     along = lines if symmetric else np.concatenate([-lines[:0:-1], lines])
     across = lines if above else -lines[::-1]
-    _few((len(along) - 1) * (len(across) - 1))
+    few((len(along) - 1) * (len(across) - 1))
     bent = mapped(grid(along, across), lambda X: _onto_disc(X, radius))
     surface, cap = ("bottom", "top") if above else ("top", "bottom")
     names = {"surface": surface, "cap": cap, "left": "left", "right": "right"}
@@ -379,8 +379,8 @@ class _Spread:
         return refined(points, [marks[p] for p in points], self.growth, sides)
 
 
-def _few(count: int) -> None:
-    """Refuse a mesh of too many elements."""
+def few(count: int) -> None:
+    """Raise `ModelError` for a mesh of too many elements."""
     if count > _MOST_ELEMENTS:
         raise ModelError("size", f"{count} elements", f"at most {_MOST_ELEMENTS} elements")
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.outputs import output
 from solver.results.places import FRACTION
 from solver.results.quantities import declare
 
@@ -45,6 +46,7 @@ PEAK_CONTACT_PRESSURE_S = declare(
 )  # fmt: skip
 
 
+@output("contact", "s", "contact")
 def contact(run: FinishedRun) -> Values:
     """Return pressure, shear and gap along the surface, half-width, and peak with its place."""
     along = [run.tractions.along(c, run.view.s + centre) for c, centre in run.stages]

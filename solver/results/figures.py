@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.outputs import output
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ CPU_SECONDS = declare("cpu_seconds", "processor time", "s")
 DEGREES_OF_FREEDOM = declare("degrees_of_freedom", "degrees of freedom", count=True)
 
 
+@output("extremes", "release")
 def extremes(run: FinishedRun) -> Values:
     """Return the largest plastic strain, the extreme residual stresses, and the plastic work."""
     system = run.system

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.tensors import stress_difference
 
@@ -44,6 +45,7 @@ SURFACE_MISES = declare(
 )  # fmt: skip
 
 
+@output("maps", "map")
 def maps(run: FinishedRun) -> Values:
     """Return maps around the contact: of bodies that are not released in every stage."""
     samples = run.samples
@@ -64,11 +66,13 @@ def maps(run: FinishedRun) -> Values:
     }
 
 
+@output("isochromatics", "map")
 def isochromatics(run: FinishedRun) -> Values:
     """Return the map whose contours are isochromatics: twice the largest shear in the plane."""
     return {STRESS_DIFFERENCE: stress_difference(run.samples.on_map("stress", run.loaded))}
 
 
+@output("profiles", "profile", "release")
 def profiles(run: FinishedRun) -> Values:
     """Return residual stress and plastic strain along depth."""
     return {
@@ -77,6 +81,7 @@ def profiles(run: FinishedRun) -> Values:
     }
 
 
+@output("surfaces", "s", "surfaces", "release")
 def surfaces(run: FinishedRun) -> Values:
     """Return residual stress along the contact surfaces, and von Mises stress of the lower one."""
     samples, bodies = run.samples, run.view.surfaces

@@ -23,7 +23,7 @@ class NamedPlaces(NamedTuple):
     lines, points : in the order of their dimensions
     contacts : names of the contact pairs
     numbers : requested of every run
-    samples : positions along each contact
+    samples : positions along each contact; none where it is stored along the view
     """
 
     lines: Mapping[str, Places]
@@ -53,7 +53,7 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
         out |= along_lines(fields, places.lines, states)
     if places.points:
         out |= at_points(fields, places.points, states)
-    if places.contacts:
+    if places.contacts and places.samples:
         out |= contacts(results, places.contacts, places.samples)
     out |= over_increments(run.outcome.history, times, system.all_names, places.contacts)
     for number in places.numbers:

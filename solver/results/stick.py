@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.outputs import output
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ STICK_FRACTION = declare(
 )
 
 
+@output("stick", "contact")
 def stick(run: FinishedRun) -> Values:
     """Return how much of the contact sticks: nothing without friction, NaN without contact."""
     points = run.tractions.points(run.loaded)

@@ -1,7 +1,8 @@
 """Arithmetic in scene files: ``"2*$radius"`` is a number once the parameters are known.
 
 An expression has numbers, parameters (``$name``), ``pi``, ``+ - * / ^``, parentheses and the
-functions of `FUNCTIONS`. Python's own parser reads it; nothing else of Python is evaluated.
+functions of `FUNCTIONS`. Two of them compared, ``"$gap < 2*$radius"``, are true or false. Python's
+own parser reads it; nothing else of Python is evaluated.
 """
 
 from __future__ import annotations
@@ -41,10 +42,16 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
+_COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
 _PARAMETER = re.compile(r"\$([A-Za-z_]\w*)", re.ASCII)
 _MARK = "parameter__"
 """What stands for ``$`` where Python reads the text."""
-_FOREIGN = re.compile(rf"\*\*|//|{_MARK}|[^\w\s$.,()*/^+-]", re.ASCII)
+_FOREIGN = re.compile(rf"\*\*|//|{_MARK}|[^\w\s$.,()*/^+<>=-]", re.ASCII)
 
 
 class ExpressionError(ValueError):
@@ -65,7 +72,7 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     """Return the value of an expression.
 
     A text that is one parameter and nothing else, such as ``"$hardening"``, has its value, which
-    may be a word or a truth value; all others are arithmetic.
+    may be a word or a truth value; a comparison is true or false; all others are arithmetic.
 
     Parameters
     ----------
@@ -81,7 +88,10 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     if whole := _PARAMETER.fullmatch(text):
         return _known(whole[1], values)
     try:
-        number = _value(_read(text), values)
+        read = _read(text)
+        if isinstance(read, ast.Compare):
+            return _compared(read, values)
+        number = _value(read, values)
         if not math.isfinite(number):
             raise ExpressionError("must be a finite number")
     except ExpressionError:
@@ -100,6 +110,14 @@ def _read(text: str) -> ast.expr:
     except SyntaxError:
         allowed = f"numbers, $parameters, pi, + - * / ^ ( ) and {', '.join(FUNCTIONS)}"
         raise ExpressionError(f"cannot be read as arithmetic: {allowed}") from None
+
+
+def _compared(node: ast.Compare, values: Mapping[str, Any]) -> bool:
+    """Return whether a comparison of numbers holds."""
+    test = _COMPARISONS.get(type(node.ops[0]))
+    if len(node.ops) != 1 or test is None:
+        raise ExpressionError("must compare two numbers by one of <, <=, >, >=")
+    return test(_value(node.left, values), _value(node.comparators[0], values))
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> float:

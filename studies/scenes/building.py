@@ -19,7 +19,7 @@ from solver.scenes.material_parameters import MaterialParameters
 from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
-from studies.scenes.shape_tables import LineTable, mesh_of
+from studies.scenes.shape_tables import ArcTable, mesh_of
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 _BESIDE = (
     "name", "summary", "parameters.", "derived.", "stages", "loading", "results.", "outputs.",
-    "singular", "allow",
+    "singular", "allow", "accuracy", "checks", "advice",
 )  # fmt: skip
 """Entries of which the bodies and how they are held do not depend."""
 
@@ -69,6 +69,8 @@ class Builder:
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
+        for side in t.results.surfaces:
+            self._named("results.surfaces", *side.split("."))
         if self._hurt():
             return None
         return self.tried(
@@ -155,11 +157,14 @@ class Builder:
         self._boundaries[name] = list(table.surfaces)
         surfaces = {}
         for each, surface in table.surfaces.items():
-            if isinstance(surface, LineTable):
-                surfaces[each] = RigidSurface(points=np.array(surface.points).T)
-            else:
+            if isinstance(surface, ArcTable):
                 start, end = np.radians(surface.angles)
                 surfaces[each] = arc(surface.centre, surface.radius, (start, end), surface.edges)
+                continue
+            chain = self.tried(f"rigid.{name}.surfaces.{each}", surface.chain)
+            if chain is None:
+                return None
+            surfaces[each] = RigidSurface(points=chain)
         motions: dict[str, Moved | Pushed] = {}
         for axis in ("x", "y", "rotation"):
             motion: tables.MotionTable = getattr(table, axis)
@@ -236,7 +241,8 @@ class Builder:
         """Return the loading history."""
         loading = self.scene.loading
         if loading is not None:
-            return load_and_release(loading.factor, loading.step, loading.release_increments)
+            step = loading.step or loading.factor
+            return load_and_release(loading.factor, step, loading.release_increments)
         stages = tuple(
             Stage(
                 name=stage.name,

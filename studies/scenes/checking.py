@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from keyword import iskeyword
+from typing import Any, get_args
 
 from solver.errors import ModelError
+from solver.parameters import Accuracy
+from solver.results.outputs import Need, outputs
 from solver.results.quantities import QUANTITIES
-from solver.scenes import SCENES
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
@@ -34,19 +37,28 @@ def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[S
     yield from _results(scene)
     yield from _outputs(scene)
     yield from _names(scene)
+    for k, check in enumerate(scene.checks):
+        yield from _one_of(f"checks[{k}].parameter", check.parameter, scene.declared)
 
 
-def declarations(
-    parameters: Mapping[str, tables.ParameterTable], used: set[str]
-) -> Iterator[StudyError]:
-    """Yield what is wrong with declared parameters.
+def unmet(scene: tables.SceneFile, values: Mapping[str, Any]) -> Iterator[StudyError]:
+    """Yield the parameters that the checks of a file refuse, for these values of them."""
+    for check in scene.checks:
+        if not check.that:
+            yield StudyError(check.parameter, values.get(check.parameter), check.allowed)
+
+
+def declarations(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyError]:
+    """Yield what is wrong with declared parameters; see `defaults` for those without a value.
 
     Parameters
     ----------
     used : those that some entry names
     """
-    for name, each in parameters.items():
+    for name, each in scene.declared.items():
         field, default = f"parameters.{name}", each.default
+        if default is None:  # that is told already
+            continue
         number = isinstance(default, int | float) and not isinstance(default, bool)
         if name in QUANTITIES or name in RESERVED:
             yield StudyError(field, name, "a data set has a variable of this name: choose another")
@@ -54,7 +66,7 @@ def declarations(
             yield StudyError(field, name, "is a word of the language Python: choose another")
         if number and not -LARGEST <= default <= LARGEST:  # type: ignore[operator]
             yield StudyError(f"{field}.default", default, f"must be at most {LARGEST:g} in size")
-        if name not in used:
+        if name not in used and not (scene.accuracy and name == tables.ACCURACY):
             yield StudyError(field, default, f"has no effect: no entry says ${name}")
         if is_expression(default):
             yield StudyError(f"{field}.default", default, "must be a value; see derived")
@@ -71,6 +83,33 @@ def declarations(
         elif each.choices is not None and default not in each.choices:
             listed = ", ".join(each.choices)
             yield StudyError(f"{field}.default", default, f"must be one of its choices: {listed}")
+
+
+def defaults(scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield what is wrong with the numbers that ``accuracy`` sets, and those that nothing sets."""
+    for name, each in scene.parameters.items():
+        if each.default is None and (scene.accuracy is None or name not in scene.accuracy.standard):
+            allowed = "must be given, or a number in each table of accuracy"
+            yield StudyError(f"parameters.{name}.default", None, allowed)
+    if scene.accuracy is None:
+        return
+    if tables.ACCURACY in scene.parameters:
+        field = f"parameters.{tables.ACCURACY}"
+        yield StudyError(field, tables.ACCURACY, "is declared by the table accuracy")
+    usual = scene.accuracy.standard
+    for level in get_args(Accuracy):
+        numbers = scene.accuracy.level(level)
+        for name in sorted(usual.keys() | numbers.keys()):
+            field, value = f"accuracy.{level}.{name}", numbers.get(name)
+            known = scene.parameters.get(name)
+            if value is None or known is None or known.default is not None:
+                allowed = "every accuracy must set the same parameters, none with a default"
+                yield StudyError(field, value, allowed)
+            elif type(value) is float and known.unit == "1" and type(usual[name]) is int:
+                yield StudyError(field, value, "must be an integer, as it is for standard")
+            elif known.range is not None and not known.range[0] <= value <= known.range[1]:
+                low, high = known.range
+                yield StudyError(field, value, f"must be in its range, {low:g} to {high:g}")
 
 
 def _one_of(field: str, name: str, known: Iterable[str]) -> Iterator[StudyError]:
@@ -133,8 +172,18 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
 
 
 def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
-    for axis in ("x", "y") if scene.results.map else ():
-        yield from _map(f"results.map.{axis}", getattr(scene.results.map, axis))
+    taken = scene.results
+    for axis in ("x", "y") if taken.map else ():
+        yield from _spaced(f"results.map.{axis}", getattr(taken.map, axis))
+    if taken.s:
+        yield from _spaced("results.s", taken.s)
+    if taken.profile:
+        yield from _spaced("results.profile.depth", taken.profile.depth)
+        yield from _one_of("results.profile.body", taken.profile.body, scene.bodies)
+    for side in taken.surfaces:
+        yield from _one_of("results.surfaces", side.partition(".")[0], scene.bodies)
+    if not math.isclose(math.hypot(*taken.axis.along), 1.0, rel_tol=1e-9):
+        yield StudyError("results.axis.along", list(taken.axis.along), "must have the length 1")
     for name, line in scene.results.lines.items():
         where = f"results.lines.{name}"
         yield from _one_of(f"{where}.body", line.body, scene.bodies)
@@ -147,7 +196,28 @@ def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield from _one_of(f"results.points.{name}.body", point.body, scene.bodies)
 
 
-def _map(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
+def lacking(scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield the outputs that are asked for and need what the file has not."""
+    taken = scene.results
+    there: Mapping[Need, tuple[bool, str]] = {
+        "map": (taken.map is not None, "results.map"),
+        "profile": (taken.profile is not None, "results.profile"),
+        "s": (taken.s is not None, "results.s"),
+        "surfaces": (
+            {side.partition(".")[0] for side in taken.surfaces} == scene.bodies.keys(),
+            "a surface of each body in results.surfaces",
+        ),
+        "contact": (bool(scene.contacts), "contacts"),
+        "release": (bool(scene.released), "a last stage that releases the bodies"),
+    }
+    for word in taken.words:
+        missing = [words for need in outputs()[word].needs for is_there, words in [there[need]]
+                   if not is_there]  # fmt: skip
+        if missing:
+            yield StudyError("results.outputs", word, f"needs {', '.join(missing)}")
+
+
+def _spaced(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
     start, stop = axis.start, axis.stop
     if not start < stop:
         yield StudyError(f"{where}.stop", stop, f"must be > start = {start:g}")
@@ -191,13 +261,15 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
         "rigid": [name for name in scene.rigid if name in scene.bodies],
         "stages": _twice([stage.name for stage in scene.stages]),
         "contacts": _twice([contact.name for contact in scene.contacts]),
+        "results.outputs": _twice(list(scene.results.outputs or ())),
+        "results.surfaces": _twice([side.partition(".")[0] for side in scene.results.surfaces]),
     }
-    if scene.name in SCENES:
-        yield StudyError("name", scene.name, "a built-in scene has this name: choose another")
     for field, names in groups.items():
         for name in names:
-            yield StudyError(field, name, "two have this name: each needs one of its own")
-    taken = {*QUANTITIES, *RESERVED, *scene.parameters}
+            own_name = "two have this name: each needs one of its own"
+            allowed = "stands twice" if field.startswith("results.") else own_name
+            yield StudyError(field, name, allowed)
+    taken = {*QUANTITIES, *RESERVED, *scene.declared}
     for name in scene.outputs:
         own = {name, f"{name}_x", f"{name}_y"}
         for each in sorted(own & taken):

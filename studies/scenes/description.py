@@ -19,11 +19,11 @@ from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
-from studies.scenes.tables import ParameterTable, SceneFile
+from studies.scenes.tables import ACCURACY, ParameterTable, SceneFile
 from studies.toml import toml_of
 
-PLAIN = ("name", "summary", "parameters", "derived")
-"""Entries of a scene file in which no expression stands, and the table of derived numbers."""
+PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
+"""Entries of a scene file in which no parameter stands, and the table of derived numbers."""
 
 LARGEST = 1e100
 """Largest number that a parameter may have by default."""
@@ -72,14 +72,16 @@ class Description:
     content : its tables, as TOML or JSON holds them
     meshes : mesh files by the name that bodies give; None where they are not at hand, so that
         no model can be built
+    shipped : whether it is a scene of the package, which studies call by its name
     """
 
     file: str
     content: Mapping[str, Any]
     meshes: Mapping[str, MeshFile] | None
+    shipped: bool = False
 
     @classmethod
-    def read(cls, path: Path | str) -> Self:
+    def read(cls, path: Path | str, *, shipped: bool = False) -> Self:
         """Read a scene file, and the meshes beside it.
 
         Raises
@@ -93,7 +95,7 @@ class Description:
         for name in mesh_names(content):
             if (path.parent / name).is_file():  # one that is not there is a mistake of the file
                 meshes[name] = MeshFile(name, _bytes(path.parent / name))
-        return cls(path.name, content, meshes)
+        return cls(path.name, content, meshes, shipped)
 
     @cached_property
     def digest(self) -> str:
@@ -104,9 +106,9 @@ class Description:
         return _digest("\n".join(parts).encode())[:32]
 
     @cached_property
-    def key(self) -> tuple[str, str]:
-        """Content id, and the content with its words."""
-        return self.digest, json.dumps(self.content, sort_keys=True, default=str)
+    def key(self) -> tuple[str, str, bool]:
+        """Content id, the content with its words, and whether the package brings it."""
+        return self.digest, json.dumps(self.content, sort_keys=True, default=str), self.shipped
 
     @cached_property
     def parameters(self) -> dict[str, ParameterTable]:
@@ -169,7 +171,26 @@ class Description:
         given = self.content.get("parameters")
         tables = given.items() if isinstance(given, Mapping) else ()
         defaults = {str(k): v.get("default") if isinstance(v, Mapping) else None for k, v in tables}
+        levels = self._levels({})
+        usual = levels.get("standard") if isinstance(levels, Mapping) else None
+        if isinstance(usual, Mapping):
+            set_by_it = {k: v for k, v in usual.items() if k in defaults and defaults[k] is None}
+            defaults |= {ACCURACY: "standard"} | set_by_it
         return {name: each if _can_be(each) else None for name, each in defaults.items()}
+
+    def _levels(self, mistakes: Mistakes) -> Any:
+        """Return the table of accuracies; texts in it are arithmetic without parameters."""
+
+        def numbers(where: Where, value: Any) -> Any:
+            if isinstance(value, Mapping):
+                return {str(key): numbers((*where, str(key)), each) for key, each in value.items()}
+            try:
+                return evaluated(value, {}) if isinstance(value, str) else value
+            except ExpressionError as error:
+                mistakes[where] = StudyError(dotted(where), value, str(error))
+                return None
+
+        return numbers((ACCURACY,), self.content.get(ACCURACY))
 
     @property
     def _derived(self) -> dict[str, Any]:
@@ -197,6 +218,8 @@ class Description:
             key: value if key in PLAIN else _replaced((key,), value, known, mistakes)
             for key, value in self.content.items()
         }
+        if ACCURACY in tree:
+            tree[ACCURACY] = self._levels(mistakes)
         return _Evaluated(tree, mistakes)
 
 
@@ -268,13 +291,13 @@ def _expressions(value: Any) -> Iterator[tuple[Where, str]]:
 
 
 def _without_words(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables without summary and descriptions, which make no numbers."""
+    """Return the tables without summary, descriptions and advice, which make no numbers."""
     return {
         key: {name: _undescribed(each) for name, each in value.items()}
         if key in DESCRIBED and isinstance(value, Mapping)
         else value
         for key, value in content.items()
-        if key != "summary"
+        if key not in ("summary", "advice")
     }
 
 

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder
-from studies.scenes.checking import clashes, declarations
+from studies.scenes.checking import clashes, declarations, defaults, lacking, unmet
 from studies.scenes.description import Description
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
 from studies.scenes.results import view_of
+from studies.scenes.shipped import is_built_in
 
 if TYPE_CHECKING:
     from solver.contact.system import System
@@ -38,8 +39,16 @@ def examined(description: Description, *, built: bool) -> tables.SceneFile:
     found = description.readable(description.declared)
     mistakes = found.mistakes
     if found.tables:
-        others = [*declarations(found.tables.parameters, description.used())]
+        others = [*declarations(found.tables, description.used())]
         others += clashes(found.tables, description.meshes)
+        if not {where[0] for where in found.own} & {"accuracy", "parameters"}:
+            others += defaults(found.tables)
+        if not found.own:  # what has a stand-in may be what is needed
+            others += lacking(found.tables)
+        others += unmet(found.tables, description.declared)
+        if not description.shipped and is_built_in(found.tables.name):
+            allowed = "a built-in scene has this name: choose another"
+            others.append(StudyError("name", found.tables.name, allowed))
         mistakes += _meant(others, found.own)
         if built:
             absent = {dotted(where) for where in found.own}

@@ -30,6 +30,7 @@ _STAND_INS: dict[Where, _StandIn] = {
     ("loads",): _stand_in(
         "body boundary amplitude", kind="pressure", body="", boundary="", value=0
     ),
+    ("checks",): _stand_in("", parameter="", that=True, allowed="true"),
     ("singular",): _stand_in("", at=[0, 0], radius=1.0),
     ("stages",): _stand_in("name", name="stage"),
     ("results", "lines"): _stand_in("body", body=""),

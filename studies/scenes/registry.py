@@ -1,9 +1,10 @@
-"""Scenes by name: the built-in ones, those of installed packages, and those of files."""
+"""Scenes by name: those of the package, those of installed packages, and those of files."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from solver.scenes import SCENES, Scene
 from studies.errors import StudyError, one_of
 from studies.scenes.description import Description
+from studies.scenes.shipped import SHIPPED
 
 GROUP = "residua.scenes"
 """Entry-point group of installed packages: each gives a `Scene`, or the path of a scene file."""
@@ -39,7 +41,7 @@ def scene_named(name: Any, find: Find = nothing) -> Scene:
         that says which scenes exist
     """
     if isinstance(name, str):
-        found = SCENES.get(name) or find(name)
+        found = SCENES.get(name) or _shipped(name) or find(name)
         if found is None and (entry := _installed().get(name)):
             found = _loaded(entry)
         if found is not None:
@@ -49,7 +51,12 @@ def scene_named(name: Any, find: Find = nothing) -> Scene:
 
 def known_names() -> list[str]:
     """Return the names of the built-in scenes and of those of installed packages."""
-    return list(dict.fromkeys((*SCENES, *_installed())))
+    return list(dict.fromkeys((*SCENES, *SHIPPED, *_installed())))
+
+
+def built_in() -> list[Scene]:
+    """Return the scenes of the package."""
+    return [scene_named(name) for name in (*SCENES, *SHIPPED)]
 
 
 def known_scenes() -> Iterator[Scene]:
@@ -61,7 +68,7 @@ def name_of(scene: Scene) -> str:
     """Return what a study calls a scene: its name, or the content id of one from a file."""
     from studies.scenes.scene import FileScene
 
-    return scene.id if isinstance(scene, FileScene) else scene.name
+    return scene.id if isinstance(scene, FileScene) and scene.posted else scene.name
 
 
 def beside(folder: Path) -> Find:
@@ -81,7 +88,7 @@ def attributes(scene: Scene) -> dict[str, str]:
     """Return what a data set tells of its scene, so that it can be read without the file."""
     from studies.scenes.scene import FileScene
 
-    if not isinstance(scene, FileScene):
+    if not (isinstance(scene, FileScene) and scene.posted):
         return {"scene": scene.name}
     content = scene.description.content
     return {"scene": scene.name, "scene_id": scene.id, "scene_file": json.dumps(content)}
@@ -100,6 +107,20 @@ def scene_of(told: Mapping[str, Any]) -> Scene:
     from studies.scenes.scene import file_scene
 
     return file_scene(Description(str(told["scene"]), json.loads(told["scene_file"]), None))
+
+
+def _shipped(name: str) -> Scene | None:
+    """Return the scene of a file of the package."""
+    if name not in SHIPPED:
+        return None
+    from studies.scenes.scene import file_scene
+
+    return file_scene(_description(SHIPPED[name]))
+
+
+@cache
+def _description(path: Path) -> Description:
+    return Description.read(path, shipped=True)
 
 
 def _installed() -> dict[str, EntryPoint]:

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.named_places import NamedPlaces
+from solver.results.outputs import outputs
 from solver.results.requested import RequestedNumber
-from solver.results.view import Places, View
+from solver.results.view import Axis, Places, View
 from studies.scenes import tables
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from solver.results.run import Output
 
     Array = NDArray[np.float64]
 
@@ -22,28 +25,24 @@ _NOWHERE = np.zeros(0)
 def view_of(scene: tables.SceneFile) -> View:
     """Return the map grid and the states; see `places_of` for lines, points and contacts."""
     names = scene.stage_names
-    released = "unloaded" if scene.loading else _released(scene)
+    released, taken = scene.released, scene.results
     under_load = [name for name in names if name != released]
-    grid = scene.results.map
+    grid, profile = taken.map, taken.profile
+    surfaces = dict(side.split(".") for side in taken.surfaces)
     return View(
         x=grid.x.positions() if grid else _NOWHERE,
         y=grid.y.positions() if grid else _NOWHERE,
-        depth=_NOWHERE,
-        station=_NOWHERE,
-        s=_NOWHERE,
-        profile_body=next(iter(scene.bodies)),
-        surfaces=dict.fromkeys(scene.bodies, ""),
+        depth=profile.depth.positions() if profile else _NOWHERE,
+        station=np.array(profile.stations) if profile else _NOWHERE,
+        s=taken.s.positions() if taken.s else _NOWHERE,
+        profile_body=profile.body if profile else next(iter(scene.bodies)),
+        surfaces={name: surfaces.get(name, "") for name in scene.bodies},
         stages=tuple(names),
         loaded=under_load[-1] if under_load else names[-1],
         unloaded=released,
         symmetric=scene.symmetric,
+        axis=Axis(taken.axis.origin, taken.axis.along),
     )
-
-
-def _released(scene: tables.SceneFile) -> str:
-    """Return the name of the last stage, if the bodies are released in it."""
-    last = scene.stages[-1]
-    return last.name if last.release and len(scene.stages) > 1 else ""
 
 
 def numbers_of(scene: tables.SceneFile) -> list[RequestedNumber]:
@@ -61,7 +60,15 @@ def places_of(scene: tables.SceneFile) -> NamedPlaces:
         points={n: Places(at.body, np.array(at.at)[:, None]) for n, at in taken.points.items()},
         contacts=[contact.name for contact in scene.contacts],
         numbers=numbers_of(scene),
-        samples=taken.samples,
+        samples=0 if "contact" in taken.words else taken.samples,
+    )
+
+
+def output_of(scene: tables.SceneFile, word: str) -> Output:
+    """Return the output of a word with the parameters that a scene file gives it."""
+    known = outputs()[word]
+    return (
+        known.make(**getattr(scene.results, word).model_dump()) if known.parametric else known.make
     )
 
 

@@ -6,27 +6,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, make_dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
-from solver.parameters import check, described
+from solver.parameters import Accuracy, by_accuracy, check, described
 from solver.results.figures import cost
-from solver.results.maps import maps
 from solver.results.named_places import NamedPlaces, at_named_places
+from solver.results.outputs import outputs
+from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
 from solver.scenes.effort import Effort
 from solver.scenes.scene import Scene
 from studies.errors import SceneError
 from studies.scenes import tables
 from studies.scenes.building import Builder
-from studies.scenes.checking import clashes
+from studies.scenes.checking import clashes, lacking, unmet
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of
 from studies.scenes.examining import examined
-from studies.scenes.results import numbers_of, places_of, view_of
+from studies.scenes.results import numbers_of, output_of, places_of, view_of
 
 if TYPE_CHECKING:
     from solver.contact.state import Converged
@@ -45,6 +46,11 @@ class FileScene(Scene):
     """
 
     description: Description
+
+    @property
+    def posted(self) -> bool:
+        """Whether it is none of the package, so that studies call it by its content id."""
+        return not self.description.shipped
 
     @property
     def id(self) -> str:
@@ -76,7 +82,7 @@ def file_scene(description: Description, *, built: bool = False) -> FileScene:
     return known
 
 
-_SCENES: dict[tuple[str, str], FileScene] = {}
+_SCENES: dict[tuple[str, str, bool], FileScene] = {}
 _MOST = 64
 """Scenes of files that a process keeps."""
 
@@ -85,16 +91,22 @@ def _made(description: Description, scene: tables.SceneFile) -> FileScene:
     return FileScene(
         name=scene.name,
         summary=scene.summary or f"scene of the file {description.file}",
-        parameters=_parameters(description, scene.parameters),
+        parameters=_parameters(description, scene),
         branch=_branch(description),
         model=partial(_model, description),
         program=partial(_program, description),
         view=partial(_view, description),
         places=partial(_places, description),
-        outputs=(*((maps,) if scene.results.map else ()), partial(_at_places, description)),
+        outputs=(
+            *(partial(_output, description, word) for word in scene.results.words),
+            partial(_at_places, description),
+        ),
         costs=(cost,),
         watch=_watched,
         effort=partial(_effort, description),
+        advice={
+            Status[key.upper()]: text for key, text in scene.advice.model_dump().items() if text
+        },
         quantities=tuple(q for number in numbers_of(scene) for q in number.quantities),
         source=description.digest,
         allow=scene.allow,
@@ -145,6 +157,10 @@ def _places(description: Description, parameters: Any) -> NamedPlaces:
     return places_of(_tables(description, parameters))
 
 
+def _output(description: Description, word: str, run: FinishedRun) -> Values:
+    return output_of(_tables(description, run.parameters), word)(run)
+
+
 def _at_places(description: Description, run: FinishedRun) -> Values:
     program = _program(description, run.parameters)
     times = [0.0, *(target.time for target in program.targets)]
@@ -175,26 +191,39 @@ def _values(parameters: Any) -> dict[str, Any]:
 
 
 def _branch(description: Description) -> str:
-    """Return the parameter that is the load factor and nothing else, if there is one."""
+    """Return the parameter that is the load factor, if there is one and all else is without it.
+
+    Outputs may have it: they are taken of each run.
+    """
     loading = description.content.get("loading", {})
     factor = loading.get("factor")
     if not isinstance(factor, str) or factor.removeprefix("$") not in description.parameters:
         return ""
     name = factor.removeprefix("$")
-    rest = dict(description.content) | {"loading": {**loading, "factor": 1.0}}
+    results = description.content.get("results", {})
+    places = {key: each for key, each in results.items() if key not in outputs()}
+    rest = {**description.content, "loading": {**loading, "factor": 1.0}, "results": places}
     others = Description(description.file, rest, description.meshes).used()
     return "" if name in others else name
 
 
-def _parameters(
-    description: Description, declared: Mapping[str, tables.ParameterTable]
-) -> type[Any]:
+def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
     """Return the class of the scene's parameters, which checks itself as those of scenes do."""
+    declared, levels = scene.declared, scene.accuracy
+    usual: dict[str, dict[str, Any]] = {}
+    if levels:
+        for level in get_args(Accuracy):
+            numbers = levels.level(level).items()
+            usual[level] = {name: type(_default(declared[name]))(each) for name, each in numbers}
 
     def checked(self: Any) -> None:
         check(self)
+        for name, number in usual[self.accuracy].items() if usual else ():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, number)
         try:
-            mistakes = list(clashes(_tables(description, self), None))
+            found = _tables(description, self)
+            mistakes = [*unmet(found, _values(self)), *clashes(found, None), *lacking(found)]
         except SceneError as error:
             mistakes = list(error.mistakes)
         for first in mistakes[:1]:
@@ -206,7 +235,13 @@ def _parameters(
     return make_dataclass(
         "Parameters",
         [
-            (name, _kind(each), described(_default(each), each.description))
+            (
+                name,
+                _kind(each),
+                by_accuracy(each.description)
+                if levels and name in levels.standard
+                else described(_default(each), each.description),
+            )
             for name, each in declared.items()
         ],
         frozen=True,
@@ -226,8 +261,10 @@ def _again(description: Description, values: Mapping[str, Any]) -> Any:
 
 def _default(declared: tables.ParameterTable) -> Any:
     """Return a default; a whole number with a unit is a length or the like, not a count."""
-    whole = isinstance(declared.default, int) and not isinstance(declared.default, bool)
-    return float(declared.default) if whole and declared.unit != "1" else declared.default
+    default = declared.default
+    if isinstance(default, int) and not isinstance(default, bool) and declared.unit != "1":
+        return float(default)
+    return default
 
 
 def _kind(declared: tables.ParameterTable) -> Any:

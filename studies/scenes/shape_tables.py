@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from annotated_types import Interval
 from pydantic import Field
 
 from solver.errors import ModelError
-from solver.mesh import Near, ball, disc, fillet, half_plane, pad, rectangle, ring
+from solver.mesh import Near, ball, disc, fillet, grid, half_plane, pad, rectangle, refined, ring
+from solver.mesh.shapes import few
 from solver.parameters import Length
 from studies.scenes.table import Count, Place, SceneTable, Span
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from skfem import Mesh
+
+    Array = NDArray[np.float64]
+
+Growth = Annotated[float, Interval(gt=1.0, le=3.0)]
 
 
 class NearTable(SceneTable):
@@ -35,7 +44,7 @@ class _MeshedTable(SceneTable):
     """
 
     size: Length
-    growth: Annotated[float, Interval(gt=1.0, le=3.0)] = 1.3
+    growth: Growth = 1.3
     near: tuple[NearTable, ...] = ()
 
 
@@ -110,13 +119,54 @@ class RoundTable(SceneTable):
     radius: Length
     size: Length
     fine: Length
-    growth: Annotated[float, Interval(gt=1.0, le=3.0)] = 1.3
+    growth: Growth = 1.3
     above: bool = True
     symmetric: bool = False
 
 
+class _MarkTable(SceneTable):
+    """An element side [mm] that lines have at a place; left out, it is that of the other places.
+
+    ``largest`` is the largest side between this place and the one before.
+    """
+
+    size: Length | None = None
+    largest: Length | None = None
+
+
+class LineMarkTable(_MarkTable):
+    """A place on an axis through which a line of a grid goes."""
+
+    at: float
+
+
+class PointMarkTable(_MarkTable):
+    """A point of a surface."""
+
+    at: Place
+
+
+class GridTable(SceneTable):
+    """A rectangle whose lines go through given places: left, right, bottom, top.
+
+    Elements have the sides that are given there, and grow away from them.
+    """
+
+    kind: Literal["grid"]
+    x: Annotated[tuple[LineMarkTable, ...], Field(min_length=2)]
+    y: Annotated[tuple[LineMarkTable, ...], Field(min_length=2)]
+    growth: Growth = 1.3
+
+
 Shape = Annotated[
-    RectangleTable | HalfPlaneTable | PadTable | RingTable | FilletTable | DiscTable | RoundTable,
+    RectangleTable
+    | GridTable
+    | HalfPlaneTable
+    | PadTable
+    | RingTable
+    | FilletTable
+    | DiscTable
+    | RoundTable,
     Field(discriminator="kind"),
 ]
 _MESHED: Mapping[str, Callable[..., Mesh]] = {
@@ -138,6 +188,13 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
     ModelError
         naming the entry of the shape that is wrong
     """
+    if isinstance(shape, GridTable):
+        x, y = (
+            _graded(name, marks, [mark.at for mark in marks], shape.growth)
+            for name, marks in (("x", shape.x), ("y", shape.y))
+        )
+        few((len(x) - 1) * (len(y) - 1))
+        return grid(x, y, cells)
     given = {name: getattr(shape, name) for name in type(shape).model_fields if name != "kind"}
     if near := given.get("near"):
         given["near"] = [Near(**each.model_dump()) for each in near]
@@ -148,11 +205,43 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
     return _MESHED[shape.kind](**given)
 
 
+def _graded(field: str, marks: Sequence[_MarkTable], at: Sequence[float], growth: float) -> Array:
+    """Return lines through places ``at`` (n,) with the sides of their marks [mm]."""
+    if not all(before < after for before, after in pairwise(at)):
+        raise ModelError(field, list(at), "must have increasing places [mm]")
+    if marks[0].largest is not None:
+        raise ModelError(field, marks[0].largest, "has no largest side before its first place")
+    sizes, largest = (
+        [math.inf if side is None else side for side in sides]
+        for sides in ((mark.size for mark in marks), (mark.largest for mark in marks[1:]))
+    )
+    return refined(at, sizes, growth, largest)
+
+
 class LineTable(SceneTable):
     """A straight surface of a rigid body, which lies on the left of one who walks along it."""
 
     kind: Literal["line"]
     points: Annotated[tuple[Place, ...], Field(min_length=2, max_length=10_000)]
+
+    def chain(self) -> Array:
+        """Return its points (2, n) [mm]."""
+        return np.array(self.points).T
+
+
+class GradedTable(SceneTable):
+    """A line through points, its edges growing away from each of them, as a grid's do."""
+
+    kind: Literal["graded"]
+    points: Annotated[tuple[PointMarkTable, ...], Field(min_length=2)]
+    growth: Growth = 1.3
+
+    def chain(self) -> Array:
+        """Return its points (2, n) [mm]."""
+        corners = np.array([point.at for point in self.points]).T
+        reached = np.append(0.0, np.cumsum(np.hypot(*np.diff(corners))))
+        s = _graded("points", self.points, reached.tolist(), self.growth)
+        return np.stack([np.interp(s, reached, each) for each in corners])
 
 
 class ArcTable(SceneTable):

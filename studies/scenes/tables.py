@@ -24,10 +24,11 @@ from pydantic import Field, StringConstraints, create_model
 from solver.mesh.lines import closer
 from solver.model.friction import FRICTION
 from solver.model.loads import LOADS, Load
-from solver.parameters import Length, Stress
+from solver.parameters import Accuracy, Length, Stress
 from solver.parts import declared
+from solver.results.outputs import outputs
 from solver.scenes.material_parameters import MaterialParameters
-from studies.scenes.shape_tables import ArcTable, LineTable, Shape
+from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
 from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
 
 # -- bodies ------------------------------------------------------------------------------------
@@ -91,7 +92,7 @@ class RigidTable(SceneTable):
     """A rigid body: its surfaces by name, its centre and motions."""
 
     surfaces: Annotated[
-        dict[Label, Annotated[LineTable | ArcTable, Field(discriminator="kind")]],
+        dict[Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]],
         Field(min_length=1),
     ]
     centre: Place = (0.0, 0.0)
@@ -187,10 +188,13 @@ class StageTable(SceneTable):
 
 
 class LoadingTable(SceneTable):
-    """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away."""
+    """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away.
 
-    factor: Annotated[float, Interval(gt=0.0, le=1e6)]
-    step: Annotated[float, Interval(gt=0.0, le=1e6)]
+    Without a step they grow in one increment.
+    """
+
+    factor: Annotated[float, Interval(gt=0.0, le=1e7)]
+    step: Annotated[float, Interval(gt=0.0, le=1e7)] | None = None
     release_increments: Count = 5
 
 
@@ -238,13 +242,71 @@ class PointResultTable(SceneTable):
     at: Place
 
 
-class ResultsTable(SceneTable):
-    """Where results are stored; ``samples`` is their number along lines and contact surfaces."""
+class ProfileTable(SceneTable):
+    """Lines down into a body, at stations along the contact surface."""
+
+    body: str
+    depth: SpacedTable
+    stations: Annotated[tuple[float, ...], Field(min_length=1, max_length=1000)] = (0.0,)
+
+
+class AxisTable(SceneTable):
+    """The line along the contact surface; see `solver.results.view.Axis`."""
+
+    origin: Place = (0.0, 0.0)
+    along: Place = (1.0, 0.0)
+
+
+class PlacesTable(SceneTable):
+    """Where results are stored; ``samples`` is their number along lines and contact surfaces.
+
+    ``outputs`` are words of outputs without parameters; those with parameters have tables of their
+    own. Left out, what a map can show is stored.
+    """
 
     samples: Annotated[int, Interval(ge=2, le=5000)] = 201
     map: MapTable | None = None
     lines: dict[Label, LineResultTable] = Field(default_factory=dict)
     points: dict[Label, PointResultTable] = Field(default_factory=dict)
+    s: SpacedTable | None = None
+    surfaces: tuple[Side, ...] = ()
+    profile: ProfileTable | None = None
+    axis: AxisTable = AxisTable()
+    outputs: tuple[str, ...] | None = None
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The words of all outputs that are stored."""
+        plain = (("maps",) if self.map else ()) if self.outputs is None else self.outputs
+        tables = (w for w, each in outputs().items() if each.parametric and getattr(self, w, None))
+        return (*plain, *tables)
+
+
+def _results() -> type[PlacesTable]:
+    """Return the table of results with a table for each output that has parameters."""
+    plain = tuple(word for word, each in outputs().items() if not each.parametric)
+    known: dict[str, Any] = {"outputs": (tuple[Literal[plain], ...] | None, None)}  # type: ignore[valid-type]
+    for word, each in outputs().items():
+        if each.parametric:
+            made = create_model(each.make.__name__, __base__=SceneTable, **_fields(each.make))
+            made.__doc__ = each.make.__doc__
+            known[word] = (made | None, None)
+    found: type[PlacesTable] = create_model("ResultsTable", __base__=PlacesTable, **known)
+    return found
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    """Return the entries of a table for the parameters of a part."""
+    return {
+        name: (hint, ... if field.default is dataclasses.MISSING else field.default)
+        for name, (hint, field) in declared(kind).items()
+    }
+
+
+if TYPE_CHECKING:
+    ResultsTable = PlacesTable
+else:
+    ResultsTable = _results()
 
 
 class OutputTable(SceneTable):
@@ -275,13 +337,54 @@ class OutputTable(SceneTable):
 
 
 class ParameterTable(SceneTable):
-    """A declared parameter: its default, range or choices, unit and meaning."""
+    """A declared parameter: its default, range or choices, unit and meaning.
 
-    default: bool | int | float | str
+    One without a default is a number that `AccuracyTable` sets.
+    """
+
+    default: bool | int | float | str | None = None
     range: tuple[float, float] | None = None
     choices: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     unit: Annotated[str, StringConstraints(max_length=40)] = "1"
     description: Annotated[str, StringConstraints(max_length=400)] = ""
+
+
+class AccuracyTable(SceneTable):
+    """Numbers of parameters without a default, for each accuracy."""
+
+    draft: dict[Label, int | float]
+    standard: dict[Label, int | float]
+    fine: dict[Label, int | float]
+
+    def level(self, accuracy: Accuracy) -> dict[str, int | float]:
+        """Return the numbers of an accuracy."""
+        found: dict[str, int | float] = getattr(self, accuracy)
+        return found
+
+
+class CheckTable(SceneTable):
+    """A condition between parameters: ``that`` must be true, or ``parameter`` is refused."""
+
+    parameter: str
+    that: bool
+    allowed: Annotated[str, StringConstraints(min_length=1, max_length=400)]
+
+
+ACCURACY = "accuracy"
+"""The parameter that a file with a table of accuracies has."""
+_ACCURACY = ParameterTable(
+    default="standard",
+    choices=get_args(Accuracy),
+    description="sets mesh and increments together, where they are not given",
+)
+
+
+class AdviceTable(SceneTable):
+    """What the user can do when a run fails."""
+
+    limit_load: str = ""
+    not_converged: str = ""
+    audit_failed: str = ""
 
 
 class SceneFile(SceneTable):
@@ -293,6 +396,8 @@ class SceneFile(SceneTable):
     thickness: Length = 1.0
     symmetric: bool = False
     parameters: dict[Label, ParameterTable] = Field(default_factory=dict)
+    accuracy: AccuracyTable | None = None
+    checks: tuple[CheckTable, ...] = ()
     derived: dict[Label, Any] = Field(default_factory=dict)
     materials: Annotated[dict[Label, Material], Field(min_length=1)]  # type: ignore[valid-type]
     bodies: Annotated[dict[Label, BodyTable], Field(min_length=1)]
@@ -305,6 +410,28 @@ class SceneFile(SceneTable):
     loading: LoadingTable | None = None
     results: ResultsTable = ResultsTable()
     outputs: dict[Label, OutputTable] = Field(default_factory=dict)
+    advice: AdviceTable = AdviceTable()
+
+    @property
+    def declared(self) -> dict[str, ParameterTable]:
+        """The parameters, `accuracy` too; what it sets stands as default of ``standard``."""
+        if self.accuracy is None:
+            return self.parameters
+        usual = self.accuracy.standard
+        return {ACCURACY: _ACCURACY} | {
+            name: each.model_copy(update={"default": usual[name]})
+            if each.default is None and name in usual
+            else each
+            for name, each in self.parameters.items()
+        }
+
+    @property
+    def released(self) -> str:
+        """Name of the last stage, if the bodies are released in it."""
+        if self.loading or not self.stages:
+            return "unloaded"
+        last = self.stages[-1]
+        return last.name if last.release and len(self.stages) > 1 else ""
 
     @property
     def stage_names(self) -> list[str]:

@@ -17,8 +17,8 @@ _FILE = "scene.json"
 
 
 def keep(directory: Path, scene: Scene) -> None:
-    """Keep the content of a scene, if it comes from a file."""
-    if not isinstance(scene, FileScene):
+    """Keep the content of a scene, if it comes from a file that is none of the package."""
+    if not (isinstance(scene, FileScene) and scene.posted):
         return
     folder = directory / "scenes" / scene.id
     with suppress(StudyError):  # one that is damaged is written anew

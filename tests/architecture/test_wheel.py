@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -16,11 +17,12 @@ from tests.architecture.sources import PACKAGES, PROJECT, ROOT, tracked
 pytestmark = pytest.mark.processes
 
 BUILD = """
-import sys
+import json, sys
 from setuptools import Distribution, find_namespace_packages
 
-target, *include = sys.argv[1:]
-built = Distribution({"packages": find_namespace_packages(include=include)})
+target, include, data = sys.argv[1], *map(json.loads, sys.argv[2:])
+packages = find_namespace_packages(include=include)
+built = Distribution({"packages": packages, "package_data": data})
 built.script_name = "setup.py"
 command = built.get_command_obj("build_py")
 command.build_lib = target
@@ -48,8 +50,9 @@ def finished(
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tree that a wheel holds, built by the command that fills wheels."""
     target = tmp_path_factory.mktemp("wheel")
-    include = PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
-    command = [sys.executable, "-c", BUILD, str(target), *include]
+    setuptools = PROJECT["tool"]["setuptools"]
+    told = [setuptools["packages"]["find"]["include"], setuptools["package-data"]]
+    command = [sys.executable, "-c", BUILD, str(target), *map(json.dumps, told)]
     answer = finished(command, ROOT)
     assert answer.returncode == 0, answer.stderr
     promised = {line for line in answer.stdout.splitlines() if line.startswith(str(target))}
@@ -70,3 +73,4 @@ def test_the_command_works_from_a_wheel(installed: Path, tmp_path: Path) -> None
     answer = finished([sys.executable, "-m", "residua", "scenes"], tmp_path, elsewhere)
     assert answer.returncode == 0, answer.stderr
     assert re.search(r"^punch +elastic-plastic punch", answer.stdout, re.MULTILINE)
+    assert re.search(r"^rigid_punch +rigid flat punch", answer.stdout, re.MULTILINE)

@@ -25,7 +25,6 @@ CASES: list[tuple[str, dict[str, Any]]] = [
     ("punch", COARSE | {"elastic_punch": True}),
     ("punch", {"smallest_element": 0.003, "growth": 1.6}),
     ("elastic_punch", PLAIN),
-    ("rigid_punch", {"accuracy": "draft"}),
     ("ball", {"accuracy": "draft"}),
     ("ball", {"accuracy": "draft", "yielding": "ball", "radius": 3.0}),
     ("elastic_punch", PLAIN | {"element": "quad9", "punch_groove": 0.3, "friction": 0.1}),

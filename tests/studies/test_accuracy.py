@@ -14,6 +14,7 @@ from solver.errors import ModelError
 from studies import Store, Study, open_netcdf, open_study, run_study
 from studies.definition.parameters import completed, defaults, parameters_of, scene_schema
 from studies.errors import StudyError
+from studies.scenes.registry import scene_named
 from studies.views.plots.captions import setting
 
 pytestmark = pytest.mark.usefixtures("one_worker")
@@ -34,9 +35,10 @@ BY_ACCURACY = [
 def test_every_number_that_is_left_out_is_set_and_none_grows_with_accuracy(
     scene: str, fixed: dict[str, Any], names: set[str]
 ) -> None:
-    left_out = {name for name, each in parameters_of(SCENES[scene]).items() if each.default is None}
+    found = scene_named(scene)
+    left_out = {name for name, each in parameters_of(found).items() if each.default is None}
     assert left_out == names
-    kind = SCENES[scene].parameters
+    kind = found.parameters
     draft, standard, fine = (kind(accuracy=level, **fixed) for level in LEVELS)
     assert standard == kind(**fixed)
     for name in names:

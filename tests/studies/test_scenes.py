@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver import SCENES, Record
+from solver import Record
 from solver.results.quantities import QUANTITIES
 from studies import Store, Study, open_study, run_study
 from studies.definition.vocabulary import LABEL_ATTRIBUTES
+from studies.scenes.registry import built_in, scene_named
 from studies.scenes.scene import read_scene
 from studies.views.tables import runs_table
 
@@ -57,11 +58,13 @@ def records() -> list[Record]:
         "rolling, endless": ({"element_size": 3.0}, 1),
     }
     names = {label: label.split(",")[0] for label in coarse}
-    assert set(names.values()) == SCENES.keys() - {"fake"}, "every scene of the product is here"
+    assert set(names.values()) == {each.name for each in built_in()} - {"fake"}, (
+        "every scene of the product is here"
+    )
     found = []
     for label, (parameters, value) in coarse.items():
         name = names[label]
-        scene = SCENES[name]
+        scene = scene_named(name)
         found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)
     for own in FILES:
         found += own.path(

@@ -20,6 +20,7 @@ from solver.scenes import SCENES
 from studies import Study, StudyError, scene_schema
 from studies.definition.identity import content_id, written
 from studies.definition.sweep import MAXIMUM_RUNS
+from studies.scenes.shipped import SHIPPED
 from tests.studies.conftest import fake_study
 
 ROOT = Path(__file__).parents[2]
@@ -351,7 +352,7 @@ def test_the_error_survives_pickling() -> None:
     assert (error.field, error.value, error.allowed) == ("name", 3, "a text")
 
 
-@pytest.mark.parametrize("name", sorted(SCENES))
+@pytest.mark.parametrize("name", [*SCENES, *SHIPPED])
 def test_every_scene_describes_its_parameters(name: str) -> None:
     schema = scene_schema(name)
     assert schema["additionalProperties"] is False

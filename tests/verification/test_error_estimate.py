@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from solver import SCENES
 from solver.fem.error import ErrorPoints
 from solver.fem.fields import Sampler, recovery
 from solver.results.audit.report import estimated_error
 from solver.tensors import SQRT2
+from studies.scenes.registry import scene_named
 from tests.verification import hertz_line
 from tests.verification.bodies import NU, steel
 from tests.verification.effectivity import effectivity
@@ -168,7 +168,7 @@ def test_pressure_of_a_rigid_slave_is_compared_with_the_stress_of_its_master():
 
 
 def under_a_rigid_punch(smallest_element):
-    scene = SCENES["rigid_punch"]
+    scene = scene_named("rigid_punch")
     given = scene.parameters(
         smallest_element=smallest_element, growth=1.44, largest_element=0.05, half_plane_size=10.0
     )

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from solver.results.record import Status
-from solver.scenes import SCENES
+from studies.scenes.registry import scene_named
 from tests.reference.flat_punch_friction import stick_width
 from tests.reference.wedge import singular_power
 
-RIGID_PUNCH = SCENES["rigid_punch"]
+RIGID_PUNCH = scene_named("rigid_punch")
 NU = 0.3
 
 

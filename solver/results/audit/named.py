@@ -130,7 +130,7 @@ class NamedPlacesCheck:
         return LIMIT / limit if found.measured else 1.0
 
     def _pairs(self) -> None:
-        for k, _ in enumerate(self._places.contacts):
+        for k, _ in enumerate(self._places.contacts if self._places.samples else ()):
             for j, stage in enumerate(self._run.view.stages):
                 found = self._source.tractions(k, stage)
                 s = np.asarray(self._record.coordinates["fraction"]) * found.s[-1]

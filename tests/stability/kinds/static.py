@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from solver import SCENES, Record
+from solver import Record
+from studies.scenes.registry import scene_named
 from tests.stability.trial import Figure, Scene
 
 COUNT = 4
@@ -40,7 +41,7 @@ class Drawn:
             name: value * self._factor(name) if isinstance(value, float) else value
             for name, value in self.given.items()
         }
-        factor = self._factor(SCENES[self.name].branch)
+        factor = self._factor(scene_named(self.name).branch)
         value = self.value * factor if factor != 1.0 else self.value
         return self._run(self.given, self.value), self._run(scaled, value)
 
@@ -51,7 +52,7 @@ class Drawn:
         return self.stiffer if name in stresses else 1.0
 
     def _run(self, given: Mapping[str, Any], value: float) -> Record:
-        scene = SCENES[self.name]
+        scene = scene_named(self.name)
         (record,) = scene.path(scene.parameters(**given), [value], lambda share: None)
         return record
 

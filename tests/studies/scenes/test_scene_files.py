@@ -31,6 +31,7 @@ from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named, scene_of
 from studies.scenes.scene import FileScene, file_scene, read_scene
+from studies.scenes.shipped import SHIPPED
 from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
 from tests.studies.scenes.conftest import BLOCKS, blocks, built
@@ -346,7 +347,7 @@ def test_installed_packages_bring_scenes(monkeypatch: pytest.MonkeyPatch) -> Non
         Entry("wrong", 3),
     ]
     monkeypatch.setattr(registry, "entry_points", lambda group: entries)
-    assert registry.known_names() == [*SCENES, "lug", "own", "wrong"]
+    assert registry.known_names() == [*SCENES, *SHIPPED, "lug", "own", "wrong"]
     lug = scene_named("lug")
     assert isinstance(lug, FileScene) and lug.name == "pin"
     assert scene_named("own") is PUNCH

@@ -1,0 +1,100 @@
+"""The sharp corner at the end of a contact: the power of its singularity."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.parameters import Length, Stress, check, described
+from solver.results.outputs import output
+from solver.results.singularity import (
+    APPARENT_POWER,
+    NOWHERE,
+    SINGULAR_INTENSITY,
+    SINGULAR_POWER,
+    SINGULAR_POWER_ERROR,
+    apparent_power,
+    fit_singularity,
+)
+
+if TYPE_CHECKING:
+    from solver.results.contact_result import ContactResult
+    from solver.results.run import FinishedRun, Values
+
+_NEAREST, _FARTHEST = 10.0, 0.03
+"""Range of the fit: elements at the corner, and half-widths from it."""
+_GRADED = 0.9
+"""Largest range of the fit / distance within which elements grow."""
+_SHARE = 0.25
+"""Largest range of the fit / distance of another feature, or of the end of slip."""
+_NOTCH, _NOTCH_SHEAR = 0.364, 0.543
+"""A corner that sticks is a notch of 270 degrees (Williams): difference of its first two powers,
+and outward shear / pressure of the first. In the second the two may have any sign."""
+_SEEN = (0.01, 0.1)
+"""Range in which the apparent power is taken / half-width."""
+
+
+@output("corner", "contact")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Corner:
+    """The power of the singularity with its error, its intensity, and the apparent power.
+
+    Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
+    nine tenths of where elements grow, or a quarter of the way to another feature or to the end of
+    slip, where that is less. Where elements grow in proportion to the distance, their error is the
+    same share of the pressure everywhere, and has no part in its power. NaN where the corner has
+    lifted off, and where it sticks and the first term of the notch is not the largest in that
+    range. Stress in the half-plane would be a worse measure: a uniform stress along its surface,
+    which has no part in the pressure, is a term only 1 - p above the first.
+    """
+
+    half_width: Length = described(MISSING, "distance of the corner from the middle of the contact")
+    mean_pressure: Stress = described(MISSING, "mean pressure on the contact")
+    smallest_element: Length = described(MISSING, "element side at the corner")
+    graded: Length = described(
+        MISSING, "distance from the corner within which elements grow in proportion to it"
+    )
+    feature: Length = described(
+        1e6, "distance from the corner of what else shapes the stress, such as a groove"
+    )
+    flush: bool = described(
+        False, "whether a corner that sticks is no notch: a straight side goes on beyond it"
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def __call__(self, run: FinishedRun) -> Values:
+        """Return the quantities of a run."""
+        points = run.tractions.points(run.loaded)
+        assert points is not None, "the model has a contact pair"
+        r = 1 - points.s / self.half_width
+        pressure = points.pressure / self.mean_pressure
+        found, apparent = NOWHERE, np.nan
+        if points.closed[-1]:
+            low = _NEAREST * self.smallest_element / self.half_width
+            graded = _GRADED * self.graded / self.half_width
+            high = min(_FARTHEST, graded, _SHARE * self._next_feature(points, r))
+            notch = bool(points.sticking[-1]) and not self.flush
+            if not notch or _first_term_leads(points, r, low):
+                found = fit_singularity(r, pressure, low, high, _NOTCH if notch else 1.0)
+            apparent = apparent_power(r, pressure, *_SEEN)
+        return {
+            SINGULAR_POWER: found.power,
+            SINGULAR_POWER_ERROR: found.error,
+            SINGULAR_INTENSITY: found.intensity,
+            APPARENT_POWER: apparent,
+        }
+
+    def _next_feature(self, points: ContactResult, r: np.ndarray) -> float:
+        """Return the distance / half-width from the corner of what else shapes the field."""
+        other = points.sticking != points.sticking[-1]
+        return float(min([1.0, self.feature / self.half_width, *r[other]]))
+
+
+def _first_term_leads(points: ContactResult, r: np.ndarray, low: float) -> bool:
+    """Whether shear where the fit begins is more than half that of the first term of a notch."""
+    near = int(np.argmin(np.abs(r - low)))
+    return bool(points.shear[near] > _NOTCH_SHEAR / 2 * points.pressure[near])

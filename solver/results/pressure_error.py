@@ -1,0 +1,53 @@
+"""Contact pressure under a rigid flat punch, against its closed form.
+
+K.L. Johnson, Contact Mechanics (1985), section 2.8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.parameters import Friction, Length, Stress, check, described
+from solver.results.outputs import output
+from solver.results.quantities import declare
+
+if TYPE_CHECKING:
+    from solver.results.run import FinishedRun, Values
+
+PRESSURE_ERROR = declare(
+    "pressure_error",
+    "error of contact pressure without friction against the closed form, over nine tenths of the "
+    "contact, / the pressure there; both in the mean square",
+)
+_AWAY = 0.9  # of the half-width: where the error is taken
+
+
+@output("pressure_error", "contact")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureError:
+    """The error against p(x) / p0 = 2 / (pi sqrt(1 - (x/a)^2)), p0 the mean pressure.
+
+    NaN with friction, where there is no closed form.
+    """
+
+    half_width: Length = described(MISSING, "half-width a of the punch")
+    mean_pressure: Stress = described(MISSING, "mean pressure p0 under the punch")
+    friction: Friction = described(0.0, "Coulomb friction coefficient")
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def __call__(self, run: FinishedRun) -> Values:
+        """Return the error of a run."""
+        points = run.tractions.points(run.loaded)
+        assert points is not None, "the model has a contact pair"
+        x = points.s / self.half_width
+        exact = 2 / (np.pi * np.sqrt(1 - np.minimum(x, _AWAY) ** 2))
+        miss = points.pressure / self.mean_pressure - exact
+        at = x <= _AWAY
+        square = [np.trapezoid(each[at] ** 2, x[at]) for each in (miss, exact)]
+        error = float(np.sqrt(square[0] / square[1]))
+        return {PRESSURE_ERROR: np.nan if self.friction else error}

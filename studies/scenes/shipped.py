@@ -1,0 +1,18 @@
+"""The scenes that the package brings as files, in the folder ``files`` beside this module."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from solver.scenes import SCENES
+
+SHIPPED: Mapping[str, Path] = {
+    path.stem: path for path in sorted((Path(__file__).parent / "files").glob("*.toml"))
+}
+"""Name of a scene, which is that of its file -> file."""
+
+
+def is_built_in(name: str) -> bool:
+    """Tell whether a scene of the package has this name."""
+    return name in SCENES or name in SHIPPED

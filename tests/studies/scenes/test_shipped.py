@@ -1,0 +1,73 @@
+"""Scenes that the package brings as files."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from solver.contact.system import System
+from solver.scenes import SCENES
+from studies import Study, StudyError
+from studies.errors import SceneError
+from studies.scenes.description import Description
+from studies.scenes.registry import attributes, name_of, scene_named, scene_of
+from studies.scenes.scene import FileScene, file_scene, read_scene
+from studies.scenes.shipped import SHIPPED
+from studies.storage.shelf import keep, kept
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_scene_of_the_package_is_called_by_its_name(name: str) -> None:
+    scene = scene_named(name)
+    assert isinstance(scene, FileScene) and name not in SCENES
+    assert scene.name == name_of(scene) == name
+    assert attributes(scene) == {"scene": name}
+    assert scene_of(attributes(scene)) is scene
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_its_bodies_can_be_built(name: str) -> None:
+    assert file_scene(Description.read(SHIPPED[name], shipped=True), built=True).name == name
+
+
+@pytest.mark.parametrize("changes", [{}, {"half_plane_size": 30.0, "growth": 1.4}])
+def test_the_work_of_the_rigid_punch_is_told_as_it_is(changes: dict[str, float]) -> None:
+    scene = scene_named("rigid_punch")
+    parameters = scene.parameters(accuracy="draft", **changes)
+    system = System(scene.model(parameters))
+    assert scene.effort is not None
+    told = scene.effort(parameters, [parameters.mean_pressure])
+    assert told.elements == sum(body.mesh.nelements for body in system.model.bodies)
+    assert told.unknowns == system.n_unknowns
+
+
+def test_its_runs_follow_the_content_of_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = Study.from_dict({"name": "a", "scene": "rigid_punch", "sweep": {"friction": [0.1]}})
+    assert Study.known(study.to_dict()).id == study.id
+    text = SHIPPED["rigid_punch"].read_text()
+    assert study.problem.source == read_as("rigid_punch", text).source
+    changed = text.replace("[0, 10]", "[0, 9]")
+    assert changed != text
+    assert study.problem.source != read_as("rigid_punch", changed).source
+
+
+def read_as(name: str, text: str) -> FileScene:
+    return file_scene(Description(f"{name}.toml", tomllib.loads(text), {}, shipped=True))
+
+
+def test_nobody_else_gives_a_scene_its_name(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_bytes(SHIPPED["rigid_punch"].read_bytes())
+    with pytest.raises(SceneError, match="name = 'rigid_punch': a built-in scene has this name"):
+        read_scene(own)
+    with pytest.raises(StudyError, match=r"scene = 'rigid_punsh': .*rigid_punch"):
+        scene_named("rigid_punsh")
+
+
+def test_a_store_keeps_no_copy_of_it(tmp_path: Path) -> None:
+    scene = scene_named("rigid_punch")
+    assert isinstance(scene, FileScene)
+    keep(tmp_path, scene)
+    assert kept(tmp_path, scene.id) is None
