@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from solver.materials.material import Material
+    from solver.materials.law import Law
     from solver.steady.layers import Layers
     from solver.steady.load import PassingLoad
     from solver.steady.passing import Pass
@@ -61,7 +61,7 @@ class Expected:
 
 def rolling(
     track: Track,
-    material: Material,
+    material: Law,
     load: PassingLoad | Iterable[PassingLoad],
     directions: Iterable[int],
     *,
@@ -92,7 +92,7 @@ def rolling(
         raise ModelError(
             "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
-    state: Layers = track.rows.virgin
+    state: Layers = track.rows.virgin(material)
     expected: dict[tuple[int, int], Expected] = {}
     loads = load if isinstance(load, Iterable) else itertools.repeat(load)
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):

@@ -53,7 +53,7 @@ class SteadyIncrement:
             p.mesh_width, p.element_size, p.growth, elasticity, reach=reach, interleaved=True
         )
         self.rim = rim_of(p)
-        virgin, load = self.track.rows.virgin, load_on(self.track, p, p)
+        virgin, load = self.track.rows.virgin(self.material), load_on(self.track, p, p)
         self.found = passing(self.track, self.material, load, virgin, parts=1, tolerance=tolerance)
         self.arc = (1 - self.found.loading.creepage) * p.element_size
         """By which the wheel turns."""
