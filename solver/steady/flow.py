@@ -28,6 +28,9 @@ however large the window is; 5 % then change stress by 1 % of the yield stress."
 LEAST = 0.05
 """Ratio of the plastic strain to the yield strain, up to which a pass gathers nothing to speak of.
 Its tenth is too much for the deepest row."""
+_COMPILED, _STEPPED = 16, 4
+"""Increments between two points of a row: the error is of first order in their length. Four cost a
+third of sixteen, and move stress by 1 MPa in 500 where points are 1/16 of the half-width apart."""
 
 
 class Flow(Protocol):
@@ -52,6 +55,11 @@ class Flow(Protocol):
 
         ``added`` is the change of strain (n_rows, n_columns, 4) at the columns.
         """
+
+
+def usual_parts(law: Law) -> int:
+    """Return the increments between two points of a row."""
+    return _COMPILED if isinstance(law, Material) else _STEPPED
 
 
 def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:

@@ -63,7 +63,8 @@ class Layers:
         """The layer at depth zero and those below, as one."""
         both = self.top, self
         depth, thickness = (
-            np.concatenate([getattr(each, name) for each in both]) for name in ("depth", "thickness")
+            np.concatenate([getattr(each, name) for each in both])
+            for name in ("depth", "thickness")
         )
         packed = np.concatenate([each.state.packed for each in both], axis=1)
         return Layers(depth, thickness, self.state.unpacked(packed))

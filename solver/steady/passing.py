@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
-from solver.steady.flow import RowFlow
+from solver.steady.flow import RowFlow, usual_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,8 +43,6 @@ TOLERANCE = 1e-4
 
 _FORCING = 0.1
 """Relative error with which Newton's equation is solved."""
-PARTS = 16
-"""Increments between two points of a row: the error is of first order in their length."""
 _KRYLOV, _MOST_KRYLOV = 60, 240
 """Most solves for one step of Newton's: at first, and where that is too few."""
 _STALLED = 0.98
@@ -124,7 +122,7 @@ def passing(
     before: Layers,
     guess: Array | None = None,
     *,
-    parts: int = PARTS,
+    parts: int | None = None,
     tolerance: float = TOLERANCE,
 ) -> Pass:
     """Return the steady pass of a load over a half-plane.
@@ -136,7 +134,7 @@ def passing(
     load : that passes
     before : state by depth
     guess : strains that a pass like this one adds
-    parts : increments between two points of a row
+    parts : increments between two points of a row, `usual_parts` if None
     tolerance : on the strain of the residual
 
     Raises
@@ -149,6 +147,7 @@ def passing(
         if no steady pass was found
     """
     rows, solve = track.rows, track.operator.solve
+    parts = parts or usual_parts(material)
     shape = (*rows.shape, 4)
     scale = np.sqrt(rows.weights)[..., None]
     double_shear = 2 * material.elasticity.shear_modulus

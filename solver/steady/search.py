@@ -20,7 +20,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, WindowTooSmall
 from solver.materials.material import Material
-from solver.steady.passing import PARTS, TOLERANCE, passing
+from solver.steady.passing import TOLERANCE, passing
 from solver.steady.touching import RollingContact
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def search(
     before: Layers,
     guess: Array | None = None,
     *,
-    parts: int = PARTS,
+    parts: int | None = None,
     tolerance: float = TOLERANCE,
 ) -> Pass:
     """Return the steady pass that `passing` finds, from the guess or from another one.
@@ -75,10 +75,13 @@ def search(
         return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
 
     def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass:
-        return passing(track, _linear(material, ratio), load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
+        return passing(
+            track, _linear(material, ratio), load, before, guess, parts=_PARTS, tolerance=_TOLERANCE
+        )
 
-    linear = isinstance(material, Material) and material.hardens
-    own = material.hardening_ratio if linear else 0.0
+    own = 0.0
+    if isinstance(material, Material) and material.hardens:
+        own = material.hardening_ratio
     largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
     if isinstance(found, NoContact):  # an elastic track makes another contact than it will have

@@ -11,6 +11,7 @@ and is not exact: what flows within a column flows in several increments.
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -95,12 +96,14 @@ class SteppedFlow:
     @cached_property
     def _scale(self) -> Array:
         """Steps of differences (n + 4,): of internal variables and of strain."""
-        law, scale = self._law, []
-        for name, values in _members(self.states).items():
-            count = _members(self._start)[name].size // len(self._start.accumulated)
-            scale += [float(np.abs(values).max(initial=0.0))] * count
-        yield_strain = law.yield_stress / law.elasticity.youngs_modulus
-        return _STEP * np.array(scale + [yield_strain] * 4)
+        largest = {
+            f.name: np.full_like(getattr(self._start, f.name), np.abs(values).max(initial=0.0))
+            for f in fields(self._start)
+            for values in [getattr(self.states, f.name)]
+        }
+        scale = replace(self._start, **largest).packed[:, 0]
+        yield_strain = self._law.yield_stress / self._law.elasticity.youngs_modulus
+        return _STEP * np.append(scale, [yield_strain] * 4)
 
     def _slopes(self, before: Array, strain: Array) -> Array:
         """Return the derivatives (n_points, n, n + 4) of internal variables over an increment.
@@ -143,11 +146,6 @@ class SteppedFlow:
         by_state, by_strain = slopes[..., :n], slopes[..., n:]
         stress = (C[_FREE] @ by_state, (C - C @ by_strain)[:, _FREE][..., _FREE])
         return by_state + by_strain[..., _FREE] @ np.linalg.solve(stress[1], stress[0])
-
-
-def _members(state: PlasticState) -> dict[str, Array]:
-    """Return the internal variables by name."""
-    return {name: getattr(state, name) for name in state.__dataclass_fields__}
 
 
 def _at_rest(law: Law, state: PlasticState) -> _Left:

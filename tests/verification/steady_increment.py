@@ -47,7 +47,7 @@ class SteadyIncrement:
 
     def __init__(self, reach: float = 1.0, tolerance: float = 1e-6, **fields: object) -> None:
         self.parameters = p = RollingParameters(**fields)
-        self.material = p.linear_material()
+        self.material = p.material()
         elasticity = self.material.elasticity
         self.track = Track(
             p.mesh_width, p.element_size, p.growth, elasticity, reach=reach, interleaved=True

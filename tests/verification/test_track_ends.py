@@ -32,9 +32,9 @@ SAME = 0.05
 def endless():
     """Depth of the rows and residual sigma_x there, mean of both chains of points."""
     p = RollingParameters(**FREE)
-    track = Track(p.mesh_width, SIDE, p.growth, p.linear_material().elasticity, interleaved=True)
-    (one,) = rolling(track, p.linear_material(), load_on(track, p, p), [1], parts=1)
-    stress = one.after.stress(p.linear_material().elasticity)[:, 0]
+    track = Track(p.mesh_width, SIDE, p.growth, p.material().elasticity, interleaved=True)
+    (one,) = rolling(track, p.material(), load_on(track, p, p), [1], parts=1)
+    stress = one.after.stress(p.material().elasticity)[:, 0]
     return one.after.depth[::2], stress.reshape(-1, 2).mean(axis=1)
 
 
