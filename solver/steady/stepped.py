@@ -145,7 +145,7 @@ class SteppedFlow:
         C = self._law.stiffness(4)
         by_state, by_strain = slopes[..., :n], slopes[..., n:]
         stress = (C[_FREE] @ by_state, (C - C @ by_strain)[:, _FREE][..., _FREE])
-        return by_state + by_strain[..., _FREE] @ np.linalg.solve(stress[1], stress[0])
+        return by_state + by_strain[..., _FREE] @ _solved(stress[1], stress[0])
 
 
 def _at_rest(law: Law, state: PlasticState) -> _Left:
@@ -183,8 +183,16 @@ def _at_rest(law: Law, state: PlasticState) -> _Left:
         if (least < _AT_REST * law.yield_stress).all():
             break
         tangent = np.moveaxis(response.tangent[np.ix_(_FREE, _FREE)], 2, 0)
-        turned = np.linalg.solve(tangent, stress.T[..., None])[..., 0].T
+        turned = _solved(tangent, stress.T[..., None])[..., 0].T
         step[_FREE] = np.where(better, turned, step[_FREE])
     if not (least < _ALMOST * law.yield_stress).all():
         raise NotConverged("what a steady pass leaves does not come to rest")
     return _Left(law.respond(found, state).state, found)
+
+
+def _solved(matrices: Array, right: Array) -> Array:
+    """Return the solutions (n, 2, m) of systems (n, 2, 2), or raise where one has none."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, right))
+    except np.linalg.LinAlgError:
+        raise NotConverged("what a steady pass leaves has no stiffness across") from None
