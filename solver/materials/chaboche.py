@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class ChabocheState(PlasticState):
     """
 
     back: Array
+    TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain", "back")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

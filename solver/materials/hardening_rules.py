@@ -88,7 +88,7 @@ class MovingRule(HardeningRule):
 
 
 class LinearRule(HardeningRule):
-    """The rule of `Material` that has this word; steady passes know no others."""
+    """The rule of `Material` that has this word."""
 
     __slots__ = ()
     word: ClassVar[Hardening]

@@ -9,7 +9,9 @@ A new law must define `elasticity`, `flow_stress` and `respond`. All else has a 
 associated flow on a von Mises surface and isotropic hardening that comes to an end. Override
 `back_stress` and `strength` with kinematic hardening, `hardens` where stress grows without end,
 `ultimate_shear_stress` without hardening, `surface` for another yield condition, `flow_rule_error`
-and `has_corners` where that has edges, `symmetric` where the tangent is not. What is marked as an
+and `has_corners` where that has edges, `symmetric` where the tangent is not. A law with internal
+variables of its own gives them in `initial`; its state names which of them are tensors
+(`PlasticState.TENSORS`), so that passes back over a track see them mirrored. What is marked as an
 attribute here may be a property or a field of a dataclass there.
 """
 

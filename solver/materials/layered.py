@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class LayeredState(PlasticState):
 
     layer_strain: Array
     layer_accumulated: Array
+    TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain", "layer_strain")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,9 +21,11 @@ class PlasticState:
     """Internal variables at the points of a body; never changed, only replaced.
 
     A law with more internal variables inherits from this class and adds its arrays, points last.
+    Those that are tensors, ``(..., n_components, n_points)``, it names in `TENSORS` too.
 
     Attributes
     ----------
+    TENSORS : names of the internal variables that are Mandel tensors
     plastic_strain : (n_components, n_points) Mandel
     accumulated : (n_points,) sum of the plastic multipliers: plastic strain grows by the
         multiplier times `Law.flow_direction`. With von Mises it is the equivalent plastic
@@ -31,6 +34,7 @@ class PlasticState:
 
     plastic_strain: NDArray[np.float64]
     accumulated: NDArray[np.float64]
+    TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain",)
 
     @classmethod
     def virgin(cls, n_points: int, n_components: int = 4) -> PlasticState:
@@ -40,6 +44,37 @@ class PlasticState:
     def at(self, points: NDArray[np.int64]) -> Self:
         """Return the internal variables of some points."""
         return replace(self, **{f.name: getattr(self, f.name)[..., points] for f in fields(self)})
+
+    @property
+    def mirrored(self) -> Self:
+        """The internal variables as one sees them who looks along -x."""
+        sign = np.ones((len(self.plastic_strain), *[1] * self.accumulated.ndim))
+        sign[3::2] = -1.0  # xy, and zx in three dimensions
+        return replace(self, **{name: getattr(self, name) * sign for name in self.TENSORS})
+
+    @property
+    def packed(self) -> NDArray[np.float64]:
+        """All internal variables as one array (n, n_points), plastic strain first."""
+        points = self.accumulated.shape
+        return np.concatenate(
+            [getattr(self, name).reshape(size, *points) for name, _, size in self._layout]
+        )
+
+    def unpacked(self, packed: NDArray[np.float64]) -> Self:
+        """Return internal variables of the same law from those of `packed` (n, ...)."""
+        found, begin = {}, 0
+        for name, shape, size in self._layout:
+            found[name] = packed[begin : begin + size].reshape(*shape, *packed.shape[1:])
+            begin += size
+        return replace(self, **found)
+
+    @property
+    def _layout(self) -> list[tuple[str, tuple[int, ...], int]]:
+        """Name, shape and count of the components of each internal variable."""
+        points = self.accumulated.ndim
+        shapes = [(f.name, getattr(self, f.name).shape) for f in fields(self)]
+        each = [(name, shape[: len(shape) - points]) for name, shape in shapes]
+        return [(name, shape, math.prod(shape)) for name, shape in each]
 
     def stretched(self, factor: NDArray[np.float64]) -> Self:
         """Return the internal variables with all strains multiplied by factors (n_points,)."""

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from solver.contact.state import State
 from solver.fem.fields import recovery
 from solver.fem.frame import RigidMotion
-from solver.materials.state import PlasticState, Response
+from solver.materials.state import Response
 from solver.results.contact_result import contact_patches
 from solver.steady import RollingContact
 from solver.steady.fields import of_layers, under_load
@@ -128,15 +128,12 @@ class TrackBody:
 
     def left_by(self, found: Pass) -> Standing:
         """Return the state that a pass leaves."""
-        return self._seen(_RELEASED, of_layers(self.track, found.after), None)
+        return self._seen(_RELEASED, of_layers(self.track, found.law, found.after), None)
 
     def _seen(self, time: float, fields: TrackFields, touching: RollingContact | None) -> Standing:
         u, strain, inside, (above, at_surface) = fields
         strain = np.concatenate([strain, above], axis=1)
-        plastic = PlasticState(
-            np.concatenate([inside.plastic_strain, at_surface.plastic_strain], axis=1),
-            np.concatenate([inside.accumulated, at_surface.accumulated]),
-        )
+        plastic = inside.unpacked(np.concatenate([inside.packed, at_surface.packed], axis=1))
         stress = self.track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
         if self.way == -1:
             points, nodes = self.track.mirror
@@ -144,8 +141,7 @@ class TrackBody:
             points = np.concatenate([points, len(points) + uppermost])
             u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
             stress = stress[:, points] * _MIRRORED
-            plastic = plastic.at(points)
-            plastic = PlasticState(plastic.plastic_strain * _MIRRORED, plastic.accumulated)
+            plastic = plastic.at(points).mirrored
         response = Response(stress, np.zeros((4, 4, 0)), plastic, np.zeros(0, dtype=bool))
         return Standing(State(time, (u,), (plastic,), ()), response, touching)
 

@@ -18,8 +18,6 @@ from solver.model.model import ContactPair
 from solver.parameters import Accuracy, Poisson, Stress, check, described
 
 YieldCondition = Literal["mises", "tresca"]
-LINEAR = tuple(word for word, rule in HARDENING.all().items() if issubclass(rule, LinearRule))
-"""Rules of the closed-form law, which steady passes know."""
 _GROWING = tuple(word for word, rule in HARDENING.all().items() if issubclass(rule, GrowingRule))
 """Rules that go with Tresca's condition."""
 
@@ -83,9 +81,13 @@ class MaterialParameters(HardeningParameters):
             naming the parameter, if those of the rule are wrong or do not go with the yield
             condition
         """
+        rule = HARDENING.made(self.hardening, self)
+        elasticity = Elasticity(
+            youngs_modulus=self.youngs_modulus * stiffness, poisson_ratio=self.poisson_ratio
+        )
         if elastic:
-            return self.linear_material(stiffness, elastic=True)
-        rule, elasticity = HARDENING.made(self.hardening, self), self._elasticity(stiffness)
+            linear = rule if isinstance(rule, LinearRule) else NoHardening()
+            return linear.law(elasticity, math.inf)
         if self.yield_condition == "mises":
             return rule.law(elasticity, self.yield_stress)
         if not isinstance(rule, GrowingRule):
@@ -93,21 +95,6 @@ class MaterialParameters(HardeningParameters):
             raise ModelError("hardening", self.hardening, allowed)
         return TrescaMaterial(
             elasticity=elasticity, curve=rule.flow_curve(elasticity, self.yield_stress)
-        )
-
-    def linear_material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Material:
-        """Return the von Mises law with these constants and linear hardening, where there is any.
-
-        Steady passes know no other.
-        """
-        rule = HARDENING.made(self.hardening, self)
-        linear = rule if isinstance(rule, LinearRule) else NoHardening()
-        strength = math.inf if elastic else self.yield_stress
-        return linear.law(self._elasticity(stiffness), strength)
-
-    def _elasticity(self, stiffness: float) -> Elasticity:
-        return Elasticity(
-            youngs_modulus=self.youngs_modulus * stiffness, poisson_ratio=self.poisson_ratio
         )
 
 

@@ -163,7 +163,7 @@ class _Rolled:
         def check() -> Audit:
             assert found is not None
             way = ways[len(self._steps) - 1]
-            return audit_pass(side.half_plane.track, run.linear_material(), found, previous, way)
+            return audit_pass(side.half_plane.track, run.material(), found, previous, way)
 
         own = run.of_pass(max(len(self._steps) - 1, 0))
         moving = _moving(own, found.direction) if found and own.load != "contact" else None
@@ -173,7 +173,7 @@ class _Rolled:
             tractions=_tractions(own, side.half_plane.way),
             outcome=outcome,
             check=check,
-            notes=doubts({side.samples.view.profile_body: run.linear_material()}),
+            notes=doubts({side.samples.view.profile_body: run.material()}),
             source=OfPass(side.half_plane, found, moving, view.unloaded) if found else None,
         )
 

@@ -13,7 +13,6 @@ from solver.errors import ModelError
 from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import MOST_COLUMNS, window_elements
 from solver.parameters import Accuracy, by_accuracy, described
-from solver.scenes.material_parameters import LINEAR
 from solver.scenes.schedule import Schedule
 from solver.scenes.sequence import OF_A_PASS, block_of
 from solver.scenes.wheel_parameters import WheelParameters
@@ -124,9 +123,6 @@ class RollingParameters(WheelParameters):
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual}, or track a length")
-        for name, known in (("yield_condition", ("mises",)), ("hardening", LINEAR)):
-            if (value := getattr(self, name)) not in known:
-                raise ModelError(name, value, f"must be {' or '.join(known)}, or track a length")
         a, h = self.mesh_width, self.element_size
         if h > a / 2:
             allowed = f"must be at most {a / 2:.4g} mm, half the half-width that is meshed"

@@ -18,7 +18,6 @@ from solver.model.friction import effective_friction
 from solver.model.motion import Axle
 from solver.scenes.rolling_model import wheel_body
 from solver.steady import Rim, RollingWheel, rolling, track_of
-from solver.steady.passing import PARTS
 from solver.steady.search import search
 
 if TYPE_CHECKING:
@@ -37,11 +36,11 @@ _PARTS, _TOLERANCE = 4, 0.01
 
 
 def steady_passes(
-    parameters: RollingParameters, reach: float = 1.0, parts: int = PARTS
+    parameters: RollingParameters, reach: float = 1.0, parts: int | None = None
 ) -> Iterator[Pass]:
     """Yield the passes, on a window of so many times the usual size.
 
-    ``parts`` are the increments from one point of a row to the next.
+    ``parts`` are the increments from one point of a row to the next, None as many as usual.
     """
     p = parameters
     track = track_for(p, reach)
@@ -49,7 +48,7 @@ def steady_passes(
     made = {id(own): load_on(track, p, own) for own in block}
     loads = itertools.cycle(made[id(own)] for own in block)
     guess = _first_guess(p, reach)
-    yield from rolling(track, p.linear_material(), loads, p.directions, guess=guess, parts=parts)
+    yield from rolling(track, p.material(), loads, p.directions, guess=guess, parts=parts)
 
 
 def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
@@ -63,8 +62,8 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
         track = track_for(coarse, reach)
         with one_thread():
             found = search(
-                track, p.linear_material(), load_on(track, coarse, coarse.of_pass(0)),
-                track.rows.virgin, _first_guess(coarse, reach), parts=_PARTS,
+                track, p.material(), load_on(track, coarse, coarse.of_pass(0)),
+                track.rows.virgin(p.material()), _first_guess(coarse, reach), parts=_PARTS,
                 tolerance=_TOLERANCE,
             )  # fmt: skip
     except LimitLoad:
@@ -77,7 +76,7 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
 def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
     """Return the half-space, made once for all runs of a process with the same mesh."""
     p = parameters
-    return track_of(p.mesh_width, p.element_size, p.growth, p.linear_material().elasticity, reach)
+    return track_of(p.mesh_width, p.element_size, p.growth, p.material().elasticity, reach)
 
 
 def rim_of(parameters: RollingParameters) -> Rim:
@@ -104,7 +103,7 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
     p = parameters
     if p.load == "hertz":
         shear = p.friction * abs(p.traction) * p.peak_pressure
-        if (limit := too_much_shear(p.linear_material(), shear)) is not None:
+        if (limit := too_much_shear(p.material(), shear)) is not None:
             raise limit
         return track.hertz(p.peak_pressure, p.friction * p.traction, p.half_width)
     friction = effective_friction(p.friction)
@@ -113,7 +112,7 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
         rim_of(run),
         friction=p.friction_part,
         force=p.force,
-        strength=p.linear_material().shear_yield_stress,
+        strength=p.material().shear_yield_stress,
         drive=None if p.guided else p.traction * friction * p.force,
         creepage=1.0 if p.traction == 1.0 else p.given_creepage,
     )

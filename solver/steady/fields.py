@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from solver.materials.state import PlasticState
 from solver.tensors import SQRT2
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.materials.law import Law
+    from solver.materials.state import PlasticState
     from solver.steady.layers import Layers
     from solver.steady.passing import Pass
     from solver.steady.rows import FlowRows
@@ -32,16 +33,16 @@ class TrackFields(NamedTuple):
     surface: tuple[Array, PlasticState]
 
 
-def of_layers(track: Track, layers: Layers) -> TrackFields:
+def of_layers(track: Track, law: Law, layers: Layers) -> TrackFields:
     """Return the fields of a half-plane whose state is a function of depth alone."""
     rows, n = track.rows, track.part.weights.size
 
     def at(every: NDArray[np.int64], size: int, layers: Layers) -> tuple[Array, PlasticState]:
-        strain, plastic = np.zeros((4, size)), PlasticState.virgin(size)
+        strain, virgin = np.zeros((4, size)), law.initial(size, 4)
         strain[:, every] = layers.strain(track.elasticity).T[:, :, None]
-        plastic.plastic_strain[:, every] = layers.plastic_strain.T[:, :, None]
-        plastic.accumulated[every] = layers.accumulated[:, None]
-        return strain, plastic
+        packed = virgin.packed
+        packed[:, every] = layers.state.packed[:, :, None]
+        return strain, virgin.unpacked(packed)
 
     above = at(rows.above, len(rows.highest), layers.top)
     return TrackFields(_sunk(track, layers), *at(rows.every, n, layers), above)
@@ -49,32 +50,34 @@ def of_layers(track: Track, layers: Layers) -> TrackFields:
 
 def under_load(track: Track, found: Pass) -> TrackFields:
     """Return the fields while the load of a pass is there, which goes along +x."""
-    rows, before, after = track.rows, of_layers(track, found.before), found.after
+    rows, before, after = track.rows, of_layers(track, found.law, found.before), found.after
     grown = after.plastic_strain - found.before.plastic_strain
     u = track.operator.expand(found.loading.u, rows.force_behind(grown))
     added = track.part.strain(u)
     uppermost = np.moveaxis(added[:, rows.every[: 2 * rows.uppermost]], 0, 2)
-    strain, plastic = before.surface
+    strain, above = before.surface
     strain[:, rows.above] += np.moveaxis(rows.onto_surface(uppermost), 2, 0)
-    _pass(rows, rows.every, before.plastic, (found.plastic_strain, found.accumulated), after)
-    _pass(rows, rows.above, plastic, found.surface, after.top)
-    return before._replace(u=before.u + u, strain=before.strain + added)
+    return TrackFields(
+        before.u + u,
+        before.strain + added,
+        _passed(rows, rows.every, before.plastic, found.states, after),
+        (strain, _passed(rows, rows.above, above, found.surface, after.top)),
+    )
 
 
-def _pass(
+def _passed(
     rows: FlowRows,
     every: NDArray[np.int64],
-    plastic: PlasticState,
-    flow: tuple[Array, Array],
+    before: PlasticState,
+    flow: PlasticState,
     after: Layers,
-) -> None:
-    """Put into ``plastic`` what rows have gathered in the window, and have behind it."""
+) -> PlasticState:
+    """Return internal variables with what rows have in the window, and have behind it."""
     n = rows.shape[1]
-    inside, behind = every[:, :n], every[:, n + rows.ahead.shape[1] :]
-    plastic.plastic_strain[:, inside] = np.moveaxis(flow[0], 2, 0)
-    plastic.accumulated[inside] = flow[1]
-    plastic.plastic_strain[:, behind] = after.plastic_strain.T[:, :, None]
-    plastic.accumulated[behind] = after.accumulated[:, None]
+    packed = before.packed
+    packed[:, every[:, :n]] = flow.packed
+    packed[:, every[:, n + rows.ahead.shape[1] :]] = after.state.packed[:, :, None]
+    return before.unpacked(packed)
 
 
 def _sunk(track: Track, layers: Layers) -> Array:

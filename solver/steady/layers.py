@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.materials.elasticity import Elasticity
+    from solver.materials.state import PlasticState
 
     Array = NDArray[np.float64]
 
@@ -32,16 +33,24 @@ class Layers:
     ----------
     depth : (n,) of the rows of integration points, increasing [mm]
     thickness : (n,) that each row stands for [mm]
-    plastic_strain : (n, 4) Mandel
-    accumulated : (n,) equivalent plastic strain
+    state : internal variables of the law, of n points
     surface : the same at depth zero, of no thickness; None for that layer itself
     """
 
     depth: Array
     thickness: Array
-    plastic_strain: Array
-    accumulated: Array
+    state: PlasticState
     surface: Layers | None = None
+
+    @property
+    def plastic_strain(self) -> Array:
+        """Plastic strain (n, 4), Mandel."""
+        return np.ascontiguousarray(self.state.plastic_strain.T)
+
+    @property
+    def accumulated(self) -> Array:
+        """Accumulated plastic strain (n,)."""
+        return self.state.accumulated
 
     @property
     def top(self) -> Layers:
@@ -53,11 +62,12 @@ class Layers:
     def whole(self) -> Layers:
         """The layer at depth zero and those below, as one."""
         both = self.top, self
-        depth, thickness, plastic_strain, accumulated = (
+        depth, thickness = (
             np.concatenate([getattr(each, name) for each in both])
-            for name in ("depth", "thickness", "plastic_strain", "accumulated")
+            for name in ("depth", "thickness")
         )
-        return Layers(depth, thickness, plastic_strain, accumulated)
+        packed = np.concatenate([each.state.packed for each in both], axis=1)
+        return Layers(depth, thickness, self.state.unpacked(packed))
 
     def strain(self, elasticity: Elasticity) -> Array:
         """Return total strain (n, 4), Mandel."""
@@ -86,6 +96,5 @@ class Layers:
     @property
     def mirrored(self) -> Layers:
         """The same, seen along -x."""
-        seen = self.plastic_strain * [1.0, 1.0, 1.0, -1.0]
         surface = self.surface.mirrored if self.surface else None
-        return replace(self, plastic_strain=seen, surface=surface)
+        return replace(self, state=self.state.mirrored, surface=surface)

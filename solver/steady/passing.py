@@ -23,14 +23,15 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
-from solver.steady.flow import RowFlow
+from solver.steady.flow import RowFlow, usual_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from solver.materials.material import Material
+    from solver.materials.law import Law
+    from solver.materials.state import PlasticState
     from solver.steady.layers import Layers
     from solver.steady.load import AppliedLoad, PassingLoad
     from solver.steady.track import Track
@@ -42,8 +43,6 @@ TOLERANCE = 1e-4
 
 _FORCING = 0.1
 """Relative error with which Newton's equation is solved."""
-PARTS = 16
-"""Increments between two points of a row: the error is of first order in their length."""
 _KRYLOV, _MOST_KRYLOV = 60, 240
 """Most solves for one step of Newton's: at first, and where that is too few."""
 _STALLED = 0.98
@@ -68,31 +67,42 @@ class Pass:
 
     Attributes
     ----------
+    law : of the material
+    parts : increments between two points of a row
     before, after : state by depth, as the load sees it, which goes along +x
     strain : (n_rows, n_columns, 4) Mandel strain that the pass adds, at the points of the window
-    plastic_strain : (n_rows, n_columns, 4) there
-    accumulated : (n_rows, n_columns) there
-    surface : the same two (n, n_columns, ...) at the surface above the n uppermost rows
-    last_steps : multiplier (n_rows, n_columns) and direction (n_rows, n_columns, 4) of flow in the
-        last increment before each column
+    states : internal variables (..., n_rows, n_columns) there
+    ago : the same at the beginning of the last increment before each point
+    surface : internal variables (..., n, n_columns) at the surface above the n uppermost rows
     loading : the load on it
     left_over : largest deviatoric strain of the residual
     steps, solves : of Newton's method, of the stiffness
     direction : 1 if the load goes along +x, -1 if it goes back
     """
 
+    law: Law
+    parts: int
     before: Layers
     after: Layers
     strain: Array
-    plastic_strain: Array
-    accumulated: Array
-    surface: tuple[Array, Array]
-    last_steps: tuple[Array, Array]
+    states: PlasticState
+    ago: PlasticState
+    surface: PlasticState
     loading: AppliedLoad
     left_over: float
     steps: int
     solves: int
     direction: int = 1
+
+    @property
+    def plastic_strain(self) -> Array:
+        """Plastic strain (n_rows, n_columns, 4), Mandel."""
+        return np.moveaxis(self.states.plastic_strain, 0, 2)
+
+    @property
+    def accumulated(self) -> Array:
+        """Accumulated plastic strain (n_rows, n_columns)."""
+        return self.states.accumulated
 
     @property
     def gathered(self) -> float:
@@ -107,12 +117,12 @@ class Pass:
 
 def passing(
     track: Track,
-    material: Material,
+    material: Law,
     load: PassingLoad,
     before: Layers,
     guess: Array | None = None,
     *,
-    parts: int = PARTS,
+    parts: int | None = None,
     tolerance: float = TOLERANCE,
 ) -> Pass:
     """Return the steady pass of a load over a half-plane.
@@ -124,7 +134,7 @@ def passing(
     load : that passes
     before : state by depth
     guess : strains that a pass like this one adds
-    parts : increments between two points of a row
+    parts : increments between two points of a row, `usual_parts` if None
     tolerance : on the strain of the residual
 
     Raises
@@ -137,9 +147,10 @@ def passing(
         if no steady pass was found
     """
     rows, solve = track.rows, track.operator.solve
+    parts = parts or usual_parts(material)
     shape = (*rows.shape, 4)
     scale = np.sqrt(rows.weights)[..., None]
-    double_shear = 2 * material.shear_modulus
+    double_shear = 2 * material.elasticity.shear_modulus
     solves, krylov = 0, _KRYLOV
 
     def at(added: Array) -> _At:
@@ -159,15 +170,16 @@ def passing(
             flow = here.flow
             if flow.beyond:
                 raise WindowTooSmall(f"the window is too small {flow.beyond} for a steady pass")
-            plastic, total, top = flow.surface()
+            surface, top = flow.surface()
             return Pass(
+                law=material,
+                parts=parts,
                 before=before,
                 after=replace(flow.after, surface=top),
                 strain=here.added,
-                plastic_strain=flow.plastic,
-                accumulated=flow.total,
-                surface=(plastic, total),
-                last_steps=flow.last_steps,
+                states=flow.states,
+                ago=flow.ago,
+                surface=surface,
                 loading=here.loading,
                 left_over=left_over,
                 steps=step,
@@ -236,7 +248,7 @@ def _along(at: Callable[[Array], _At], here: _At, change: Array) -> _At:
     return tried[0] if tried[0].size < _AWAY * here.size else min(tried, key=lambda a: a.size)
 
 
-def _lost(material: Material, gathered: float) -> NotConverged:
+def _lost(material: Law, gathered: float) -> NotConverged:
     """Return that Newton's method was led to this plastic strain, and found no pass there."""
     if not material.hardens:
         return LimitLoad("plastic strain grows without bound in a steady pass")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 from solver.linear.threads import one_thread
-from solver.steady.passing import PARTS, TOLERANCE
+from solver.steady.passing import TOLERANCE
 from solver.steady.search import search
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from solver.materials.material import Material
+    from solver.materials.law import Law
     from solver.steady.layers import Layers
     from solver.steady.load import PassingLoad
     from solver.steady.passing import Pass
@@ -61,12 +61,12 @@ class Expected:
 
 def rolling(
     track: Track,
-    material: Material,
+    material: Law,
     load: PassingLoad | Iterable[PassingLoad],
     directions: Iterable[int],
     *,
     guess: Array | None = None,
-    parts: int = PARTS,
+    parts: int | None = None,
 ) -> Iterator[Pass]:
     """Yield the passes of a load over a track that begins without plastic strain.
 
@@ -77,7 +77,7 @@ def rolling(
     load : as it goes along +x; one for all passes, or one for each
     directions : for each pass, 1 along +x, -1 back
     guess : strains (n_rows, n_columns, 4) that the first pass adds, as a coarser mesh has them
-    parts : increments between two points of a row
+    parts : increments between two points of a row, as many as usual if None
 
     Raises
     ------
@@ -92,7 +92,7 @@ def rolling(
         raise ModelError(
             "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
-    state: Layers = track.rows.virgin
+    state: Layers = track.rows.virgin(material)
     expected: dict[tuple[int, int], Expected] = {}
     loads = load if isinstance(load, Iterable) else itertools.repeat(load)
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):

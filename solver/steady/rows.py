@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
+    from solver.materials.law import Law
     from solver.steady.condensed import CondensedTrack
 
     Array = NDArray[np.float64]
@@ -45,8 +46,8 @@ class FlowRows:
     points : (n_rows, n_columns) their numbers
     ahead, behind : (n_rows, n) numbers of the points before and behind the window, on these rows
     shape : n_rows, n_columns
+    depth : (n_rows,) increasing [mm]
     uppermost : number of the rows that lie nearest to the surface
-    virgin : the state before any load
     weights : (n_rows, n_columns) volume of the points [mm3]
     """
 
@@ -70,12 +71,9 @@ class FlowRows:
         self.weights = part.volumes[points]
         n_rows = len(points)
         length = self._length(points)
-        self.uppermost = k = 2 if interleaved else 1
-        depth = -part.points[1].ravel()[points[:, 0]]
-        nothing = np.zeros(n_rows), np.zeros((n_rows, 4))
-        surface = Layers(nothing[0][:k], nothing[0][:k], nothing[1][:k], nothing[0][:k])
-        thickness = self.weights.sum(axis=1) / length
-        self.virgin = Layers(depth, thickness, nothing[1], nothing[0], surface)
+        self.uppermost = 2 if interleaved else 1
+        self.depth = -part.points[1].ravel()[points[:, 0]]
+        self._thickness = self.weights.sum(axis=1) / length
         self.ahead = _in_rows(part, shallow & (middle[0] > ahead), deep, interleaved)
         self.behind = downstream = _in_rows(
             part, shallow & (middle[0] < -behind), deep, interleaved
@@ -92,6 +90,12 @@ class FlowRows:
         self._behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
         # it acts on the boundary of the window alone
         self._force_behind = sparse.csr_array(operator.condense(self._behind.toarray()))
+
+    def virgin(self, law: Law) -> Layers:
+        """Return the state before any load."""
+        k = self.uppermost
+        surface = Layers(np.zeros(k), np.zeros(k), law.initial(k, 4))
+        return Layers(self.depth, self._thickness, law.initial(len(self.depth), 4), surface)
 
     @property
     def every(self) -> NDArray[np.int64]:
@@ -114,7 +118,7 @@ class FlowRows:
         ``n`` is the number of the uppermost rows.
         """
         k = self.uppermost
-        near, far = self.virgin.depth[0], self.virgin.depth[k]
+        near, far = self.depth[0], self.depth[k]
         return np.asarray((far * values[:k] - near * values[k : 2 * k]) / (far - near))
 
     def _length(self, points: NDArray[np.int64]) -> float:

@@ -13,14 +13,14 @@ until it does; more than 30 % of plastic strain in a pass counts as the limit lo
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, WindowTooSmall
-from solver.steady.passing import PARTS, TOLERANCE, passing
+from solver.materials.material import Material
+from solver.steady.passing import TOLERANCE, passing
 from solver.steady.touching import RollingContact
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.materials.material import Material
+    from solver.materials.law import Law
     from solver.steady.layers import Layers
     from solver.steady.load import PassingLoad
     from solver.steady.passing import Pass
@@ -54,12 +54,12 @@ _PARTS, _TOLERANCE = 8, 2e-3
 
 def search(
     track: Track,
-    material: Material,
+    material: Law,
     load: PassingLoad,
     before: Layers,
     guess: Array | None = None,
     *,
-    parts: int = PARTS,
+    parts: int | None = None,
     tolerance: float = TOLERANCE,
 ) -> Pass:
     """Return the steady pass that `passing` finds, from the guess or from another one.
@@ -75,10 +75,14 @@ def search(
         return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
 
     def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass:
-        harder = replace(material, hardening="kinematic", hardening_ratio=ratio)
-        return passing(track, harder, load, before, guess, parts=_PARTS, tolerance=_TOLERANCE)
+        return passing(
+            track, _linear(material, ratio), load, before, guess, parts=_PARTS, tolerance=_TOLERANCE
+        )
 
-    own, largest = (material.hardening_ratio, np.inf) if material.hardens else (0.0, _LARGE)
+    own = 0.0
+    if isinstance(material, Material) and material.hardens:
+        own = material.hardening_ratio
+    largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
     if isinstance(found, NoContact):  # an elastic track makes another contact than it will have
         found = _approached(exactly, load.driven, _LIGHTER, None, found)
@@ -102,6 +106,17 @@ def search(
     if found.gathered > largest:
         raise _too_much(own)
     return found
+
+
+def _linear(law: Law, ratio: float) -> Material:
+    """Return a material that yields where the law does first, and hardens by this ratio."""
+    return Material(
+        youngs_modulus=law.elasticity.youngs_modulus,
+        poisson_ratio=law.elasticity.poisson_ratio,
+        yield_stress=law.yield_stress,
+        hardening="kinematic",
+        hardening_ratio=ratio,
+    )
 
 
 def _too_much(ratio: float) -> LimitLoad:

@@ -8,11 +8,58 @@ Mises with linear isotropic and kinematic hardening, on deviators: plastic strai
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 
 from solver.materials.radial_return import SQRT23
+from solver.materials.state import PlasticState
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.material import Material
+
+    Array = NDArray[np.float64]
+
+
+class CompiledFlow:
+    """Material of linear hardening on its way along rows; see `solver.steady.flow.Flow`."""
+
+    def __init__(self, law: Material, strain: Array, start: PlasticState, parts: int) -> None:
+        rule, elasticity = law.hardening_rule, law.elasticity
+        double_shear = 2 * elasticity.shear_modulus
+        self._law = np.array(
+            [
+                double_shear,
+                double_shear + rule.prager_modulus,
+                rule.isotropic_modulus,
+                double_shear + 2 / 3 * rule.modulus,
+                rule.yield_stress,
+            ]
+        )
+        before = np.ascontiguousarray(start.plastic_strain.T), start.accumulated
+        plastic, total, self._path = flow(strain, *before, self._law, parts)
+        ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
+        left, gathered, *self._closing = close(*ends, self._law, elasticity.bulk_modulus)
+        self.states = PlasticState(np.moveaxis(plastic, 2, 0), total)
+        self.after = PlasticState(left.T, gathered)
+
+    @property
+    def ago(self) -> PlasticState:
+        """Internal variables at the beginning of the last increment before each column."""
+        last = self._path[:, :, -1]
+        flowed = np.moveaxis(last[..., 4, None] * last[..., :4], 2, 0)
+        return PlasticState(
+            self.states.plastic_strain - flowed, self.states.accumulated - SQRT23 * last[..., 4]
+        )
+
+    def along(self, added: Array) -> tuple[Array, Array]:
+        """Return the changes of plastic strain for a change of the strains."""
+        plastic, total = flow_along(added, self._law, self._path)
+        ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
+        return plastic, close_along(*ends, self._law, *self._closing)
 
 
 @njit(cache=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -71,6 +71,7 @@ class Centred(PlasticState):
     """Remembers the centre of its yield surface (n_components, n_points) [MPa]."""
 
     centre: np.ndarray
+    TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain", "centre")
 
 
 @dataclass(frozen=True)

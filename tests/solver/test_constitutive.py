@@ -52,6 +52,28 @@ def test_tangent_matches_central_difference(law, n_components):
 
 
 @every_law
+def test_seen_along_minus_x_a_law_responds_with_the_mirror_image(law, n_components):
+    """Steady passes back over a track need it of all internal variables."""
+    strain, state = random_history(law, n_components)
+    turn = np.where(np.isin(np.arange(n_components), (3, 5)), -1.0, 1.0)[:, None]  # xy, zx
+    here, there = law.respond(strain, state), law.respond(turn * strain, state.mirrored)
+    np.testing.assert_allclose(there.stress, turn * here.stress, atol=1e-6)
+    np.testing.assert_allclose(there.state.mirrored.packed, here.state.packed, atol=1e-6)
+
+
+@every_law
+def test_internal_variables_come_out_of_one_array_as_they_went_in(law, n_components):
+    _, state = random_history(law, n_components, n_points=5)
+    other = law.initial(5, n_components).unpacked(state.packed)
+    for name in (f.name for f in fields(state)):
+        np.testing.assert_array_equal(getattr(other, name), getattr(state, name))
+    square = state.packed[:, :4].reshape(-1, 2, 2)
+    assert state.unpacked(square).accumulated.shape == (2, 2)
+    np.testing.assert_array_equal(state.unpacked(square).packed, square)
+    np.testing.assert_array_equal(state.packed[:n_components], state.plastic_strain)
+
+
+@every_law
 def test_a_tangent_is_symmetric_where_the_law_says_so(law, n_components):
     strain, state = random_history(law, n_components)
     tangent = law.respond(strain, state).tangent

@@ -224,7 +224,7 @@ def test_a_law_stands_alone() -> None:
 def endless(law: FrictionLaw) -> Any:
     """Return the first pass of a wheel that is driven by half of Coulomb's full slip."""
     p = RollingParameters(element_size=2.0, friction=0.3, load_ratio=3.0)
-    material = p.linear_material()
+    material = p.material()
     track = track_of(p.mesh_width, p.element_size, 1.15, material.elasticity)
     wheel = RollingWheel(
         track, rim_of(p), friction=law, force=p.force, strength=material.shear_yield_stress,

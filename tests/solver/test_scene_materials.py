@@ -21,7 +21,6 @@ from solver.materials import (
 )
 from solver.materials.hardening_rules import HARDENING
 from solver.scenes.punch import PunchParameters
-from solver.scenes.rolling_parameters import RollingParameters
 from tests.architecture.sources import ROOT
 
 CURVE = ((0.0, 350.0), (0.002, 420.0), (0.02, 480.0))
@@ -107,14 +106,6 @@ def test_what_does_not_go_together_is_refused(
     with pytest.raises(ModelError, match=words) as refusal:
         PunchParameters(**wrong)
     assert refusal.value.field == field
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_steady_passes_refuse_what_they_do_not_know(name: str) -> None:
-    own = LAWS[name]
-    with pytest.raises(ModelError, match="or track a length") as refusal:
-        RollingParameters(**(own | {"curve": ((0.0, 502.0), (0.01, 520.0))}))
-    assert refusal.value.field in own
 
 
 @pytest.mark.solves

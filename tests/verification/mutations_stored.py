@@ -273,7 +273,7 @@ def lost_at_a_branch(*names: str) -> Fault:
 
 def no_inflow(old: Any) -> Any:
     def virgin(track: Any, material: Any, load: Any, before: Any, *rest: Any, **how: Any) -> Any:
-        return old(track, material, load, track.rows.virgin, *rest, **how)
+        return old(track, material, load, track.rows.virgin(material), *rest, **how)
 
     return virgin
 

@@ -47,13 +47,13 @@ class SteadyIncrement:
 
     def __init__(self, reach: float = 1.0, tolerance: float = 1e-6, **fields: object) -> None:
         self.parameters = p = RollingParameters(**fields)
-        self.material = p.linear_material()
+        self.material = p.material()
         elasticity = self.material.elasticity
         self.track = Track(
             p.mesh_width, p.element_size, p.growth, elasticity, reach=reach, interleaved=True
         )
         self.rim = rim_of(p)
-        virgin, load = self.track.rows.virgin, load_on(self.track, p, p)
+        virgin, load = self.track.rows.virgin(self.material), load_on(self.track, p, p)
         self.found = passing(self.track, self.material, load, virgin, parts=1, tolerance=tolerance)
         self.arc = (1 - self.found.loading.creepage) * p.element_size
         """By which the wheel turns."""
@@ -130,13 +130,11 @@ class SteadyIncrement:
         """
         found, rows = self.found, self.track.rows
         plastic = under_load(self.track, found).plastic
-        upstream = np.concatenate(
-            [found.before.plastic_strain[:, None], found.plastic_strain[:, :-1]], axis=1
+        packed = plastic.packed
+        packed[:, rows.points] = np.concatenate(
+            [found.before.state.packed[..., None], found.states.packed[..., :-1]], axis=2
         )
-        plastic.plastic_strain[:, rows.points] = np.moveaxis(upstream, 2, 0)
-        plastic.accumulated[rows.points] = np.concatenate(
-            [found.before.accumulated[:, None], found.accumulated[:, :-1]], axis=1
-        )
+        plastic = plastic.unpacked(packed)
         u = self.unknowns(1)
         virgin = self.system.parts[0].virgin()
         return State(0.0, u, (virgin, plastic), (self._contact(u, from_touch=from_touch),))
@@ -169,4 +167,4 @@ class SteadyIncrement:
         """Return 2 G |change of plastic strain| against the pass, the largest component [MPa]."""
         after = increment.state.plastic[1].plastic_strain[:, self.track.rows.points]
         change = np.moveaxis(after, 0, 2) - self.found.plastic_strain
-        return 2 * self.material.shear_modulus * float(np.abs(change).max())
+        return 2 * self.material.elasticity.shear_modulus * float(np.abs(change).max())

@@ -122,10 +122,10 @@ def test_the_derivative_of_the_flow_is_that_of_differences():
     step = 1e-6
 
     def force(strain):
-        return RowFlow(rows, material, rows.virgin, strain, 4).force
+        return RowFlow(rows, material, rows.virgin(material), strain, 4).force
 
     differences = (force(loaded + step * change) - force(loaded - step * change)) / (2 * step)
-    exact = RowFlow(rows, material, rows.virgin, loaded, 4).along(change)
+    exact = RowFlow(rows, material, rows.virgin(material), loaded, 4).along(change)
     assert np.linalg.norm(exact - differences) < 1e-4 * np.linalg.norm(differences)
 
 

@@ -40,7 +40,7 @@ def wheel(pressure=4.7, size=2.0, share=0.0, friction=FRICTION, creepage=None, h
         friction=friction,
         hardening=hardening,
     )
-    material = parameters.linear_material()
+    material = parameters.material()
     place = track_of(A, size, 1.15, material.elasticity)
     drive = share * friction * parameters.force if creepage is None and friction else None
     load = RollingWheel(

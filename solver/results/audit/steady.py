@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.materials.radial_return import SQRT23
-from solver.materials.state import PlasticState, Response
+from solver.materials.state import Response
 from solver.results.audit.plain import PlainBody, load_factor
 from solver.results.audit.recomputed import Acting
 from solver.results.audit.report import (
@@ -30,7 +30,8 @@ from solver.steady.passing import TOLERANCE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.materials.material import Material
+    from solver.materials.law import Law
+    from solver.materials.state import PlasticState
     from solver.model.motion import TravellingPressure
     from solver.results.audit.recomputed import BodyFields
     from solver.results.steady import TrackBody
@@ -46,7 +47,7 @@ _LIMITS = {
 
 
 def audit_pass(
-    track: Track, material: Material, found: Pass, previous: Pass | None, direction: int
+    track: Track, material: Law, found: Pass, previous: Pass | None, direction: int
 ) -> Audit:
     """Check a steady pass: the state under load, what it leaves, and how material came there.
 
@@ -56,7 +57,7 @@ def audit_pass(
     direction : its way along x, as declared
     """
     plain, C = PlainBody(track.part), material.stiffness(4)
-    loaded, left = under_load(track, found), of_layers(track, found.after)
+    loaded, left = under_load(track, found), of_layers(track, material, found.after)
     stress, residual = (C @ (f.strain - f.plastic.plastic_strain) for f in (loaded, left))
     load = found.loading.force.reshape(-1, 2)
     held = np.ones_like(load, dtype=bool)
@@ -67,13 +68,15 @@ def audit_pass(
     figures = {
         "audit_residual": float(np.linalg.norm(lacking[~held])) / level,
         "audit_reactions": _largest(abs((load + np.where(held, lacking, 0)).sum(axis=0))) / level,
-        "audit_law": way.misfit() / material.yield_stress,
+        "audit_law": max(way.misfit(), way.retraced()) / material.yield_stress,
         "audit_yield": way.beyond() / material.yield_stress,
         "audit_dissipation": way.dissipation(),
         "audit_history": way.lost(previous, direction),
         "audit_inflow": way.inflow(),
         "audit_outflow": way.outflow(),
-        "audit_steadiness": 2 * material.shear_modulus * found.left_over / material.yield_stress,
+        "audit_steadiness": (
+            2 * material.elasticity.shear_modulus * found.left_over / material.yield_stress
+        ),
         "audit_contact_after_unloading": float(np.linalg.norm(plain.forces(residual)[~held])),
         "audit_error_loaded": estimated_error([(track.part, stress)]),
         "audit_error_residual": estimated_error([(track.part, residual)]),
@@ -99,18 +102,13 @@ def _strain(track: Track, found: Pass) -> Strained:
 class _Way:
     """The way of material through the window: at each column, the last increment before it."""
 
-    def __init__(self, track: Track, material: Material, found: Pass) -> None:
-        self._material, self._found = material, found
-        strain = found.before.strain(track.elasticity)[:, None] + found.strain
-        self._strain = np.moveaxis(strain, 2, 0).reshape(4, -1)
-        self._after = PlasticState(
-            np.moveaxis(found.plastic_strain, 2, 0).reshape(4, -1), found.accumulated.ravel()
-        )
-        multiplier, direction = found.last_steps
-        flow = np.moveaxis(multiplier[..., None] * direction, 2, 0).reshape(4, -1)
-        self._before = PlasticState(
-            self._after.plastic_strain - flow,
-            self._after.accumulated - SQRT23 * multiplier.ravel(),
+    def __init__(self, track: Track, material: Law, found: Pass) -> None:
+        self._material, self._found, self._elasticity = material, found, track.elasticity
+        at_rest = found.before.strain(track.elasticity)[:, None]
+        self._at_rest = np.moveaxis(at_rest, 2, 0)
+        self._strain = np.moveaxis(at_rest + found.strain, 2, 0).reshape(4, -1)
+        self._after, self._before = (
+            each.unpacked(_flat(each.packed)) for each in (found.states, found.ago)
         )
         self._stress = material.stiffness(4) @ (self._strain - self._after.plastic_strain)
 
@@ -118,6 +116,45 @@ class _Way:
         """Return how far the increments are from the law [MPa]."""
         off = self._material.misfit(self._strain, self._stress, self._before, self._after)
         return _largest(off)
+
+    def retraced(self) -> float:
+        """Return how far states are from those that the law gives, from column to column [MPa].
+
+        The law is asked for all increments to each column, from the state at the one upstream;
+        that at the first one begins with what was there before the pass, and what is left begins
+        with the state at the last one, in one increment.
+        """
+        found, law = self._found, self._material
+        states = found.states.packed
+        strain = self._strain.reshape(4, *states.shape[1:])
+        before = np.concatenate([found.before.state.packed[..., None], states], axis=2)
+        first = _flat(np.concatenate([self._at_rest, strain[..., :-1]], axis=2))
+        state = self._after.unpacked(_flat(before[..., :-1]))
+        for part in range(1, found.parts + 1):
+            share = part / found.parts
+            state = law.respond(first + share * (self._strain - first), state).state
+        last = found.before.state.unpacked(before[..., -1])
+        left = law.respond(found.after.strain(self._elasticity).T, last)
+        across = float(np.abs(left.stress[[1, 3]]).max())
+        return max(
+            across, self._apart(self._after, state), self._apart(found.after.state, left.state)
+        )
+
+    def _apart(self, one: PlasticState, other: PlasticState) -> float:
+        """Return the largest difference of internal variables, as stress [MPa].
+
+        Strain counts times 2 G, any other variable as a share of its largest value.
+        """
+        double_shear, worst = 2 * self._material.elasticity.shear_modulus, []
+        for name in (f.name for f in fields(one)):
+            values, others = getattr(one, name), getattr(other, name)
+            off = float(np.abs(values - others).max(initial=0.0))
+            if name in ("plastic_strain", "accumulated"):
+                worst.append(off * double_shear)
+            elif off:
+                size = max(np.abs(values).max(), np.abs(others).max())
+                worst.append(off / float(size) * self._material.yield_stress)
+        return float(np.max(worst))
 
     def beyond(self) -> float:
         """Return the stress beyond yield [MPa]."""
@@ -132,20 +169,18 @@ class _Way:
     def lost(self, previous: Pass | None, direction: int) -> float:
         """Return how far the state before the pass is from that which the last one left.
 
-        It is a difference of plastic strain, times 2 G / yield stress. Seen along the other way
+        It is the largest difference of internal variables / yield stress. Seen along the other way
         shear has the other sign.
         """
         found = self._found
-        before = found.before.whole
-        strain, flow = np.zeros_like(before.plastic_strain), np.zeros_like(before.accumulated)
-        if previous is not None:
-            left = previous.after.whole
-            seen = 1.0 if previous.direction == direction else -1.0
-            strain, flow = left.plastic_strain * [1.0, 1.0, 1.0, seen], left.accumulated
-        off = np.append(np.abs(before.plastic_strain - strain), np.abs(before.accumulated - flow))
-        double_shear = 2 * self._material.shear_modulus
+        before = found.before.whole.state
+        if previous is None:
+            left = self._material.initial(len(before.accumulated), 4)
+        else:
+            left = previous.after.whole.state
+            left = left if previous.direction == direction else left.mirrored
         turned = float(found.direction != direction)
-        return max(turned, _largest(off) * double_shear / self._material.yield_stress)
+        return max(turned, self._apart(before, left) / self._material.yield_stress)
 
     def inflow(self) -> float:
         """Return the plastic strain gathered in the first column / that of the pass."""
@@ -160,8 +195,13 @@ class _Way:
     @property
     def _gathered(self) -> float:
         """The most plastic strain that the pass gathers, or what is nothing to speak of."""
-        yield_strain = self._material.yield_stress / self._material.youngs_modulus
+        yield_strain = self._material.yield_stress / self._elasticity.youngs_modulus
         return max(LEAST * yield_strain, self._found.gathered)
+
+
+def _flat(values: Array) -> Array:
+    """Return values (n, n_points) of points in rows (n, n_rows, n_columns)."""
+    return values.reshape(len(values), -1)
 
 
 def _largest(values: Array) -> float:
@@ -169,15 +209,12 @@ def _largest(values: Array) -> float:
     return float(np.maximum(values.max(), 0.0))
 
 
-def _of_contact(material: Material, found: Pass) -> dict[str, float]:
+def _of_contact(material: Law, found: Pass) -> dict[str, float]:
     """Return the figures of the contact with a wheel, none without a wheel."""
     touching = found.loading
     if not isinstance(touching, RollingContact):
         return {}
-    strength = float(
-        material.shear_strength(PlasticState(found.after.plastic_strain.T, found.after.accumulated))
-        .max()
-    )  # fmt: skip
+    strength = float(material.shear_strength(found.after.state).max())
     return {
         "audit_tension": _largest(-touching.normal),
         "audit_friction_excess": _largest(

@@ -136,7 +136,7 @@ class PassFields:
             return np.zeros(1), stress[:, None], total[:, None]
         before = self._layered(found.before.plastic_strain)[:, None]
         stress = self._stress(before + found.strain, found.plastic_strain)
-        k = len(found.surface[1])
+        k = len(found.surface.accumulated)
         unknown = np.full((k, *stress.shape[1:]), np.nan)
         x = self._track.part.points.reshape(2, -1)[0, self._track.rows.points[0]]
         total = np.concatenate([unknown[..., 0], found.accumulated])

@@ -134,7 +134,7 @@ def _positions(passed: Passed) -> np.ndarray:
 def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far stress and plastic strain are from the law, where material flows."""
     p, run = passed.parameters, passed.run
-    a, material = p.mesh_width, p.linear_material()
+    a, material = p.mesh_width, p.material()
     x, y = _positions(passed)
     x = x * passed.parameters.directions[len(passed.record.coordinates["pass"]) - 1]
     inside = (x < AHEAD * a) & (x > -BEHIND * a) & (y > -DEEP * a)
