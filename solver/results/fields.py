@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_MOST = 16
-"""Results of the last states that are kept."""
+_MOST = 8
+"""Values of the last states that are kept."""
 T = TypeVar("T")
 
 
@@ -93,14 +93,17 @@ class SystemFields:
     def __init__(self, system: Bodies) -> None:
         self.system = system
         self.recovery = cache(system.recovery)
-        self.at_nodes = kept(self._at_nodes)
+        self._at_nodes: Remembered[BodyValues] = Remembered()
 
     def recovered(self, body: str, points: Array) -> Array:
         """Return nodal values (..., n_nodes) of point values (..., n_points)."""
         return np.asarray((self.recovery(body) @ points.T).T)
 
-    def _at_nodes(self, at: Solved, body: str) -> BodyValues:
+    def at_nodes(self, at: Solved, body: str) -> BodyValues:
         """Return the fields at the nodes of a body."""
+        return self._at_nodes.of(at, body, lambda: self._recovered(at, body))
+
+    def _recovered(self, at: Solved, body: str) -> BodyValues:
         response = self.system.response(body, at)
         return BodyValues(
             displacement=self.system.displacement(body, at.state).reshape(-1, 2).T,
@@ -129,16 +132,18 @@ def interpolated(sampler: Sampler, values: BodyValues, name: str) -> Array:
     return not_below_zero(found) if name in _POSITIVE else found
 
 
-def kept(of: Callable[..., T]) -> Callable[..., T]:
-    """Return a function of a state, and of words, that keeps its values of the last states."""
-    known: dict[tuple[Any, ...], tuple[Any, T]] = {}
+class Remembered(Generic[T]):
+    """Values of the last states, each computed once."""
 
-    def found(at: Any, *rest: Any) -> T:
-        key = (id(at), *rest)
-        if key not in known:
-            while len(known) >= _MOST:
-                del known[next(iter(known))]
-            known[key] = at, of(at, *rest)  # a state that is kept keeps its identity
-        return known[key][1]
+    def __init__(self) -> None:
+        self._known: dict[tuple[Any, ...], tuple[State, T]] = {}
 
-    return found
+    def of(self, at: Solved, name: str, make: Callable[[], T]) -> T:
+        """Return the value of this name in a state; ``make`` computes it."""
+        key = (id(at.state), name)
+        if key not in self._known:
+            while len(self._known) >= _MOST:
+                del self._known[next(iter(self._known))]
+            # a state that is held keeps its identity; the tangents beside it would take much room
+            self._known[key] = at.state, make()
+        return self._known[key][1]

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.fem.wheel import Wheel
 from solver.results.contact_result import ContactResult, contact_result
-from solver.results.fields import kept
+from solver.results.fields import Remembered
 from solver.results.view import ALONG_X, Axis
 
 if TYPE_CHECKING:
@@ -56,11 +56,13 @@ class PairTractions:
         self._symmetric = symmetric
         self._axis = axis
         self._goes_on = system.interfaces[0].slave_surface.goes_on
-        self.points = kept(self._points)
+        self._points: Remembered[ContactResult] = Remembered()
 
-    def _points(self, converged: Converged) -> ContactResult:
+    def points(self, converged: Converged) -> ContactResult:
         """See `SurfaceTractions`."""
-        return contact_result(self._system, converged).along(self._axis)
+        return self._points.of(
+            converged, "", lambda: contact_result(self._system, converged).along(self._axis)
+        )
 
     def along(self, converged: Converged, x: Array) -> tuple[Array, Array, Array]:
         """See `SurfaceTractions`."""

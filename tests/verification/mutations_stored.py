@@ -368,7 +368,7 @@ def at_nodes_times(name: str, factor: float) -> Fault:
 
         return other
 
-    return instead(SystemFields, "_at_nodes", make)
+    return instead(SystemFields, "_recovered", make)
 
 
 # -- contact --------------------------------------------------------------------------------------
