@@ -162,12 +162,11 @@ class Candidates:
         """Return the contact states after an increment over ``span`` of time."""
         after = self.states(before, self.forces, self.status)
         moved = np.abs(self.motion[self.n :]) if len(self.motion) > self.n else np.zeros(self.n)
-        moved, first, out = np.where(self.status == OPEN, 0.0, moved), 0, []
-        each = zip(before, after, self.vertices, self.gaps, self.slips, strict=True)
-        for old, new, at, gap, slip in each:
+        moved, out = np.where(self.status == OPEN, 0.0, moved), []
+        each = zip(before, after, self.vertices, self.places, self.gaps, self.slips, strict=True)
+        for old, new, at, here, gap, slip in each:
             slipped = old.slipped.copy()
-            slipped[at] += moved[first : first + len(at)]
-            first += len(at)
+            slipped[at] += moved[here]
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
             rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
