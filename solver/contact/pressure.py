@@ -14,16 +14,15 @@ if TYPE_CHECKING:
 
 
 def contact_pressure(
-    system: System, state: State, interface: int, *, deformed: bool = False
+    system: System, state: State, interface: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return pressure and shear on the slave's vertices (n,) [MPa]: means under each hat.
 
     The multiplier field is piecewise linear. Its means under the hats have the same resultant as
     its values at the vertices, without the oscillation of these next to a sharp corner.
 
-    Over the area before loading they are what the stress of the slave, whose strains are small,
-    balances. Over the ``deformed`` area, which both surfaces share, they do not depend on which
-    of them is the slave. The two are one under small sliding.
+    They are over the area before loading: what the stress of the slave, whose strains are small,
+    balances.
     """
     contact, chain = state.contacts[interface], system.interfaces[interface].slave_surface
     pairing = system.pairing(state, interface)
@@ -39,9 +38,5 @@ def contact_pressure(
     mass += np.diag(cross, 1) + np.diag(cross, -1)
     total = mass.sum(axis=1)
     smooth = mass / np.where(total > 0, total, 1.0)[:, None]
-    if deformed:
-        known = pairing.deformed > 0
-        shrunk = np.divide(pairing.area, pairing.deformed, out=np.ones_like(safe), where=known)
-        smooth = shrunk[:, None] * smooth
     pressure, shear = contact.normal / safe, contact.tangential / safe
     return smooth @ pressure, smooth @ shear

@@ -54,7 +54,7 @@ def spent(system: System, state: State) -> str:
     """Return a hint on the pairs whose friction was almost spent in the last equilibrium."""
     found = []
     for k, (interface, contact) in enumerate(zip(system.interfaces, state.contacts, strict=True)):
-        pairing = interface.pairing(state.u, state.time, finite=contact.finite)
+        pairing = system.pairing(state, k)
         lines = system.bound(k, pairing, state, state.time).over(pairing.area)
         most = float(lines.least(contact.normal)[contact.normal > 0].sum())
         share = abs(float(contact.tangential.sum())) / most if most > 0 else 0.0

@@ -31,7 +31,8 @@ class ContactResult:
     pressure : (n,) over the area before loading, to which the stress of the body refers [MPa]
     shear : (n,) that the slave exerts on the master along s, over the same area [MPa]. Between a
         lower and an upper body it is that on the lower one along x, whichever is the slave
-    pressure_deformed : (n,) over the deformed area, which both surfaces share [MPa]
+    pressure_deformed : (n,) over the deformed area, which both surfaces share: it does not depend
+        on which of them is the slave. Under small sliding it is ``pressure`` [MPa]
     gap : (n,) NaN where no master faces the slave [mm]
     slip : (n,) of the slave on the master along s [mm]
     closed : (n,) whether the bodies touch
@@ -75,8 +76,9 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
     chain = interface.slave_surface
     X = chain.X[:, chain.vertices]
     pressure, shear = contact_pressure(system, state, pair)
-    deformed, _ = contact_pressure(system, state, pair, deformed=True)
     pairing = system.pairing(state, pair)
+    known = pairing.deformed > 0
+    shrunk = np.divide(pairing.area, pairing.deformed, out=np.ones_like(pressure), where=known)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
     closed = contact.normal > 0
     return ContactResult(
@@ -84,7 +86,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
         X=X,
         pressure=pressure,
         shear=-shear,
-        pressure_deformed=deformed,
+        pressure_deformed=shrunk * pressure,
         gap=gap,
         slip=np.where(np.isfinite(gap), interface.slip(pairing, state.u), np.nan),
         closed=closed,

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.results.fields import Bodies, Solved
+    from solver.results.fields import Solved, SystemFields
 
     Array = NDArray[np.float64]
     Nodes = NDArray[np.int64]
@@ -63,18 +63,14 @@ class MeshFields:
         return np.vstack(faces), np.concatenate(numbers)
 
 
-def mesh_fields(system: Bodies, states: Mapping[str, Solved]) -> MeshFields:
+def mesh_fields(fields: SystemFields, states: Mapping[str, Solved]) -> MeshFields:
     """Return the fields of all bodies in the given states.
 
     Parameters
     ----------
     states : the state at each stage
     """
-    from solver.results.fields import SystemFields  # only who computes needs scipy
-
-    fields = SystemFields(system)
-
-    wholes = {name: system.full(name) for name in system.names}
+    wholes = {name: fields.system.full(name) for name in fields.system.names}
     bodies, first = {}, 0
     for name, whole in wholes.items():
         cells = _turned_left(whole.basis.element_dofs.T, whole.X)

@@ -45,9 +45,9 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
     system: Any = run.system
     fields = run.samples.fields
     states: list[Any] = [state for state, _ in run.stages]
-    results = [
-        [contact_result(system, at, k) for at in states] for k in range(len(places.contacts))
-    ]
+    stored = bool(places.samples) or any(number.contact for number in places.numbers)
+    names = places.contacts if stored else ()
+    results = [[contact_result(system, at, k) for at in states] for k in range(len(names))]
     out: dict[Any, Any] = {}
     if places.lines:
         out |= along_lines(fields, places.lines, states)
@@ -58,6 +58,6 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
     out |= over_increments(run.outcome.history, times, system.all_names, places.contacts)
     for number in places.numbers:
         k = run.view.stages.index(number.stage)
-        acting = {name: of[k] for name, of in zip(places.contacts, results, strict=True)}
+        acting = {name: of[k] for name, of in zip(names, results, strict=True)}
         out |= number.values(fields, states[k], places.lines, acting)
     return out

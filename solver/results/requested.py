@@ -90,19 +90,14 @@ class RequestedNumber:
         lines : those that ``line`` may name
         contacts : what acts between the surfaces of each contact pair in that state
         """
-        found = self._found(fields, at, lines, contacts)
+        if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
+            found: tuple[float, ...] = (contacts[self.contact].length,)
+        else:
+            found = self._found(*self._sought(fields, at, lines, contacts))
         return dict(zip(self.quantities, found, strict=True))
 
-    def _found(
-        self,
-        fields: SystemFields,
-        at: Solved,
-        lines: Mapping[str, Places],
-        contacts: Mapping[str, ContactResult],
-    ) -> tuple[float, ...]:
-        if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
-            return (contacts[self.contact].length,)
-        values, X = self._sought(fields, at, lines, contacts)
+    def _found(self, values: Array, X: Array) -> tuple[float, ...]:
+        """Return the number of values (n,) at places (2, n), with its own place if it has one."""
         known = np.isfinite(values)
         if not known.any():
             return (np.nan,) * len(self.quantities)

@@ -163,7 +163,7 @@ class Solution:
 
     def mesh_fields(self) -> MeshFields:
         """Return the fields at the nodes of all bodies at all stages."""
-        return mesh_fields(self.system, self.stages)
+        return mesh_fields(self._fields, self.stages)
 
     def save(self, path: str | Path) -> None:
         """Write the model and its states to a file, for `load`."""

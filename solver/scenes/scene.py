@@ -135,7 +135,7 @@ class Scene:
             status=status,
             message=self._told(status, messages),
             scalars={**written.scalars, "audit_stored": last.figure},
-            mesh=partial(mesh_fields, run.system, states),
+            mesh=partial(mesh_fields, run.samples.fields, states),
         )
 
     def _told(self, status: Status, messages: tuple[str, ...]) -> str:

@@ -154,8 +154,7 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
     for k, interface in enumerate(system.interfaces):
         state, start = loaded.state, loaded.start
         pressure, tangential = contact_pressure(system, state, k)
-        pairing = interface.pairing(state.u, state.time, finite=state.contacts[k].finite)
-        bound = system.bound(k, pairing, start, state.time).least(pressure)
+        bound = system.bound(k, system.pairing(state, k), start, state.time).least(pressure)
         for number, _, _ in interface.sides:
             law = system.parts[number].law(loaded.state.time)
             if law.elastic:
