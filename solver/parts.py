@@ -53,10 +53,7 @@ class Parts(Generic[T]):
 
         def named(part: C) -> C:
             before = self._known.get(word)
-            if before is not None and (before.__qualname__, _file(before)) != (
-                part.__qualname__,
-                _file(part),
-            ):
+            if before is not None and not run_again(before, part):
                 raise ModelError(self.kind, word, f"is the word of {before.__qualname__} already")
             self._known[word] = part
             if self._alike:
@@ -191,6 +188,11 @@ _RUNNING: list[str] = []
 """Files of one's own that run now."""
 
 
-def _file(part: type[Any]) -> str:
+def run_again(one: Any, other: Any) -> bool:
+    """Whether a class or function is another one, whose file ran twice: as script and as parts."""
+    return (one.__qualname__, _file(one)) == (other.__qualname__, _file(other))
+
+
+def _file(part: Any) -> str:
     """Return the file of a class; a script that is run has one name, the file it loads another."""
     return str(getattr(sys.modules.get(part.__module__), "__file__", part.__module__))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from solver.errors import ModelError
-from solver.parts import load_own_parts
+from solver.parts import load_own_parts, run_again
 
 Need = Literal["map", "profile", "s", "surfaces", "contact", "release"]
 """A grid, depth profiles, positions along a surface, a contact surface of every body, a contact
@@ -45,7 +45,7 @@ def output(word: str, *needs: Need) -> Callable[[T], T]:
 
     def named(make: T) -> T:
         before = _OUTPUTS.get(word)
-        if before is not None and before.make.__qualname__ != make.__qualname__:
+        if before is not None and not run_again(before.make, make):
             raise ModelError("output", word, f"is the word of {before.make.__qualname__} already")
         _OUTPUTS[word] = NamedOutput(make, needs)
         return make

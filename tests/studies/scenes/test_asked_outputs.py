@@ -192,6 +192,13 @@ def test_a_word_is_given_once() -> None:
         def other(run: object) -> object:
             return run
 
+    def namesake(run: object) -> object:
+        return run
+
+    namesake.__qualname__ = "contact"  # the same name in another file
+    with pytest.raises(ModelError, match="output = 'contact': is the word of contact already"):
+        output("contact")(namesake)
+
 
 def test_runs_of_a_factor_share_increments_where_only_outputs_have_it() -> None:
     tables = released()
