@@ -145,19 +145,18 @@ def test_bodies_that_overlap_part_without_friction() -> None:
 
 def test_friction_that_is_almost_spent_is_told_with_its_bodies() -> None:
     area = np.array([1.0, 2.0, 1.0])
-    interface = SimpleNamespace(
-        slave=0, master=1, pairing=lambda u, time, finite: SimpleNamespace(area=area)
-    )
+    interface = SimpleNamespace(slave=0, master=1)
 
     def found(law: Coulomb, share: float) -> str:
         normal = np.array([1.0, 3.0, 0.0])
-        contact = SimpleNamespace(normal=normal, tangential=-0.3 * share * normal, finite=False)
+        contact = SimpleNamespace(normal=normal, tangential=-0.3 * share * normal)
         at: Any = SimpleNamespace(n=3)
         system: Any = SimpleNamespace(
             interfaces=[interface], all_names=["pad", "plate"],
+            pairing=lambda state, pair: SimpleNamespace(area=area),
             bound=lambda pair, pairing, start, time: lines_of(law, at),
         )  # fmt: skip
-        state: Any = SimpleNamespace(contacts=[contact], u=(), time=1.0)
+        state: Any = SimpleNamespace(contacts=[contact], time=1.0)
         return spent(system, state)
 
     told = "; just before, friction between pad and plate bears 97%"
