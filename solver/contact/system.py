@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from solver.contact.interface import Interface
     from solver.contact.state import Converged
     from solver.fem.frame import RigidMotion
+    from solver.fem.operators import PartOperators
     from solver.fem.part import Part
     from solver.fem.surface import Surface
     from solver.materials.state import Response
@@ -82,15 +83,12 @@ class System:
         surfaces = surfaces_of(model, wholes)
         self.model = model = with_slaves(model, surfaces)
         own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
+        self._own, self._linear_solver = own, linear_solver
         self.names = [body.name for body in model.bodies]
         self.all_names = list(wholes)
         self.parts: tuple[Part, ...] = tuple(
             _part(whole, chains, linear_solver)
             for whole, chains in zip(wholes.values(), own, strict=True)
-        )
-        self.operators = tuple(
-            part.operators(chains, linear_solver)
-            for part, chains in zip(self.parts, own, strict=True)
         )
         self.interfaces = tuple(
             interface_of(contact, self.parts, self.all_names, surfaces)
@@ -155,6 +153,14 @@ class System:
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
             self._least = time, found
         return found
+
+    @cached_property
+    def operators(self) -> tuple[PartOperators, ...]:
+        """The inverses of the stiffness of each part."""
+        return tuple(
+            part.operators(chains, self._linear_solver)
+            for part, chains in zip(self.parts, self._own, strict=True)
+        )
 
     @property
     def n_unknowns(self) -> int:

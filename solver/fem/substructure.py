@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import replace
+from functools import cached_property
 from hashlib import sha256
 from typing import TYPE_CHECKING
 
@@ -33,20 +34,18 @@ _CACHE: OrderedDict[str, _CondensedBody] = OrderedDict()
 
 
 class _CondensedBody:
-    """The condensation of one body to a set of nodes."""
+    """The condensation of one body to some of its unknowns."""
 
-    def __init__(self, part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> None:
-        self.nodes = nodes
-        self.kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+    def __init__(self, part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> None:
         K = part.elastic_matrix()
-        inside = np.setdiff1d(part.free, self.kept)
-        self._schur = SchurComplement(K, self.kept, inside, linear_solver)
+        inside = np.setdiff1d(part.free, kept)
+        self._schur = SchurComplement(K, kept, inside, linear_solver)
         self._loads = part.condensable.fields
         self.forces = self._schur.condense(self._loads)
         at = self._schur.boundary
-        stiffness = K[self.kept][:, self.kept].toarray()
+        stiffness = K[kept][:, kept].toarray()
         stiffness[np.ix_(at, at)] -= self._schur.taken
-        self.stiffness = _without_motions(stiffness, part.rigid[self.kept])
+        self.stiffness = _without_motions(stiffness, part.rigid[kept])
 
     def expand(self, u: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all displacements (n,) from those kept, at the factors of the loads."""
@@ -69,7 +68,8 @@ class Substructure(Part):
     """A part with the unknowns of its contact surfaces alone.
 
     An increment can use it like a `Discretisation`; ``whole`` is the meshed body. ``elastic`` are
-    the unknowns that the condensed stiffness acts on.
+    the unknowns that the condensed stiffness acts on. The body is condensed when its stiffness is
+    first needed: to check a model, or to tell its size, needs none.
     """
 
     meshed = False
@@ -77,21 +77,29 @@ class Substructure(Part):
     def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
         self.whole = whole
         self.body = whole.body
-        nodes = np.unique(np.concatenate([surface.nodes for surface in surfaces]))
-        self._condensed = _condense(whole, nodes, linear_solver)
-        kept = self._condensed.kept
+        self._linear_solver = linear_solver
+        self._nodes = nodes = np.unique(np.concatenate([surface.nodes for surface in surfaces]))
+        self._kept = kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
         self.elastic = slice(len(kept))
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]
         self.copied = np.arange(self.n)
-        self.loads = Superposed(whole.condensable.cases, self._condensed.forces)
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
         self.active = choose_pins(self.rigid, self.free)
 
+    @cached_property
+    def _condensed(self) -> _CondensedBody:
+        return _condense(self.whole, self._kept, self._linear_solver)
+
+    @cached_property
+    def loads(self) -> Superposed:  # type: ignore[override]  # a cached property can be written
+        """Nodal forces of the body's loads, those on inner nodes condensed [N]."""
+        return Superposed(self.whole.condensable.cases, self._condensed.forces)
+
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
-        nodes = np.searchsorted(self._condensed.nodes, surface.nodes)
+        nodes = np.searchsorted(self._nodes, surface.nodes)
         return replace(surface, nodes=nodes)
 
     def resisted(self, time: float) -> tuple[float, float]:
@@ -124,7 +132,7 @@ class Substructure(Part):
 
     def elastic_matrix(self) -> sparse.csr_array:
         """Return the condensed stiffness on all unknowns (n, n), supports not applied."""
-        rest = np.zeros((self.n - len(self._condensed.kept),) * 2)
+        rest = np.zeros((self.n - len(self._kept),) * 2)
         return sparse.csr_array(sparse.block_diag([self._condensed.stiffness, rest]))
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
@@ -143,7 +151,7 @@ class Substructure(Part):
     def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the nodal forces (n,) of the whole body for those of this part [N]."""
         whole = np.zeros(self.whole.n)
-        whole[self._condensed.kept] = force[self.elastic]
+        whole[self._kept] = force[self.elastic]
         return whole
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
@@ -152,11 +160,11 @@ class Substructure(Part):
         return self._condensed.expand(u[self.elastic], factors)[self.whole.copied]
 
 
-def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> str:
+def _key(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> str:
     """Return a key made from the content: equal bodies share their condensation."""
     digest, body = sha256(), part.body
     elastic = body.law.stiffness(part.B.shape[2])
-    for array in (body.mesh.doflocs, body.mesh.t, nodes, elastic, part.condensable.fields):
+    for array in (body.mesh.doflocs, body.mesh.t, kept, elastic, part.condensable.fields):
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(
         repr((
@@ -169,12 +177,12 @@ def _key(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> 
     return digest.hexdigest()
 
 
-def _condense(part: Discretisation, nodes: NDArray[np.int64], linear_solver: str) -> _CondensedBody:
-    key = _key(part, nodes, linear_solver)
+def _condense(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> _CondensedBody:
+    key = _key(part, kept, linear_solver)
     if key in _CACHE:
         _CACHE.move_to_end(key)
     else:
-        _CACHE[key] = _CondensedBody(part, nodes, linear_solver)
+        _CACHE[key] = _CondensedBody(part, kept, linear_solver)
         while len(_CACHE) > _KEPT_IN_MEMORY:
             _CACHE.popitem(last=False)
     return _CACHE[key]
