@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.results.quantities import Quantity
+from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
           "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
-_COMPONENTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
+_COMPONENTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 EXTREME = ("maximum", "minimum")
 
 
@@ -33,15 +35,16 @@ class RequestedNumber:
 
     Attributes
     ----------
-    name : of the variable; those of the place end in ``_x`` and ``_y``
-    of : of a body ``stress.xx`` (``yy``, ``zz``, ``xy``), ``mises``, ``plastic_strain`` or
-        ``displacement.x`` (``y``); of a contact ``pressure``, ``shear``, ``gap`` or ``slip``. In a
-        body ``mises`` and ``plastic_strain`` are those at integration points, others at nodes
+    name : of the variable; those of the place end in ``_x``, ``_y`` (and ``_z``)
+    of : of a body ``stress.xx`` (``yy``, ``zz``, ``xy``; with three coordinates ``yz``, ``zx``),
+        ``mises``, ``plastic_strain`` or ``displacement.x`` (``y``, ``z``); of a contact
+        ``pressure``, ``shear``, ``gap`` or ``slip``. In a body ``mises`` and ``plastic_strain`` are
+        those at integration points, others at nodes
     take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
         along which the value is above zero; of a pressure that is the length of contact
     stage : the state
     body, line, contact : where: one of them
-    x, y : the box of the body where it is sought [mm]
+    x, y, z : the box of the body where it is sought [mm]
     description : what it is, in words
     """
 
@@ -54,11 +57,12 @@ class RequestedNumber:
     contact: str | None = None
     x: Span | None = None
     y: Span | None = None
+    z: Span | None = None
     description: str = ""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The number and, of an extreme value, its place."""
+        """The number and, of an extreme value, its place, of which a run gives its axes."""
         places = {"body": self.body, "line": self.line, "contact": self.contact}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
@@ -72,7 +76,7 @@ class RequestedNumber:
             Quantity(
                 name=f"{self.name}_{axis}", long_name=f"{axis} where {self.name} is", units="mm"
             )
-            for axis in "xy"
+            for axis in AXES
         )
 
     def values(
@@ -89,21 +93,25 @@ class RequestedNumber:
         at : the state at its stage
         lines : those that ``line`` may name
         contacts : what acts between the surfaces of each contact pair in that state
+
+        Raises
+        ------
+        ModelError : the body has no such component, or no such coordinate
         """
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
             found = self._found(*self._sought(fields, at, lines, contacts))
-        return dict(zip(self.quantities, found, strict=True))
+        return dict(zip(self.quantities, found, strict=False))
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:
-        """Return the number of values (n,) at places (2, n), with its own place if it has one."""
+        """Return the number of values (n,) at places (n_axes, n), with its place if it has one."""
         known = np.isfinite(values)
         if not known.any():
-            return (np.nan,) * len(self.quantities)
+            return (np.nan,) * (1 + len(X) if self.take in EXTREME else 1)
         if self.take in EXTREME:
             k = int((np.nanargmax if self.take == "maximum" else np.nanargmin)(values))
-            return float(values[k]), float(X[0, k]), float(X[1, k])
+            return float(values[k]), *X[:, k].tolist()
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X), axis=0))])
         values = np.where(known, values, 0.0)
         if self.take == "integral":
@@ -131,11 +139,19 @@ class RequestedNumber:
             found = mises if kind == "mises" else strain
         else:
             found, X = getattr(fields.at_nodes(at, body), kind), fields.system.full(body).X
+        if part:
+            names = components(len(found)) if kind == "stress" else AXES[: len(found)]
+            if part not in names:
+                known = ", ".join(f"{kind}.{name}" for name in names)
+                raise ModelError(f"{self.name}.of", self.of, f"must be one of {known}")
         values = found[_COMPONENTS[part]] if part else found
         inside = np.ones(X.shape[1], dtype=bool)
-        for x, span in zip(X, (self.x, self.y), strict=True):
+        for k, span in enumerate((self.x, self.y, self.z)):
             if span is not None:
-                inside &= (x >= span[0]) & (x <= span[1])
+                if k >= len(X):
+                    allowed = f"must be left out: places of this body have {', '.join(AXES[:k])}"
+                    raise ModelError(f"{self.name}.{AXES[k]}", span, allowed)
+                inside &= (X[k] >= span[0]) & (X[k] <= span[1])
         return np.where(inside, values, np.nan), X
 
 

@@ -12,6 +12,7 @@ from solver.errors import ModelError
 from solver.parameters import Accuracy
 from solver.results.outputs import Need, outputs
 from solver.results.quantities import QUANTITIES
+from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
@@ -271,7 +272,7 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
             yield StudyError(field, name, allowed)
     taken = {*QUANTITIES, *RESERVED, *scene.declared}
     for name in scene.outputs:
-        own = {name, f"{name}_x", f"{name}_y"}
+        own = {name, *(f"{name}_{axis}" for axis in AXES)}
         for each in sorted(own & taken):
             allowed = f"the data set has {each} already: choose another name"
             yield StudyError(f"outputs.{name}", name, allowed)
