@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,12 +21,22 @@ if TYPE_CHECKING:
     from solver.results.view import Places
 
     Array = NDArray[np.float64]
-    Span = tuple[float, float]
 
+Span = tuple[float, float]
+Take = Literal["maximum", "minimum", "integral", "extent"]
 _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
           "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
 _COMPONENTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 EXTREME = ("maximum", "minimum")
+OF_CONTACT = ("pressure", "shear", "gap", "slip")
+"""What is taken of a contact."""
+
+
+def of_body(axes: int) -> tuple[str, ...]:
+    """Return what is taken of a body whose places have this many coordinates."""
+    stress = (f"stress.{name}" for name in components(2 * axes))
+    moved = (f"displacement.{name}" for name in AXES[:axes])
+    return (*stress, "mises", "plastic_strain", *moved)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,10 +46,8 @@ class RequestedNumber:
     Attributes
     ----------
     name : of the variable; those of the place end in ``_x``, ``_y`` (and ``_z``)
-    of : of a body ``stress.xx`` (``yy``, ``zz``, ``xy``; with three coordinates ``yz``, ``zx``),
-        ``mises``, ``plastic_strain`` or ``displacement.x`` (``y``, ``z``); of a contact
-        ``pressure``, ``shear``, ``gap`` or ``slip``. In a body ``mises`` and ``plastic_strain`` are
-        those at integration points, others at nodes
+    of : one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are those at
+        integration points, others at nodes
     take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
         along which the value is above zero; of a pressure that is the length of contact
     stage : the state
@@ -50,7 +58,7 @@ class RequestedNumber:
 
     name: str
     of: str
-    take: str
+    take: Take = "maximum"
     stage: str
     body: str | None = None
     line: str | None = None
@@ -128,22 +136,20 @@ class RequestedNumber:
         """Return the values it is taken of (n,), NaN outside of the box, and where they are."""
         kind, _, part = self.of.partition(".")
         if self.contact is not None:
+            self._check(OF_CONTACT)
             result = contacts[self.contact]
             return getattr(result, kind), result.X
         body = str(self.body)
+        X = fields.system.full(body).X if self.line is None else lines[self.line].X
+        self._check(of_body(len(X)))
         if self.line is not None:
             (values,) = fields.at_places(lines[self.line], [at])
-            found, X = getattr(values, kind), lines[self.line].X
+            found = getattr(values, kind)
         elif kind in ("mises", "plastic_strain"):  # recovered at nodes they may be beyond the law
             X, mises, strain = fields.at_points(at, body)
             found = mises if kind == "mises" else strain
         else:
-            found, X = getattr(fields.at_nodes(at, body), kind), fields.system.full(body).X
-        if part:
-            names = components(len(found)) if kind == "stress" else AXES[: len(found)]
-            if part not in names:
-                known = ", ".join(f"{kind}.{name}" for name in names)
-                raise ModelError(f"{self.name}.of", self.of, f"must be one of {known}")
+            found = getattr(fields.at_nodes(at, body), kind)
         values = found[_COMPONENTS[part]] if part else found
         inside = np.ones(X.shape[1], dtype=bool)
         for k, span in enumerate((self.x, self.y, self.z)):
@@ -153,6 +159,10 @@ class RequestedNumber:
                     raise ModelError(f"{self.name}.{AXES[k]}", span, allowed)
                 inside &= (X[k] >= span[0]) & (X[k] <= span[1])
         return np.where(inside, values, np.nan), X
+
+    def _check(self, known: tuple[str, ...]) -> None:
+        if self.of not in known:
+            raise ModelError(f"{self.name}.of", self.of, f"must be one of {', '.join(known)}")
 
 
 def _positive_length(values: Array, s: Array) -> float:
