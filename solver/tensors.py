@@ -1,4 +1,4 @@
-"""Components of symmetric tensors, and their scaling.
+"""Names of axes and of the components of symmetric tensors, and the scaling of these.
 
 Inside the solver strain and stress are Mandel vectors, components first, points last:
 ``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three,
@@ -16,8 +16,21 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-COMPONENTS = ("xx", "yy", "zz", "xy")
+AXES = ("x", "y", "z")
+"""Names of coordinates; a place has the first two or all of them."""
+_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
 SQRT2 = float(np.sqrt(2.0))
+
+
+def components(count: int) -> tuple[str, ...]:
+    """Return the names of the components of a tensor with 4 of them, in two dimensions, or 6."""
+    if count not in (4, 6):
+        raise ValueError(f"{count} components: must be 4 or 6")
+    return _COMPONENTS[:count]
+
+
+COMPONENTS = components(4)
+"""Those of bodies in two dimensions."""
 
 
 def to_tensor(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -58,7 +71,19 @@ def not_below_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.maximum(values, 0.0)
 
 
-def stress_difference(stress: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return sigma1 - sigma2 (...) of the xy plane, of components xx, yy, zz, xy (4, ...) [MPa]."""
-    xx, yy, _, xy = stress
-    return np.hypot(xx - yy, 2 * xy)
+def stress_difference(
+    stress: NDArray[np.float64], plane: tuple[str, str] = ("x", "y")
+) -> NDArray[np.float64]:
+    """Return sigma1 - sigma2 (...) of a plane, of tensor components (n_components, ...) [MPa].
+
+    Parameters
+    ----------
+    plane : names of its two axes
+    """
+    names = components(len(stress))
+
+    def component(*axes: str) -> NDArray[np.float64]:
+        return stress[next(k for k, name in enumerate(names) if set(name) == set(axes))]
+
+    a, b = plane
+    return np.hypot(component(a, a) - component(b, b), 2 * component(a, b))

@@ -16,7 +16,7 @@ from solver.contact.slave import with_slaves
 from solver.contact.state import ContactState, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
-from solver.fem.fields import recovery
+from solver.fem.fields import Sampler, recovery
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
@@ -289,6 +289,10 @@ class System:
         """Return the motion of the first wheel, where there is one."""
         both = zip(self.parts, converged.state.u, strict=True)
         return next((part.motion_of(u) for part, u in both if isinstance(part, Wheel)), None)
+
+    def sampler(self, name: str, X: NDArray[np.float64]) -> Sampler:
+        """Return the interpolation of nodal fields of a body at positions (2, n) [mm]."""
+        return Sampler(self.full(name), X)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""

@@ -10,12 +10,15 @@ from xml.etree import ElementTree
 import numpy as np
 
 from solver.errors import ModelError
-from solver.tensors import COMPONENTS
+from solver.tensors import components
 
 if TYPE_CHECKING:
     import meshio
+    from numpy.typing import NDArray
 
     from solver.results.mesh_fields import MeshFields
+
+    Array = NDArray[np.float64]
 
 _CELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 """Nodes of an element -> cell of meshio. Corners, mid-sides and the middle have the same order in
@@ -79,14 +82,20 @@ def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
 
     values = dict(fields.stages[stage])
     moved, stress = values.pop("displacement"), values.pop("stress")
+    names = components(len(stress))
     every = list(fields.bodies.values())
     return meshio.Mesh(
-        np.pad(fields.X.T, ((0, 0), (0, 1))),
+        _in_space(fields.X),
         [(_CELLS[cells.shape[1]], cells) for _, cells in every],
         point_data={
-            "displacement": np.pad(moved.T, ((0, 0), (0, 1))),
-            **{f"stress_{c}": each for c, each in zip(COMPONENTS, stress, strict=True)},
+            "displacement": _in_space(moved),
+            **{f"stress_{c}": each for c, each in zip(names, stress, strict=True)},
             **values,
         },
         cell_data={"body": [np.full(len(cells), k) for k, (_, cells) in enumerate(every)]},
     )
+
+
+def _in_space(vectors: Array) -> Array:
+    """Return vectors (n, 3) of (2, n), or of (3, n)."""
+    return np.pad(vectors.T, ((0, 0), (0, 3 - len(vectors))))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import defaultdict
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from solver.results.quantities import Quantity, declare
+from solver.results.quantities import Quantity, along_axes, declare, declare_along
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,14 +21,19 @@ _ROUNDING, _SAME = 1e-9, 1e-6
 """Stress / yield stress that is rounding, and has no place; relative difference of rounding."""
 
 
-LARGEST = (
+class Extreme(NamedTuple):
+    """Residual stress in the body and its place, and at its contact surface and its distance s."""
+
+    inside: Quantity
+    place: tuple[Quantity, ...]
+    surface: Quantity
+    s: Quantity
+
+
+LARGEST = Extreme(
     declare("residual_max", "largest residual stress in the body", "MPa", dims=_OVER),
-    declare(
-        "residual_max_x", "position along x of the largest residual stress in the body", "mm",
-        dims=_OVER,
-    ),
-    declare(
-        "residual_max_y", "position along y of the largest residual stress in the body", "mm",
+    declare_along(
+        "residual_max_{}", "position along {} of the largest residual stress in the body", "mm",
         dims=_OVER,
     ),
     declare(
@@ -40,14 +46,10 @@ LARGEST = (
         dims=_OVER,
     ),
 )  # fmt: skip
-SMALLEST = (
+SMALLEST = Extreme(
     declare("residual_min", "smallest residual stress in the body", "MPa", dims=_OVER),
-    declare(
-        "residual_min_x", "position along x of the smallest residual stress in the body", "mm",
-        dims=_OVER,
-    ),
-    declare(
-        "residual_min_y", "position along y of the smallest residual stress in the body", "mm",
+    declare_along(
+        "residual_min_{}", "position along {} of the smallest residual stress in the body", "mm",
         dims=_OVER,
     ),
     declare(
@@ -60,7 +62,6 @@ SMALLEST = (
         dims=_OVER,
     ),
 )  # fmt: skip
-"""In the body, with x and y; at its contact surface, with s."""
 
 
 def residual_extremes(run: FinishedRun) -> Values:
@@ -70,28 +71,35 @@ def residual_extremes(run: FinishedRun) -> Values:
     to the middle of the contact is taken; where there is no stress, none.
     """
     none = _ROUNDING * run.parameters.yield_stress
-    found: dict[Quantity, list[Array]] = {each: [] for each in LARGEST + SMALLEST}
+    found: defaultdict[Quantity, list[Array]] = defaultdict(list)
     for name, boundary in run.view.surfaces.items():
         body = run.system.full(name)
         stress = run.samples.fields.at_nodes(run.unloaded, name).stress
         away = np.abs(run.view.axis.reached(body.X))
         surface = body.boundary_nodes(boundary)
         s = run.view.axis.reached(body.X[:, surface])
-        for quantities, sign in ((LARGEST, 1.0), (SMALLEST, -1.0)):
+        for extreme, sign in ((LARGEST, 1.0), (SMALLEST, -1.0)):
             inside, at = _most(sign * stress, none, body.X, away)
-            along, where = _most(sign * stress[:, surface], none, s[None], away[surface])
-            inside, along = sign * inside, sign * along
-            for quantity, values in zip(quantities, (inside, *at, along, *where), strict=True):
+            along, (where,) = _most(sign * stress[:, surface], none, s[None], away[surface])
+            of_body = {
+                extreme.inside: sign * inside,
+                **along_axes(extreme.place, at),
+                extreme.surface: sign * along,
+                extreme.s: where,
+            }
+            for quantity, values in of_body.items():
                 found[quantity].append(values)
     return {quantity: np.stack(values) for quantity, values in found.items()}
 
 
 def _most(stress: Array, none: float, X: Array, away: Array) -> tuple[Array, Array]:
-    """Return the largest value of each component (4,), and its place (n, 4).
+    """Return the largest value of each component (n,), and its place (n_axes, n).
 
     Parameters
     ----------
-    X, away : positions of the nodes (n, n_nodes), and their distance from the middle (n_nodes,)
+    stress : (n, n_nodes) [MPa]
+    X, away : positions of the nodes (n_axes, n_nodes), and their distance from the middle
+        (n_nodes,)
     """
     most = stress.max(axis=1)
     same = stress >= most[:, None] - _SAME * np.abs(most[:, None])

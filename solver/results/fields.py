@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from solver.fem.fields import Sampler
 from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
@@ -36,6 +35,20 @@ class Solved(Protocol):
         """Its unknowns."""
 
 
+class Interpolation(Protocol):
+    """Interpolates nodal fields of a body at n positions; a `Sampler`, for one.
+
+    Attributes
+    ----------
+    inside : (n,) whether a position is in the body
+    """
+
+    inside: NDArray[np.bool_]
+
+    def __call__(self, nodal: Array) -> Array:
+        """Return values (..., n) of nodal fields (..., n_nodes), NaN outside of the body."""
+
+
 class Bodies(Protocol):
     """Bodies of which states were found, each body a whole mesh: a `System`, for one."""
 
@@ -51,7 +64,10 @@ class Bodies(Protocol):
         """Return a body."""
 
     def positions(self, name: str) -> Array:
-        """Return where the points of a body are (2, n_points) [mm]."""
+        """Return where the points of a body are (n_axes, n_points) [mm]."""
+
+    def sampler(self, name: str, X: Array) -> Interpolation:
+        """Return the interpolation of nodal fields of a body at positions (n_axes, n) [mm]."""
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
@@ -71,8 +87,8 @@ class BodyValues(NamedTuple):
 
     Attributes
     ----------
-    displacement : (2, n) [mm]
-    stress : (4, n) recovered, components xx, yy, zz, xy [MPa]
+    displacement : (n_axes, n), two axes or three [mm]
+    stress : (n_components, n) recovered, components xx, yy, zz, xy (, yz, zx) [MPa]
     mises : (n,) von Mises stress, recovered from the integration points: that of recovered stress
         would go beyond the strength [MPa]
     plastic_strain : (n,) equivalent plastic strain, recovered
@@ -104,29 +120,29 @@ class SystemFields:
         return self._at_nodes.of(at, body, lambda: self._recovered(at, body))
 
     def _recovered(self, at: Solved, body: str) -> BodyValues:
-        response = self.system.response(body, at)
+        response, nodes = self.system.response(body, at), self.system.full(body).X.shape[1]
         return BodyValues(
-            displacement=self.system.displacement(body, at.state).reshape(-1, 2).T,
+            displacement=self.system.displacement(body, at.state).reshape(nodes, -1).T,
             stress=to_tensor(self.recovered(body, response.stress)),
             mises=not_below_zero(self.recovered(body, von_mises(response.stress))),
             plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
         )
 
     def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:
-        """Return positions (2, n), von Mises stress and plastic strain at integration points."""
+        """Return positions (n_axes, n), von Mises stress and plastic strain at the points."""
         found = self.system.response(body, at)
         return self.system.positions(body), von_mises(found.stress), found.state.accumulated
 
     def at_places(self, places: Places, states: Sequence[Solved]) -> list[BodyValues]:
         """Return the fields at places of a body in each state; NaN outside of it."""
-        sampler = Sampler(self.system.full(places.body), places.X)
+        sampler = self.system.sampler(places.body, places.X)
         return [
             BodyValues(*(interpolated(sampler, values, name) for name in BodyValues._fields))
             for values in (self.at_nodes(at, places.body) for at in states)
         ]
 
 
-def interpolated(sampler: Sampler, values: BodyValues, name: str) -> Array:
+def interpolated(sampler: Interpolation, values: BodyValues, name: str) -> Array:
     """Return a field (..., n) of a body between its nodes, not below zero where it cannot be."""
     found = sampler(getattr(values, name))
     return not_below_zero(found) if name in _POSITIVE else found

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from solver.results.run import FinishedRun, Values
 
 _MAP = ("y", "x")
+"""Dimensions of a map, up and across; a section has others, see `_on_map`."""
 
 RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("component", *_MAP))
 PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain after unloading", dims=_MAP)
@@ -54,22 +55,31 @@ def maps(run: FinishedRun) -> Values:
         return np.stack([samples.on_map(name, at) for at, _ in run.stages])
 
     if not run.view.unloaded:
-        return {
+        found = {
             MAP_STRESS: staged("stress"),
             MAP_MISES: staged("mises"),
             MAP_PLASTIC_STRAIN: staged("plastic_strain"),
         }
-    return {
-        RESIDUAL_STRESS: samples.on_map("stress", run.unloaded),
-        PLASTIC_STRAIN: samples.on_map("plastic_strain", run.unloaded),
-        MAP_MISES: staged("mises"),
-    }
+    else:
+        found = {
+            RESIDUAL_STRESS: samples.on_map("stress", run.unloaded),
+            PLASTIC_STRAIN: samples.on_map("plastic_strain", run.unloaded),
+            MAP_MISES: staged("mises"),
+        }
+    return _on_map(run, found)
 
 
 @output("isochromatics", "map")
 def isochromatics(run: FinishedRun) -> Values:
     """Return the map whose contours are isochromatics: twice the largest shear in the plane."""
-    return {STRESS_DIFFERENCE: stress_difference(run.samples.on_map("stress", run.loaded))}
+    stress = run.samples.on_map("stress", run.loaded)
+    return _on_map(run, {STRESS_DIFFERENCE: stress_difference(stress, run.view.map_axes)})
+
+
+def _on_map(run: FinishedRun, values: Values) -> Values:
+    """Return values on the map, whose last two dimensions are the axes that the view has."""
+    across, up = run.view.map_axes
+    return {each.at(*each.dims[:-2], up, across): value for each, value in values.items()}
 
 
 @output("profiles", "profile", "release")

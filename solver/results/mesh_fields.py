@@ -36,11 +36,11 @@ class MeshFields:
 
     Attributes
     ----------
-    X : positions of the nodes before loading (2, n_nodes)
-    bodies : body -> its element, the nodes of its cells (n_cells, k) counterclockwise: corners,
-        mid-sides, middle
-    stages : stage -> displacement (2, n_nodes), stress (4, n_nodes) with components xx, yy, zz,
-        xy, mises (n_nodes,) and plastic_strain (n_nodes,)
+    X : positions of the nodes before loading (n_axes, n_nodes)
+    bodies : body -> its element, the nodes of its cells (n_cells, k) counterclockwise (in two
+        coordinates): corners, mid-sides, middle
+    stages : stage -> displacement (n_axes, n_nodes), stress (n_components, n_nodes) with components
+        xx, yy, zz, xy (, yz, zx), mises (n_nodes,) and plastic_strain (n_nodes,)
     """
 
     X: Array
@@ -73,7 +73,9 @@ def mesh_fields(fields: SystemFields, states: Mapping[str, Solved]) -> MeshField
     wholes = {name: fields.system.full(name) for name in fields.system.names}
     bodies, first = {}, 0
     for name, whole in wholes.items():
-        cells = _turned_left(whole.basis.element_dofs.T, whole.X)
+        cells = whole.basis.element_dofs.T
+        if len(whole.X) == 2:  # in space they have no side that is seen
+            cells = _turned_left(cells, whole.X)
         bodies[name] = (whole.body.element, first + cells)
         first += whole.X.shape[1]
     stages = {}

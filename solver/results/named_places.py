@@ -38,7 +38,8 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
 
     Parameters
     ----------
-    times : at which the increments of the program end, the beginning first
+    times : at which the increments of the program end, the beginning first; none where a run has
+        no increments
     """
     from solver.results.contact_result import contact_result  # only who computes needs the solver
 
@@ -55,7 +56,8 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
         out |= at_points(fields, places.points, states)
     if places.contacts and places.samples:
         out |= contacts(results, places.contacts, places.samples)
-    out |= over_increments(run.outcome.history, times, system.all_names, places.contacts)
+    if times:
+        out |= over_increments(run.outcome.history, times, system.all_names, places.contacts)
     for number in places.numbers:
         k = run.view.stages.index(number.stage)
         acting = {name: of[k] for name, of in zip(names, results, strict=True)}

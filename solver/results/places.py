@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.results.quantities import declare
+from solver.results.quantities import along_axes, declare, declare_along
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,8 +30,7 @@ POINT = declare("point", "point", "", dims=("point",))
 
 _LINE = ("line", "fraction")
 _STATES = ("line", "stage", "fraction")
-LINE_X = declare("line_x", "position along x of a point of the line", "mm", dims=_LINE)
-LINE_Y = declare("line_y", "position along y of a point of the line", "mm", dims=_LINE)
+LINE_AT = declare_along("line_{}", "position along {} of a point of the line", "mm", dims=_LINE)
 LINE_S = declare("line_s", "distance from the start of the line", "mm", dims=_LINE)
 LINE_STRESS = declare(
     "line_stress", "stress along the line", "MPa", dims=("line", "stage", "component", "fraction")
@@ -42,8 +41,7 @@ LINE_STRAIN = declare(
 )
 
 _POINT = ("point", "stage")
-POINT_X = declare("point_x", "position of the point along x", "mm", dims=("point",))
-POINT_Y = declare("point_y", "position of the point along y", "mm", dims=("point",))
+POINT_AT = declare_along("point_{}", "position of the point along {}", "mm", dims=("point",))
 POINT_STRESS = declare(
     "point_stress", "stress at the point", "MPa", dims=("point", "stage", "component")
 )
@@ -51,9 +49,8 @@ POINT_MISES = declare("point_mises", "von Mises stress at the point", "MPa", dim
 POINT_STRAIN = declare(
     "point_plastic_strain", "equivalent plastic strain at the point", dims=_POINT
 )
-POINT_MOVED = tuple(
-    declare(f"point_displacement_{a}", f"displacement of the point along {a}", "mm", dims=_POINT)
-    for a in "xy"
+POINT_MOVED = declare_along(
+    "point_displacement_{}", "displacement of the point along {}", "mm", dims=_POINT
 )
 
 
@@ -67,8 +64,7 @@ def along_lines(
     return {
         LINE: np.array(list(lines)),
         FRACTION: np.linspace(0.0, 1.0, X.shape[2]),
-        LINE_X: X[:, 0],
-        LINE_Y: X[:, 1],
+        **along_axes(LINE_AT, X.swapaxes(0, 1)),
         LINE_S: np.pad(np.cumsum(distance, axis=1), ((0, 0), (1, 0))),
         LINE_STRESS: found["stress"],
         LINE_MISES: found["mises"],
@@ -81,16 +77,14 @@ def at_points(
 ) -> Values:
     """Return stress, plastic strain and displacement at points in each state."""
     found = {name: each[..., 0] for name, each in _states(fields, points, states).items()}
-    moved = dict(zip(POINT_MOVED, np.moveaxis(found["displacement"], -1, 0), strict=True))
     X = np.stack([point.X[:, 0] for point in points.values()])
     return {
         POINT: np.array(list(points)),
-        POINT_X: X[:, 0],
-        POINT_Y: X[:, 1],
+        **along_axes(POINT_AT, X.T),
         POINT_STRESS: found["stress"],
         POINT_MISES: found["mises"],
         POINT_STRAIN: found["plastic_strain"],
-        **moved,
+        **along_axes(POINT_MOVED, np.moveaxis(found["displacement"], -1, 0)),
     }
 
 

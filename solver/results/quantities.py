@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.tensors import AXES
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from enum import IntEnum
@@ -70,6 +72,9 @@ class Quantity:
 
 
 QUANTITIES: dict[str, Quantity] = {}
+IN_SPACE: dict[str, Quantity] = {}
+"""Those along the third axis, which only runs with three coordinates have: others may give these
+names to parameters, axes of a sweep and numbers of their own."""
 
 
 def declare(
@@ -103,3 +108,27 @@ def declare(
         beside=beside or {},
     )
     return QUANTITIES[name]
+
+
+def declare_along(
+    name: str, long_name: str, units: str = "1", *, dims: tuple[str, ...] = ()
+) -> tuple[Quantity, ...]:
+    """Declare a variable for each axis and return all of them: see `along_axes`.
+
+    Parameters
+    ----------
+    name, long_name : with ``{}`` where the name of the axis stands
+    """
+    *plane, third = ((name.format(axis), long_name.format(axis)) for axis in AXES)
+    return *(declare(*each, units, dims=dims) for each in plane), in_space(*third, units, dims=dims)
+
+
+def in_space(name: str, long_name: str, units: str, **more: Any) -> Quantity:
+    """Return a quantity along the third axis, see `IN_SPACE`; arguments are those of `Quantity`."""
+    IN_SPACE[name] = Quantity(name=name, long_name=long_name, units=units, **more)
+    return IN_SPACE[name]
+
+
+def along_axes(quantities: tuple[Quantity, ...], values: Any) -> dict[Quantity, Any]:
+    """Return what `declare_along` declared, of the axes that the array (n_axes, ...) has."""
+    return dict(zip(quantities, values, strict=False))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.results.quantities import Quantity
+from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,12 +21,22 @@ if TYPE_CHECKING:
     from solver.results.view import Places
 
     Array = NDArray[np.float64]
-    Span = tuple[float, float]
 
+Span = tuple[float, float]
+Take = Literal["maximum", "minimum", "integral", "extent"]
 _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
           "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
-_COMPONENTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
+_COMPONENTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 EXTREME = ("maximum", "minimum")
+OF_CONTACT = ("pressure", "shear", "gap", "slip")
+"""What is taken of a contact."""
+
+
+def of_body(axes: int) -> tuple[str, ...]:
+    """Return what is taken of a body whose places have this many coordinates."""
+    stress = (f"stress.{name}" for name in components(2 * axes))
+    moved = (f"displacement.{name}" for name in AXES[:axes])
+    return (*stress, "mises", "plastic_strain", *moved)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,32 +45,32 @@ class RequestedNumber:
 
     Attributes
     ----------
-    name : of the variable; those of the place end in ``_x`` and ``_y``
-    of : of a body ``stress.xx`` (``yy``, ``zz``, ``xy``), ``mises``, ``plastic_strain`` or
-        ``displacement.x`` (``y``); of a contact ``pressure``, ``shear``, ``gap`` or ``slip``. In a
-        body ``mises`` and ``plastic_strain`` are those at integration points, others at nodes
+    name : of the variable; those of the place end in ``_x``, ``_y`` (and ``_z``)
+    of : one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are those at
+        integration points, others at nodes
     take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
         along which the value is above zero; of a pressure that is the length of contact
     stage : the state
     body, line, contact : where: one of them
-    x, y : the box of the body where it is sought [mm]
+    x, y, z : the box of the body where it is sought [mm]
     description : what it is, in words
     """
 
     name: str
     of: str
-    take: str
+    take: Take = "maximum"
     stage: str
     body: str | None = None
     line: str | None = None
     contact: str | None = None
     x: Span | None = None
     y: Span | None = None
+    z: Span | None = None
     description: str = ""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The number and, of an extreme value, its place."""
+        """The number and, of an extreme value, its place, of which a run gives its axes."""
         places = {"body": self.body, "line": self.line, "contact": self.contact}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
@@ -72,7 +84,7 @@ class RequestedNumber:
             Quantity(
                 name=f"{self.name}_{axis}", long_name=f"{axis} where {self.name} is", units="mm"
             )
-            for axis in "xy"
+            for axis in AXES
         )
 
     def values(
@@ -89,21 +101,25 @@ class RequestedNumber:
         at : the state at its stage
         lines : those that ``line`` may name
         contacts : what acts between the surfaces of each contact pair in that state
+
+        Raises
+        ------
+        ModelError : the body has no such component, or no such coordinate
         """
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
             found = self._found(*self._sought(fields, at, lines, contacts))
-        return dict(zip(self.quantities, found, strict=True))
+        return dict(zip(self.quantities, found, strict=False))
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:
-        """Return the number of values (n,) at places (2, n), with its own place if it has one."""
+        """Return the number of values (n,) at places (n_axes, n), with its place if it has one."""
         known = np.isfinite(values)
         if not known.any():
-            return (np.nan,) * len(self.quantities)
+            return (np.nan,) * (1 + len(X) if self.take in EXTREME else 1)
         if self.take in EXTREME:
             k = int((np.nanargmax if self.take == "maximum" else np.nanargmin)(values))
-            return float(values[k]), float(X[0, k]), float(X[1, k])
+            return float(values[k]), *X[:, k].tolist()
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X), axis=0))])
         values = np.where(known, values, 0.0)
         if self.take == "integral":
@@ -120,23 +136,33 @@ class RequestedNumber:
         """Return the values it is taken of (n,), NaN outside of the box, and where they are."""
         kind, _, part = self.of.partition(".")
         if self.contact is not None:
+            self._check(OF_CONTACT)
             result = contacts[self.contact]
             return getattr(result, kind), result.X
         body = str(self.body)
+        X = fields.system.full(body).X if self.line is None else lines[self.line].X
+        self._check(of_body(len(X)))
         if self.line is not None:
             (values,) = fields.at_places(lines[self.line], [at])
-            found, X = getattr(values, kind), lines[self.line].X
+            found = getattr(values, kind)
         elif kind in ("mises", "plastic_strain"):  # recovered at nodes they may be beyond the law
             X, mises, strain = fields.at_points(at, body)
             found = mises if kind == "mises" else strain
         else:
-            found, X = getattr(fields.at_nodes(at, body), kind), fields.system.full(body).X
+            found = getattr(fields.at_nodes(at, body), kind)
         values = found[_COMPONENTS[part]] if part else found
         inside = np.ones(X.shape[1], dtype=bool)
-        for x, span in zip(X, (self.x, self.y), strict=True):
+        for k, span in enumerate((self.x, self.y, self.z)):
             if span is not None:
-                inside &= (x >= span[0]) & (x <= span[1])
+                if k >= len(X):
+                    allowed = f"must be left out: places of this body have {', '.join(AXES[:k])}"
+                    raise ModelError(f"{self.name}.{AXES[k]}", span, allowed)
+                inside &= (X[k] >= span[0]) & (X[k] <= span[1])
         return np.where(inside, values, np.nan), X
+
+    def _check(self, known: tuple[str, ...]) -> None:
+        if self.of not in known:
+            raise ModelError(f"{self.name}.of", self.of, f"must be one of {', '.join(known)}")
 
 
 def _positive_length(values: Array, s: Array) -> float:

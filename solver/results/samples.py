@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.fem.fields import Sampler
 from solver.results.fields import Bodies, Solved, SystemFields, interpolated
 from solver.tensors import to_tensor
 
@@ -31,27 +30,29 @@ class Samples:
     def __init__(self, system: Bodies, view: View) -> None:
         self.system, self.view = system, view
         self.fields = SystemFields(system)
-        X, Y = np.meshgrid(view.x, view.y)
+        X, Y = np.meshgrid(*view.map_grid)
         S, D = np.meshgrid(view.station, view.depth, indexing="ij")
         grid, lines = view.axis.place(X.ravel(), -Y.ravel()), view.axis.place(S.ravel(), D.ravel())
         surface = view.axis.place(view.s, np.zeros_like(view.s))
-        wholes = {name: system.full(name) for name in view.surfaces}
-        self._map = {name: Sampler(whole, grid) for name, whole in wholes.items()}
-        if view.x.size and not any(sampler.inside.any() for sampler in self._map.values()):
+        self._map = {name: system.sampler(name, grid) for name in view.surfaces}
+        if X.size and not any(sampler.inside.any() for sampler in self._map.values()):
+            across, up = view.map_axes
             raise ModelError(
-                "map", _extent(view), "must meet a body, from x to x and from y to y [mm]"
-            )
-        self._lines = Sampler(system.full(view.profile_body), lines)
-        self._surface = {name: Sampler(whole, surface) for name, whole in wholes.items()}
+                "map", _extent(view),
+                f"must meet a body, from {across} to {across} and from {up} to {up} [mm]",
+            )  # fmt: skip
+        self._lines = system.sampler(view.profile_body, lines)
+        self._surface = {name: system.sampler(name, surface) for name in view.surfaces}
 
     def on_map(self, name: str, at: Solved) -> Array:
-        """Return a field of the bodies on the map (..., y, x); see `BodyValues` for its name."""
+        """Return a field of the bodies on the map (..., up, across), named as in `BodyValues`."""
         out: Array | None = None
         for body, sampler in self._map.items():
             here = interpolated(sampler, self.fields.at_nodes(at, body), name)
             out = here if out is None else np.where(np.isnan(out), here, out)
         assert out is not None
-        return out.reshape(*out.shape[:-1], len(self.view.y), len(self.view.x))
+        across, up = self.view.map_grid
+        return out.reshape(*out.shape[:-1], len(up), len(across))
 
     def on_surface(self, name: str, body: str, at: Solved) -> Array:
         """Return a field of a body along its surface (..., s)."""
@@ -70,7 +71,7 @@ class Samples:
         return values.reshape(*values.shape[:-1], len(self.view.station), len(self.view.depth))
 
     def flow(self, at: Solved) -> Array:
-        """Return signed plastic strain (4, station, depth), tensor components."""
+        """Return signed plastic strain (n_components, station, depth), tensor components."""
         body = self.view.profile_body
         points = self.system.response(body, at).state.plastic_strain
         return to_tensor(self.along_depth(self.fields.recovered(body, points)))
@@ -93,5 +94,5 @@ class Samples:
 
 
 def _extent(view: View) -> list[float]:
-    """Return from where to where a map reaches along x, and along y [mm]."""
-    return [float(end) for grid in (view.x, view.y) for end in (grid.min(), grid.max())]
+    """Return from where to where a map reaches across, and up [mm]."""
+    return [float(end) for grid in view.map_grid for end in (grid.min(), grid.max())]

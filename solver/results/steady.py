@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, diags_array, hstack
 from scipy.spatial import cKDTree
 
 from solver.contact.state import State
-from solver.fem.fields import recovery
+from solver.fem.fields import Sampler, recovery
 from solver.fem.frame import RigidMotion
 from solver.materials.state import Response
 from solver.results.contact_result import contact_patches
@@ -77,6 +77,10 @@ class TrackBody:
         """Return the body."""
         del name
         return self._part
+
+    def sampler(self, name: str, X: Array) -> Sampler:
+        """Return the interpolation of nodal fields at positions (2, n) [mm]."""
+        return Sampler(self.full(name), X)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n) from values at points, and at the surface, to nodes.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from solver.results.quantities import declare
-from solver.tensors import COMPONENTS
+from solver.results.quantities import declare, in_space
+from solver.tensors import components
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,6 +19,9 @@ X = declare(
     "x", "position along the surface from its middle", "mm", dims=("x",), beside={"axis": "X"}
 )
 Y = declare("y", "height above the surface", "mm", dims=("y",), beside={"axis": "Y"})
+Z = in_space(
+    "z", "position across the track from its middle", "mm", dims=("z",), beside={"axis": "Z"}
+)
 DEPTH = declare(
     "depth", "depth below the surface", "mm", dims=("depth",), standard_name="depth",
     beside={"positive": "down"},
@@ -36,7 +39,7 @@ BODY = declare("body", "body", "", dims=("body",))
 
 
 class Places(NamedTuple):
-    """Places in a body: (2, n) [mm]."""
+    """Places in a body: (2, n), or (3, n) where the body has three coordinates [mm]."""
 
     body: str
     X: Array
@@ -45,26 +48,37 @@ class Places(NamedTuple):
 class Axis(NamedTuple):
     """The straight line along a contact surface before loading.
 
-    ``origin`` (2,) is its middle [mm], ``along`` the unit vector in which s grows, with the lower
-    body on its right.
+    ``origin`` is its middle [mm], ``along`` the unit vector in which s grows. Both have as many
+    coordinates as places of the bodies: with two the lower body is on the right of the line, with
+    three below it, down along y.
     """
 
-    origin: tuple[float, float] = (0.0, 0.0)
-    along: tuple[float, float] = (1.0, 0.0)
+    origin: tuple[float, ...] = (0.0, 0.0)
+    along: tuple[float, ...] = (1.0, 0.0)
+
+    @property
+    def down(self) -> tuple[float, ...]:
+        """The unit vector from the surface into the lower body."""
+        x, y, *z = self.along
+        return (0.0, -1.0, 0.0) if z else (y, -x)
 
     def place(self, s: Array, depth: Array) -> Array:
-        """Return positions (2, n) at ``s`` along the surface and a depth below it [mm]."""
-        x, y = self.along
-        ways = np.multiply.outer(np.array([x, y]), s) + np.multiply.outer(np.array([y, -x]), depth)
+        """Return positions (n_axes, n) at ``s`` along the surface and a depth below it [mm]."""
+        ways = np.multiply.outer(np.array(self.along), s)
+        ways = ways + np.multiply.outer(np.array(self.down), depth)
         return np.asarray(ways + np.array(self.origin)[:, None])
 
     def reached(self, X: Array) -> Array:
-        """Return how far along the surface positions (2, n) are (n,) [mm]."""
+        """Return how far along the surface positions (n_axes, n) are (n,) [mm]."""
         return np.asarray(np.array(self.along) @ (X - np.array(self.origin)[:, None]))
 
 
 ALONG_X = Axis()
 """The axis of a horizontal surface at y = 0, the lower body below it."""
+ACROSS_TRACK = Axis((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+"""The axis across a horizontal track along x, at x = 0: that of a section in z and y."""
+NOWHERE = np.zeros(0)
+"""The positions of a grid that a view does not have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +88,7 @@ class View:
     Attributes
     ----------
     x, y : map grid, along the contact surface from its middle and above it [mm]
+    z : in the place of x for a section across the track, whose ``axis`` is `ACROSS_TRACK` [mm]
     depth, station : profiles go down to ``depth`` below the surface at s = ``station`` [mm]
     s : positions along the contact surface from its centre [mm]
     axis : the line that s and x run along
@@ -99,6 +114,18 @@ class View:
     following: tuple[str, ...] = ()
     symmetric: bool = False
     axis: Axis = ALONG_X
+    z: Array = field(default_factory=lambda: NOWHERE)
+
+    @property
+    def map_axes(self) -> tuple[str, str]:
+        """Names of the axes of the map: that across, and that up."""
+        return ("z" if self.z.size else "x"), "y"
+
+    @property
+    def map_grid(self) -> tuple[Array, Array]:
+        """Positions on the axes of the map: across, and up [mm]."""
+        across, up = (getattr(self, name) for name in self.map_axes)
+        return across, up
 
     @property
     def coordinates(self) -> dict[str, Any]:
@@ -106,12 +133,14 @@ class View:
         grids = {
             "x": self.x,
             "y": self.y,
+            "z": self.z,
             "depth": self.depth,
             "station": self.station,
             "s": self.s,
         }
         return {
-            "component": np.array(COMPONENTS),
+            # four components with two coordinates, six with three
+            "component": np.array(components(2 * len(self.axis.origin))),
             "stage": np.array(self.stages),
             "body": np.array(list(self.surfaces)),
             **{name: grid for name, grid in grids.items() if len(grid)},

@@ -12,13 +12,13 @@ from solver.errors import ModelError
 from solver.parameters import Accuracy
 from solver.results.outputs import Need, outputs
 from solver.results.quantities import QUANTITIES
+from solver.results.requested import of_body
+from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
 from studies.scenes.description import LARGEST
 
-_NODAL = ("stress.xx", "stress.yy", "stress.zz", "stress.xy", "mises", "plastic_strain",
-          "displacement.x", "displacement.y")  # fmt: skip
 RESERVED = frozenset({"status", "message", "id", "scene", "name", "title", "created"})
 """Names that a data set or a query has already."""
 
@@ -242,7 +242,7 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
             "line": list(scene.results.lines),
             "contact": [contact.name for contact in scene.contacts],
         }
-        fitting = ("body", "line") if output.of in _NODAL else ("contact",)
+        fitting = ("body", "line") if output.of in of_body(2) else ("contact",)
         given = {key: getattr(output, key) for key in places if getattr(output, key) is not None}
         if len(given) != 1 or not set(given) <= set(fitting):
             allowed = f"needs one of {', '.join(fitting)}, where {output.of} is taken"
@@ -271,7 +271,7 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
             yield StudyError(field, name, allowed)
     taken = {*QUANTITIES, *RESERVED, *scene.declared}
     for name in scene.outputs:
-        own = {name, f"{name}_x", f"{name}_y"}
+        own = {name, *(f"{name}_{axis}" for axis in AXES)}
         for each in sorted(own & taken):
             allowed = f"the data set has {each} already: choose another name"
             yield StudyError(f"outputs.{name}", name, allowed)

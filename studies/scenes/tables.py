@@ -10,6 +10,7 @@ from typing import (
     Annotated,
     Any,
     Literal,
+    TypeAlias,
     Union,
     get_args,
     get_origin,
@@ -27,6 +28,7 @@ from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Length, Stress
 from solver.parts import declared
 from solver.results.outputs import outputs
+from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
 from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
@@ -309,28 +311,20 @@ else:
     ResultsTable = _results()
 
 
-class OutputTable(SceneTable):
-    """A number of every run, and the place where it was found.
+def _requested() -> type[SceneTable]:
+    """Return the table of a requested number: of bodies with two coordinates, its name outside."""
+    words = (*of_body(2), *OF_CONTACT)
+    known = _fields(RequestedNumber) | {"of": (Literal[words], ...)}
+    entries = {name: each for name, each in known.items() if name not in ("name", "z")}
+    made = create_model("OutputTable", __base__=SceneTable, **entries)
+    made.__doc__ = RequestedNumber.__doc__
+    return made
 
-    ``of`` is a stress (``stress.xx``), ``mises``, ``plastic_strain`` or a displacement
-    (``displacement.x``) of a body, in a box of it or along a line; or ``pressure``, ``shear``,
-    ``gap`` or ``slip`` of a contact. ``take`` is the maximum, the minimum, the integral along the
-    line or contact, or the extent: the length along which the value is above zero. The extent of a
-    pressure is the length of contact.
-    """
 
-    of: Literal[
-        "stress.xx", "stress.yy", "stress.zz", "stress.xy", "mises", "plastic_strain",
-        "displacement.x", "displacement.y", "pressure", "shear", "gap", "slip",
-    ]  # fmt: skip
-    take: Literal["maximum", "minimum", "integral", "extent"] = "maximum"
-    stage: str
-    body: str | None = None
-    line: str | None = None
-    contact: str | None = None
-    x: Span | None = None
-    y: Span | None = None
-    description: str = ""
+if TYPE_CHECKING:
+    OutputTable: TypeAlias = Any
+else:
+    OutputTable = _requested()
 
 
 # -- the whole -----------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.results.quantities import QUANTITIES
+from solver.results.quantities import IN_SPACE, QUANTITIES
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import USUAL_AXES, Case
@@ -36,7 +36,7 @@ def attributes_of(name: str, scene: Scene | None = None) -> dict[str, str]:
     A ``scene`` may have numbers of its own.
     """
     own = {each.name: each for each in scene.quantities} if scene else {}
-    quantity = QUANTITIES.get(name) or own.get(name)
+    quantity = QUANTITIES.get(name) or own.get(name) or IN_SPACE.get(name)
     known = quantity.attributes if quantity else {"long_name": name.replace("_", " ")}
     return known | dict(LABEL_ATTRIBUTES.get(name, {}))
 

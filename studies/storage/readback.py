@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.results.mesh_fields import NO_NODE, MeshFields
-from solver.results.quantities import QUANTITIES
+from solver.results.quantities import IN_SPACE, QUANTITIES
 from solver.results.record import Record
 from solver.scenes import Scene
-from solver.tensors import COMPONENTS
+from solver.tensors import AXES, components
 from studies.definition.cases import Case
 from studies.definition.parameters import build, parameters_of
 from studies.definition.vocabulary import ERROR, KEEP, LABEL_ATTRIBUTES, SYMMETRIC
@@ -132,7 +132,7 @@ def _meant(
 def _words(name: str, scene: Scene) -> dict[str, Any]:
     """Return the attributes of a quantity as it was declared; one that was not has its name."""
     own = (each for each in scene.quantities if each.name == name)
-    declared = QUANTITIES.get(name) or next(own, None)
+    declared = QUANTITIES.get(name) or next(own, None) or IN_SPACE.get(name)
     if declared is None:
         return {"long_name": name.replace("_", " "), "units": None}
     flags = list(declared.flags) if declared.flags else []
@@ -171,13 +171,13 @@ def _meant_mesh(fields: MeshFields) -> Iterator[tuple[str, _Meant]]:
     yield "time", _Meant(("time",), np.arange(len(fields.stages), dtype=float), {"units": None})
     stages = np.array(list(fields.stages), dtype=object)
     yield "mesh_stage", _Meant(("time",), stages)
-    for axis, x in zip("xy", fields.X, strict=True):
+    for axis, x in zip(AXES, fields.X, strict=False):
         yield f"mesh_node_{axis}", _Meant(("mesh_node",), x, {"units": "mm"})
     at = list(fields.stages.values())
     parts = {f"displacement_{a}": ("mm", [s["displacement"][k] for s in at])
-             for k, a in enumerate("xy")}  # fmt: skip
+             for k, a in enumerate(AXES[: len(at[0]["displacement"])])}  # fmt: skip
     parts |= {f"stress_{c}": ("MPa", [s["stress"][k] for s in at])
-              for k, c in enumerate(COMPONENTS)}  # fmt: skip
+              for k, c in enumerate(components(len(at[0]["stress"])))}  # fmt: skip
     parts |= {"mises": ("MPa", [s["mises"] for s in at]),
               "plastic_strain": ("1", [s["plastic_strain"] for s in at])}  # fmt: skip
     for name, (units, values) in parts.items():

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.results.mesh_fields import NO_NODE, MeshFields
-from solver.tensors import COMPONENTS
+from solver.tensors import AXES, components
 from studies.definition.vocabulary import FIELDS, KEEP
 from studies.errors import StudyError
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 _MESH = "mesh"
 _TIME, _NODE, _FACE, _CELL = "time", "mesh_node", "mesh_face", "mesh_cell"
-_AXES = ("x", "y")
 
 
 def variables(fields: MeshFields) -> dict[str, Any]:
@@ -46,7 +45,7 @@ def variables(fields: MeshFields) -> dict[str, Any]:
     topology = {
         "cf_role": "mesh_topology",
         "topology_dimension": np.int32(2),
-        "node_coordinates": "mesh_node_x mesh_node_y",
+        "node_coordinates": " ".join(f"mesh_node_{a}" for a in AXES[: len(fields.X)]),
         "face_node_connectivity": "mesh_face_nodes",
         "face_dimension": _FACE,
         "long_name": "faces through all nodes of the bodies",
@@ -75,7 +74,7 @@ def variables(fields: MeshFields) -> dict[str, Any]:
         ),
         "mesh_stage": (_TIME, np.array(list(fields.stages), dtype=object), {"long_name": "stage"}),
     }
-    for axis, values in zip(_AXES, fields.X, strict=True):
+    for axis, values in zip(AXES, fields.X, strict=False):
         words = {"long_name": f"position of the node along {axis}", "units": "mm"}
         out[f"mesh_node_{axis}"] = (_NODE, values, words)
     for name, values in _parts(fields).items():
@@ -106,17 +105,19 @@ def read(run: xr.Dataset) -> MeshFields:
     for number, (name, element) in enumerate(elements.items()):
         own = cells[of == number]
         bodies[name] = (element, own[:, (own != NO_NODE).all(axis=0)])
+    axes = [a for a in AXES if f"{_MESH}_node_{a}" in run]
+    parts = components(2 * len(axes))
     stages = [
         {
-            "displacement": np.stack([_at(run, f"displacement_{a}", k) for a in _AXES]),
-            "stress": np.stack([_at(run, f"stress_{c}", k) for c in COMPONENTS]),
+            "displacement": np.stack([_at(run, f"displacement_{a}", k) for a in axes]),
+            "stress": np.stack([_at(run, f"stress_{c}", k) for c in parts]),
             "mises": _at(run, "mises", k),
             "plastic_strain": _at(run, "plastic_strain", k),
         }
         for k in range(run.sizes[_TIME])
     ]
     names = [str(name) for name in run["mesh_stage"].to_numpy()]
-    X = np.stack([run[f"mesh_node_{a}"].to_numpy() for a in _AXES])
+    X = np.stack([run[f"mesh_node_{a}"].to_numpy() for a in axes])
     return MeshFields(X=X, bodies=bodies, stages=dict(zip(names, stages, strict=True)))
 
 
@@ -128,8 +129,8 @@ def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
     }
     moved, stress = stacked.pop("displacement"), stacked.pop("stress")
     return {
-        **{f"displacement_{a}": moved[:, k] for k, a in enumerate(_AXES)},
-        **{f"stress_{c}": stress[:, k] for k, c in enumerate(COMPONENTS)},
+        **{f"displacement_{a}": moved[:, k] for k, a in enumerate(AXES[: moved.shape[1]])},
+        **{f"stress_{c}": stress[:, k] for k, c in enumerate(components(stress.shape[1]))},
         **stacked,
     }
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from solver.tensors import COMPONENTS
+from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
     from solver import Solution
@@ -28,6 +28,7 @@ def to_xarray(solution: Solution) -> xr.Dataset:
     ``mises`` [MPa] and ``plastic_strain`` (stage, node).
     """
     fields = solution.mesh_fields()
+    axes = AXES[: len(fields.X)]
     names = list(fields.bodies)
     of = np.repeat(names, [solution.nodes(name).shape[1] for name in names])
     stages = fields.stages.values()
@@ -38,10 +39,9 @@ def to_xarray(solution: Solution) -> xr.Dataset:
         },
         coords={
             "stage": list(fields.stages),
-            "axis": ["x", "y"],
-            "component": list(COMPONENTS),
+            "axis": list(axes),
+            "component": list(components(2 * len(axes))),
             "body": ("node", of),
-            "x": ("node", fields.X[0], {"units": "mm"}),
-            "y": ("node", fields.X[1], {"units": "mm"}),
+            **{a: ("node", x, {"units": "mm"}) for a, x in zip(axes, fields.X, strict=True)},
         },
     )

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from solver.results.quantities import QUANTITIES
+from solver.tensors import AXES
 from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked, value_text
@@ -121,7 +122,8 @@ def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
         return xr.zeros_like(dataset[name], dtype=bool)
     if name == "max_plastic_strain":
         return dataset[name] > dataset[_AWAY]
-    for axes in (("x", "y"), ("s",)):
+    places = [axis for axis in AXES if f"singular_{axis}" in dataset]
+    for axes in (places, ["s"]):
         if all(f"{name}_{axis}" in dataset for axis in axes):
             off = [dataset[f"{name}_{axis}"] - dataset[f"singular_{axis}"] for axis in axes]
             far = sum((each**2 for each in off[1:]), off[0] ** 2) ** 0.5
@@ -136,7 +138,8 @@ def _own(dataset: xr.Dataset) -> list[str]:
     names = [str(name) for name, each in dataset.data_vars.items() if each.dims == rank]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
     own = [name for name in names if name not in known and not name.startswith("audit_")]
-    return [name for name in own if name[-2:] not in {"_x", "_y"} or name[:-2] not in own]
+    ends = {f"_{axis}" for axis in AXES}
+    return [name for name in own if name[-2:] not in ends or name[:-2] not in own]
 
 
 def messages(dataset: xr.Dataset) -> str:

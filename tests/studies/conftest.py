@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from solver.scenes import Scene
 from studies import Store, Study
 from studies.definition.identity import solver_hash
 from studies.execution.task import PathTask, walk
@@ -24,11 +25,11 @@ def fake_study(name: str = "fake", sweep: dict[str, Any] | None = None, **fixed:
     )
 
 
-def compute_here(study: Study, store: Store) -> list[dict[str, Any]]:
+def compute_here(study: Study, store: Store, scene: Scene = FAKE) -> list[dict[str, Any]]:
     """Compute a study in this process, without a grid; return what the tasks reported."""
     reports: list[dict[str, Any]] = []
     for path in study.paths():
-        task = PathTask(FAKE, path, store.directory, solver_hash())
+        task = PathTask(scene, path, store.directory, solver_hash(), study.keep)
         walk(task, reports.append, lambda: False)
     store.reconcile()
     store.save_study(study)

@@ -11,6 +11,7 @@ from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, C
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
 from solver.results.audit.values import Located, flowed
+from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _LEAST_LENGTH = 1e-9
 """Displacement, gap or slip / size of the bodies, that is next to nothing."""
-_PARTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
+_PARTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 _ROUNDED = 1e-9
 """Difference of times of the program that is rounding."""
 
@@ -78,9 +79,9 @@ class NamedPlacesCheck:
 
     def _lines(self) -> None:
         for k, line in enumerate(self._places.lines.values()):
-            X = np.stack([self._field("line_x")[k], self._field("line_y")[k]])
+            X = np.stack([self._field(f"line_{a}")[k] for a in AXES[: len(line.X)]])
             self._out.add("line_x", X, line.X, float(np.abs(line.X).max()))
-            s = np.append(0.0, np.cumsum(np.hypot(*np.diff(line.X))))
+            s = _lengths(line.X)
             self._out.add("line_s", self._field("line_s")[k], s, s[-1])
             stress, mises, strain = (
                 self._field(f"line_{name}")[k] for name in ("stress", "mises", "plastic_strain")
@@ -91,7 +92,7 @@ class NamedPlacesCheck:
 
     def _points(self) -> None:
         for k, point in enumerate(self._places.points.values()):
-            X = np.array([self._field("point_x")[k], self._field("point_y")[k]])
+            X = np.array([self._field(f"point_{a}")[k] for a in AXES[: len(point.X)]])
             self._out.add("point_x", X, point.X[:, 0], float(np.abs(point.X).max()))
             stress, mises, strain = (
                 self._field(f"point_{name}")[k][..., None]
@@ -101,7 +102,7 @@ class NamedPlacesCheck:
             for j, stage in enumerate(self._run.view.stages):
                 moved = self._source.fields(point.body, stage).displacement
                 own, scale = places.of(moved)[:, 0], self._scale("displacement", moved)
-                for axis, value in zip("xy", own, strict=True):
+                for axis, value in zip(AXES, own, strict=False):
                     name = f"point_displacement_{axis}"
                     self._out.add(name, self._field(name)[k, j], value, scale)
 
@@ -216,15 +217,15 @@ class NamedPlacesCheck:
                 "pressure", "shear") else values  # fmt: skip
         else:
             values, X = self._values(number, kind, part)
-            s = np.append(0.0, np.cumsum(np.hypot(*np.diff(X))))
+            s = _lengths(X)
         scale = self._scale(kind, values)
         if not np.isfinite(values).any():
             return
         if number.take in ("maximum", "minimum"):
             own = np.nanmax(values) if number.take == "maximum" else np.nanmin(values)
             self._out.add(number.name, told, own, scale, share)
-            place = [self._record.scalars[f"{number.name}_{axis}"] for axis in "xy"]
-            off = np.hypot(*(X - np.array(place)[:, None]))
+            place = [self._record.scalars[f"{number.name}_{axis}"] for axis in AXES[: len(X)]]
+            off = np.hypot.reduce(X - np.array(place)[:, None])
             there = values[off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()]
             near = np.abs(there[np.isfinite(there)] - own).min(initial=np.inf)
             self._out.add(f"{number.name}_x", near, 0.0, scale, share)
@@ -255,10 +256,15 @@ class NamedPlacesCheck:
             values = values[_PARTS[part]] if part else np.maximum(values, 0.0)
             X = fields.plain.part.X if X is None else X
         inside = np.ones(X.shape[1], dtype=bool)
-        for at, span in zip(X, (number.x, number.y), strict=True):
+        for at, span in zip(X, (number.x, number.y, number.z), strict=False):
             if span is not None and number.line is None:
                 inside &= (at >= span[0]) & (at <= span[1])
         return np.where(inside, values, np.nan), X
+
+
+def _lengths(X: Array) -> Array:
+    """Return how far places (n_axes, n) are from the first (n,), along the line through them."""
+    return np.append(0.0, np.cumsum(np.hypot.reduce(np.diff(X))))
 
 
 def _on_slave(found: Tractions, kind: str) -> Array:

@@ -30,9 +30,9 @@ def between(x: Array, at: Array, values: Array) -> Array:
 
 
 def along(view: View, X: Array) -> Array:
-    """Return how far along the axis of a view places (2, n) are (n,) [mm]."""
-    (x0, y0), (ax, ay) = view.axis
-    return np.asarray((X[0] - x0) * ax + (X[1] - y0) * ay)
+    """Return how far along the axis of a view places (n_axes, n) are (n,) [mm]."""
+    each = zip(X, *view.axis, strict=True)
+    return np.asarray(sum((x - x0) * ax for x, x0, ax in each))
 
 
 class OfStates:

@@ -21,6 +21,7 @@ from solver.results.audit.figures import AUDIT
 from solver.results.audit.named import NamedPlacesCheck
 from solver.results.audit.sources import OfStates, along, between
 from solver.results.audit.values import Located, flowed
+from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -140,9 +141,10 @@ class _Viewed:
     # -- fields at places ----------------------------------------------------------------------
 
     def _place(self, s: Array, depth: Array) -> Array:
-        """Return places (2, n) along the axis of the view and below it [mm]."""
-        (x0, y0), (ax, ay) = self._view.axis
-        return np.stack([x0 + s * ax + depth * ay, y0 + s * ay - depth * ax])
+        """Return places (n_axes, n) along the axis of the view and below it [mm]."""
+        axis = self._view.axis
+        each = zip(*axis, axis.down, strict=True)
+        return np.stack([x0 + s * ax + depth * down for x0, ax, down in each])
 
     def _against(
         self,
@@ -159,10 +161,11 @@ class _Viewed:
         self._out.absent(name, stored, np.all([p.outside for p in places], axis=0))
 
     def _maps(self) -> None:
-        x, y, view = self._axis("x"), self._axis("y"), self._view
+        view = self._view
+        x, y = (self._axis(name) for name in view.map_axes)
         single = {
             "residual_stress": (view.unloaded, _itself),
-            "stress_difference": (view.loaded, _difference),
+            "stress_difference": (view.loaded, self._difference),
         }
         staged = {"map_stress": _stress, "map_mises": _mises}
         names = [*single, *staged, "plastic_strain", "map_plastic_strain"]
@@ -203,12 +206,19 @@ class _Viewed:
                 values = flat[name] if name == "plastic_strain" else flat[name][k]
                 self._against(name, values[at], own, bodies, self._strain_scale(values))
 
+    def _difference(self, stress: Array) -> Array:
+        """Return the difference of the principal stresses in the plane of the map (n,)."""
+        axes = self._view.map_axes
+        one, other = (stress[AXES.index(axis)] for axis in axes)
+        shear = stress[components(len(stress)).index("".join(sorted(axes)))]
+        return np.asarray(np.sqrt((one - other) ** 2 + 4 * shear**2))
+
     def _profiles(self) -> None:
         stress, strain = self._stored("residual_profile"), self._stored("profile_plastic_strain")
         if stress is None or strain is None:
             return
         station, depth, view = self._axis("station"), self._axis("depth"), self._view
-        flat = np.moveaxis(stress, 1, 0).reshape(4, -1)
+        flat = np.moveaxis(stress, 1, 0).reshape(stress.shape[1], -1)
         at = some(strain.size, flat, strain.ravel())
         where = self._place(station[at // len(depth)], depth[at % len(depth)])
         places = Located(self._source.plain(view.profile_body), where)
@@ -304,7 +314,7 @@ class _Viewed:
             s = along(self._view, X[:, surface])
             for kind, of in (("max", np.max), ("min", np.min)):
                 for prefix, stress, places, axes in (
-                    ("residual", fields.stress, X, ("x", "y")),
+                    ("residual", fields.stress, X, AXES[: len(X)]),
                     ("surface_residual", fields.stress[:, surface], s[None], ("s",)),
                 ):
                     own = of(stress, axis=1)
@@ -313,13 +323,13 @@ class _Viewed:
     def _extreme(
         self, name: str, body: int, own: Array, stress: Array, places: Array, axes: tuple[str, ...]
     ) -> None:
-        """Compare extremes (4,), and the stress (4, n_nodes) at the places that are stored."""
+        """Compare extremes (n,), and the stress (n, n_nodes) at the places that are stored."""
         told = self._stored(name)
         at = [self._stored(f"{name}_{axis}") for axis in axes]
         if told is None or any(one is None for one in at):
             return
         self._out.add(name, told[body], own, self.stress_scale)
-        where = np.stack([np.asarray(one)[body] for one in at])  # (n_axes, 4)
+        where = np.stack([np.asarray(one)[body] for one in at])  # (n_axes, n)
         for component in np.flatnonzero(np.isfinite(where).all(axis=0)):
             off = np.abs(places - where[:, component, None]).max(axis=0)
             there = stress[component, off <= off.min() + 1e-9 * np.abs(places).max()]
@@ -337,9 +347,3 @@ def _mises(fields: BodyFields) -> Array:
 
 def _itself(values: Array) -> Array:
     return values
-
-
-def _difference(stress: Array) -> Array:
-    """Return the difference of the principal stresses in the plane (n,) of components (4, n)."""
-    xx, yy, _, xy = stress
-    return np.asarray(np.sqrt((xx - yy) ** 2 + 4 * xy**2))

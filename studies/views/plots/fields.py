@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import xarray as xr
 
+from solver.tensors import AXES
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
 
 Window = Sequence[float]
-"""Part of a map: x0, x1, y0, y1 [mm]."""
+"""Part of a map: from where to where across, and up [mm]."""
 
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
-MAP = ("y", "x")
 ALONG = ("s", "depth", "increment", "fraction")
-"""Dimensions that one figure of a run runs over: both of a map, or one of these for lines."""
+"""Dimensions that lines run over, one of them."""
+DRAWN = (*AXES, *ALONG)
+"""Dimensions that one figure of a run runs over: two axes of a map, or one of `ALONG`."""
 
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
@@ -35,13 +37,25 @@ def labelled_fields(dataset: xr.Dataset) -> list[str]:
     return [
         str(name)
         for name, each in dataset.data_vars.items()
-        if sweep < set(each.dims) and not {*MAP, *ALONG} & {*each.dims} and each.dtype.kind in "fi"
+        if sweep < (own := set(each.dims)) and not {*DRAWN} & (own - sweep)
+        if each.dtype.kind in "fi"
     ]
 
 
 def map_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables that are drawn as maps of the bodies."""
-    return [str(name) for name, each in dataset.data_vars.items() if set(MAP) <= set(each.dims)]
+    sweep = dataset["status"].dims
+    fields = dataset.data_vars.items()
+    return [str(name) for name, each in fields if len(map_axes(each, sweep)) == 2]
+
+
+def map_axes(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> tuple[str, ...]:
+    """Return the dimensions of a field that are coordinates: of a map that across, and that up.
+
+    An axis of the sweep is none, whatever its name.
+    """
+    own = (name for name in reversed(values.dims) if name not in sweep)
+    return tuple(str(name) for name in own if name in AXES)
 
 
 def line_fields(dataset: xr.Dataset) -> list[str]:
@@ -98,9 +112,11 @@ def focus(run: xr.Dataset, zoom: float) -> float:
     return edge
 
 
-def empty_window(window: Window) -> StudyError:
-    """Return what is wrong with a window that shows nothing."""
-    allowed = "must be x0 x1 y0 y1 [mm] with x0 < x1, y0 < y1, and hold two points or more"
+def empty_window(window: Window, across: str, up: str) -> StudyError:
+    """Return what is wrong with a window that shows nothing of a map over these axes."""
+    a, b = across, up
+    ends = f"{a}0 {a}1 {b}0 {b}1 [mm] with {a}0 < {a}1, {b}0 < {b}1"
+    allowed = f"must be {ends}, and hold two points or more"
     return StudyError("window", list(window), allowed)
 
 

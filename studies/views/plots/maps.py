@@ -12,13 +12,13 @@ from studies.errors import StudyError
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, wrapped
 from studies.views.plots.fields import (
-    MAP,
     Window,
     check_field,
     component_of,
     empty_window,
     focus,
     is_half,
+    map_axes,
     map_fields,
     too_close,
     usual_field,
@@ -52,12 +52,13 @@ def map_figure(
     Parameters
     ----------
     run : data set of one run
-    field : variable over ``y`` and ``x``, by default the residual stress, or the stress where the
-        bodies are not released; of several stages the last is drawn
+    field : variable over two coordinates, such as ``y`` and ``x``, the last of them across; by
+        default the residual stress, or the stress where the bodies are not released; of several
+        stages the last is drawn
     component : of a stress tensor; the first one by default
     zoom : show only what lies within this distance of the contact's centre, or of its edge where
         half of the bodies was computed [mm]
-    window : show only x0 <= x <= x1, y0 <= y <= y1: (x0, x1, y0, y1) [mm]
+    window : show only this part: from where to where across, and up, such as (x0, x1, y0, y1) [mm]
 
     Raises
     ------
@@ -68,7 +69,8 @@ def map_figure(
     field = field or usual_field(run)
     check_field(field, map_fields(run))
     values = component_of(run[field], component)
-    values = values.isel({name: -1 for name in values.dims if name not in MAP}).transpose(*MAP)
+    across, up = map_axes(values)
+    values = values.isel({name: -1 for name in values.dims if name not in (up, across)})
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     if zoom is not None:
         middle = focus(run, zoom)
@@ -76,7 +78,7 @@ def map_figure(
     elif is_half(run):
         values = whole(values)
     if window is not None:
-        values = _inside(values, window, empty_window(window))
+        values = _inside(values, window, empty_window(window, across, up))
     signed = "component" in values.coords
     high, note = _limit(values, signed)
     width, height = _size(values)
@@ -84,11 +86,11 @@ def map_figure(
     axes = sheet.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=_OUTSIDE)
     entitle(axes, run, values, max(width, _TEXT))
     mesh = axes.pcolormesh(
-        values["x"], values["y"], values, shading="nearest", rasterized=True,
+        values[across], values[up], values, shading="nearest", rasterized=True,
         cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
     )  # fmt: skip
-    (left, right), (low, up) = axes.get_xlim(), axes.get_ylim()
-    seen = edge > 0.0 and low <= 0.0 <= up
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    seen = edge > 0.0 and bottom <= 0.0 <= top
     ends = [end for end in (-edge, edge) if seen and left <= end <= right]
     if ends:  # from above: a line would hide the stress at the surface
         axes.plot(
@@ -96,7 +98,8 @@ def map_figure(
             label="edge of contact under load",
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
-    axes.set(xlim=(left, right), ylim=(low, up), xlabel=_symbol(run["x"]), ylabel=_symbol(run["y"]))
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.set(xlabel=_symbol(run[across]), ylabel=_symbol(run[up]))
     axes.set_aspect("equal")
     beside = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.16 / width, 1.0))
     over, under = bool((values > high).any()), signed and bool((values < -high).any())
@@ -115,24 +118,29 @@ def map_figure(
 def whole(values: xr.DataArray) -> xr.DataArray:
     """Return a map of both halves of bodies that are symmetric about x = 0, from the half x >= 0.
 
-    Shear across this line, or this axis, changes sign on the other side. A column on it stays one.
-    Where the map begins away from it, what lies between the halves is not known.
+    Of a section it is z, whichever goes across. Shear across this line, or this axis, changes sign
+    on the other side. A column on it stays one. Where the map begins away from it, what lies
+    between the halves is not known.
     """
-    values = values.isel(x=values["x"].to_numpy() >= 0.0)
-    x = values["x"].to_numpy()
+    across, _ = map_axes(values)
+    values = values.isel({across: values[across].to_numpy() >= 0.0})
+    x = values[across].to_numpy()
     if (start := 2.0 * x[0] - x[1]) > 0.0:  # one step from the map towards the line
-        values = xr.concat([values.isel(x=[0]).assign_coords(x=[start]) * np.nan, values], "x")
+        before = values.isel({across: [0]}).assign_coords({across: [start]}) * np.nan
+        values = xr.concat([before, values], across)
     component = str(values["component"].item()) if "component" in values.coords else ""
-    sign = -1.0 if component.count("x") == 1 else 1.0
-    other = sign * values.isel(x=slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1))
-    return xr.concat([other.assign_coords(x=-other["x"]), values], "x").assign_attrs(values.attrs)
+    sign = -1.0 if component.count(across) == 1 else 1.0
+    other = sign * values.isel({across: slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1)})
+    both = xr.concat([other.assign_coords({across: -other[across]}), values], across)
+    return both.assign_attrs(values.attrs)
 
 
 def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.DataArray:
     """Return the part of a map in a window, or raise the error for one that shows nothing."""
-    x, y = values["x"], values["y"]
+    across, up = map_axes(values)
+    x, y = (values[name].to_numpy() for name in (across, up))
     x0, x1, y0, y1 = window
-    part = values.isel(x=np.flatnonzero((x0 <= x) & (x <= x1)), y=(y0 <= y) & (y <= y1))
+    part = values.isel({across: (x0 <= x) & (x <= x1), up: (y0 <= y) & (y <= y1)})
     if min(part.shape) < 2 or not part.notnull().any():
         raise nothing
     return part
@@ -161,7 +169,7 @@ def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
 
 def _areas(values: xr.DataArray) -> np.ndarray:
     """Return the area of each point of a map, whose points lie closer where stress is steep."""
-    dx, dy = (np.gradient(values[name].to_numpy()) for name in ("x", "y"))
+    dx, dy = (np.gradient(values[name].to_numpy()) for name in map_axes(values))
     return np.abs(np.multiply.outer(dy, dx))
 
 
@@ -174,7 +182,7 @@ def _percentile(values: np.ndarray, area: np.ndarray) -> float:
 
 def _size(values: xr.DataArray) -> tuple[float, float]:
     """Return width and height of the axes of a map [in]."""
-    width, height = (float(np.ptp(values[name].to_numpy())) for name in ("x", "y"))
+    width, height = (float(np.ptp(values[name].to_numpy())) for name in map_axes(values))
     scale = min(np.sqrt(_AREA / (width * height)), _LONGEST / max(width, height))
     return scale * width, scale * height
 

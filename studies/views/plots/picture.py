@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from studies.errors import StudyError, one_of
 from studies.views.picking import one_run, positions, runs_over, select, sweep_coordinates
 from studies.views.plots.fields import (
-    ALONG,
-    MAP,
+    DRAWN,
     Window,
     check_field,
     component_of,
@@ -132,7 +131,7 @@ def _part(
     It is cut along the field's own dimensions.
     """
     swept = sweep_coordinates(dataset)
-    drawn = {*swept.values(), *MAP, *ALONG, "component"}
+    drawn = {*swept.values(), *DRAWN, "component"}
     own = [str(name) for name in dataset[field].dims if name not in drawn]
     _known(selection, [*swept, *own])
     chosen = {name: selection[name] for name in swept if name in selection}

@@ -264,6 +264,19 @@ def test_the_figure_suits_the_field(computed: ComputedStudy) -> None:
         assert picture(together, "increments").axes[0].collections
 
 
+def test_an_axis_of_the_sweep_may_be_called_like_a_coordinate(computed: ComputedStudy) -> None:
+    _, store = computed
+    with open_study(store.directory) as together:
+        swept = together.rename(friction="z")
+        axes, mesh = mesh_of(picture(swept, "residual_stress"))
+        np.testing.assert_array_equal(
+            np.ma.getdata(mesh.get_array()),
+            np.ma.getdata(mesh_of(picture(together, "residual_stress"))[1].get_array()),
+        )
+        assert picture(swept, "pass_creepage", selection={"pass": 1}).axes[0].collections
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "y [mm]")
+
+
 def test_an_unknown_field_is_told_all_that_can_be_drawn(computed: ComputedStudy) -> None:
     _, store = computed
     with open_study(store.directory) as together, pytest.raises(StudyError) as caught:
