@@ -47,7 +47,7 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
 
 def _released(before: Converged, now: Converged) -> float:
     """Return the work of bodies on contact forces that vanish as they are taken apart [N mm]."""
-    if not now.apart:
+    if not now.separated:
         return 0.0
     moves = zip(before.state.u, now.state.u, before.contact_forces, strict=True)
     return -sum(float(force @ (u1 - u0)) / 2 for u0, u1, force in moves)

@@ -334,7 +334,7 @@ class Increment:
             blended=self._blended,
             beyond_end=beyond_end(self.system, u, candidates),
             timing=self._timing(candidates),
-            apart=not self.contact,
+            separated=not self.contact,
         )
 
     def _timing(self, candidates: Candidates) -> Timing:
