@@ -152,7 +152,7 @@ class System:
         """
         at, found = self._least
         if at != time:  # an increment asks for it, and then its energy
-            force, energy = np.array([part.resisted(time) for part in self.parts]).T
+            force, energy = np.array([part.clamped(time) for part in self.parts]).T
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
             self._least = time, found
         return found
