@@ -1,4 +1,4 @@
-"""What a record stores at places that have names, against what is computed anew."""
+"""Compare stored results at named places with recomputed values."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LEAST_LENGTH = 1e-9
-"""Displacement, gap or slip / size of the bodies, that is next to nothing."""
+"""Least scale of displacement, gap and slip, over the size of the bodies."""
 _PARTS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "x": 0, "y": 1}
 _ROUNDED = 1e-9
-"""Difference of times of the program that is rounding."""
+"""Largest difference of two equal times of the program."""
 
 
 class NamedPlacesCheck:
-    """Lines, points, contact surfaces, the course of forces and motions, and numbers.
+    """Comparison of lines, points, contact surfaces, forces and motions over time, and numbers.
 
     Parameters
     ----------
-    stress_scale : that differences of stress are divided by [MPa]
+    stress_scale : scale by which differences of stress are divided [MPa]
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class NamedPlacesCheck:
                        "gap": length, "slip": length}  # fmt: skip
 
     def compare(self) -> None:
-        """Compare all that is declared."""
+        """Compare all declared results."""
         self._lines()
         self._points()
         self._pairs()
@@ -142,7 +142,7 @@ class NamedPlacesCheck:
                     values = _on_slave(found, name)
                     told = self._field(f"contact_{name}")[k, j]
                     scale = self._scale(name, values)
-                    if name in ("gap", "slip"):  # unloaded, what is left of them is rounding
+                    if name in ("gap", "slip"):  # after unloading only rounding may be left
                         scale = max(found.way, self._least[name])
                     self._out.add(f"contact_{name}", told, between(s, found.s, values), scale,
                                   self._share(found, name))  # fmt: skip
@@ -187,7 +187,7 @@ class NamedPlacesCheck:
         else:
             own = own - self._source.plain(body.name).applied(state.time)[0]
             if body.kinematics == "axisymmetric":
-                own[0] = np.nan  # radial forces are in balance round the axis
+                own[0] = np.nan  # radial forces balance around the axis
         share = LIMIT / MEASURED if measured else 1.0
         for name, value in zip(("reaction_x", "reaction_y"), own, strict=True):
             told = self._field(name)[j, increment]
@@ -238,7 +238,7 @@ class NamedPlacesCheck:
         self._out.add(number.name, told, _above_zero(values, s), s[-1], share)
 
     def _values(self, number: RequestedNumber, kind: str, part: str) -> tuple[Array, Array]:
-        """Return the values (n,) of a field of a body or line, and where they are (2, n)."""
+        """Return the values (n,) of a field of a body or line, and their positions (2, n)."""
         if number.line is not None:
             line = self._places.lines[number.line]
             body, X = line.body, line.X
@@ -262,7 +262,7 @@ class NamedPlacesCheck:
 
 
 def _on_slave(found: Tractions, kind: str) -> Array:
-    """Return what acts at the vertices of a slave (n,), NaN where it is not known."""
+    """Return pressure, shear, gap or slip at the vertices of a slave (n,), NaN if not known."""
     if kind in ("pressure", "pressure_deformed"):
         moved = kind == "pressure_deformed"
         return np.where(found.known, found.pressure(moved=moved), np.nan)
@@ -273,7 +273,7 @@ def _on_slave(found: Tractions, kind: str) -> Array:
 
 
 def _above_zero(values: Array, s: Array) -> float:
-    """Return the length along which values, linear between places, are above zero."""
+    """Return the length on which values, linear between positions s, are above zero [mm]."""
     total = 0.0
     for a, b, length in zip(values[:-1], values[1:], np.diff(s), strict=True):
         if a > 0 and b > 0:
