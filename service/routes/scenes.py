@@ -1,4 +1,4 @@
-"""What can be computed, and what it takes; scenes of the callers' own."""
+"""Scenes: list, parameters, and posting of the caller's own scene files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from studies.storage.shelf import newest
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
 LISTED = 100
-"""Scenes of callers that are listed, the newest first."""
+"""Number of posted scenes that are listed, the newest first."""
 
 
 @router.get("")
