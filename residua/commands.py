@@ -58,10 +58,10 @@ def run(options: argparse.Namespace) -> int:
             should_stop=lambda: bool(interrupted),
         )
     progress.close()
-    told = report(study, store, outcome)
+    printed = report(study, store, outcome)
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
-    print(f"{told.text.rstrip()}, {computed}")
-    written = {outcome.dataset: outcome.anew} | dict.fromkeys(told.files, told.anew)
+    print(f"{printed.text.rstrip()}, {computed}")
+    written = {outcome.dataset: outcome.anew} | dict.fromkeys(printed.files, printed.anew)
     for path, anew in written.items():
         print(f"{'wrote' if anew else 'kept'} {path}")
     if outcome.stopped:

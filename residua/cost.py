@@ -25,7 +25,7 @@ def dry_run(study: Study, store: Store) -> str:
         else f"{found.increments} in all, at most {found.longest} on a path",
         "processor time": _time(found) or unknown,
         "disk": f"about {_size(found.bytes)}",
-        "told from": found.basis,
+        "estimated from": found.basis,
     }
     table = (f"{name:<16}{text}" for name, text in lines.items())
     return "\n".join([f"{study.name}: nothing is computed or written", *table])

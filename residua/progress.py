@@ -47,8 +47,8 @@ class Progress:
             if event.kind == "path" and event.fraction == 0.0:  # nothing is done yet
                 self._reused = round(event.progress * self._size)
             if self._reused and not self._bar:
-                told = f"{self._reused} of {self._size} runs exist already"
-                print(told, file=self._stream, flush=True)
+                text = f"{self._reused} of {self._size} runs exist already"
+                print(text, file=self._stream, flush=True)
         if event.kind == "waiting" and event.message and event.message not in self._waits:
             self._waits.add(event.message)
             left = "\n" if self._bar and self._drawn else ""

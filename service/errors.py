@@ -194,8 +194,8 @@ def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer with an error of one sentence."""
     status = status_of(exc)
     later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
-    told = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
-    said = told.get(type(exc), str(exc))
+    texts = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
+    said = texts.get(type(exc), str(exc))
     return problem(request, status, said, headers=later)
 
 

@@ -18,7 +18,7 @@ UNCHANGED: dict[int | str, dict[str, Any]] = {
 }
 NETCDF: dict[int | str, dict[str, Any]] = {
     200: {"content": {MEDIA_TYPE: {}}},
-    206: {"description": "The part that was asked for", "content": {MEDIA_TYPE: {}}},
+    206: {"description": "The requested part", "content": {MEDIA_TYPE: {}}},
     **UNCHANGED,
 }
 

@@ -79,9 +79,9 @@ def job_of(row: sqlite3.Row) -> Job | None:
 def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str, list[str]]:
     """Return the SQL condition for jobs in a state, of studies with a tag, and its values."""
     tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
-    asked = {"state = ?": state, tagged: tag}
-    clauses = [clause for clause, value in asked.items() if value is not None]
-    values = [str(value) for value in asked.values() if value is not None]
+    conditions = {"state = ?": state, tagged: tag}
+    clauses = [clause for clause, value in conditions.items() if value is not None]
+    values = [str(value) for value in conditions.values() if value is not None]
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 

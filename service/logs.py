@@ -41,9 +41,9 @@ class About(logging.Filter):
     def filter(self, record: logging.LogRecord) -> bool:
         """Add the ids."""
         known = {"request": REQUEST.get(), **self.ids, **vars(record)}
-        told = {name: known[name] for name in ("request", "study", "run") if known.get(name)}
-        about = "".join(f" {name}={value}" for name, value in told.items())
-        vars(record).update(told, about=about)
+        entry = {name: known[name] for name in ("request", "study", "run") if known.get(name)}
+        about = "".join(f" {name}={value}" for name, value in entry.items())
+        vars(record).update(entry, about=about)
         return True
 
 
@@ -111,7 +111,7 @@ class RequestLog:
         finally:
             seconds = time.perf_counter() - start
             self.observe(scope, status, seconds)
-            told = {
+            entry = {
                 "client": (scope.get("client") or ("-",))[0],
                 "method": scope["method"],
                 "path": quote(scope["path"])[:200],
@@ -120,5 +120,5 @@ class RequestLog:
             }
             for name, value in scope.get("path_params", {}).items():
                 if name in ("study_id", "run_id") and is_id(value):  # not any text of a path
-                    told[name.removesuffix("_id")] = value
-            access.info(LINE, told, extra=told)
+                    entry[name.removesuffix("_id")] = value
+            access.info(LINE, entry, extra=entry)

@@ -52,13 +52,13 @@ class Details:
 
     async def get(self, study_id: str, window: Window) -> bytes:
         """Return a study, with those of its runs that are in ``window``."""
-        asked = time.monotonic()
+        requested = time.monotonic()
         key = study_id, window.limit, window.offset
         detail = self.kept.setdefault(key, Detail())
         self.kept.move_to_end(key)
         try:
             async with detail.one:
-                if detail.looked < asked:
+                if detail.looked < requested:
                     await run_sync(self._look, study_id, window, detail)
             return detail.content
         finally:

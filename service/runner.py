@@ -196,7 +196,7 @@ class Runner:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
         except Conflict as error:  # its row is damaged
             return Attempt(progress, reason=str(error), hopeless=True)
-        attempt, told = Attempt(progress), (progress, "")
+        attempt, reported = Attempt(progress), (progress, "")
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
@@ -209,8 +209,8 @@ class Runner:
                 if attempt.runs:  # while the workers compute, there is time
                     await self.starter.prepare()
                 now = attempt.progress, self._plain(waiting)
-                if told != now and await self._write(self.jobs.note, job.id, *now):
-                    told = now
+                if reported != now and await self._write(self.jobs.note, job.id, *now):
+                    reported = now
         finally:
             await processes.end(child, self.settings.grace_seconds)
             await asyncio.wait({events})

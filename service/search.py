@@ -52,12 +52,12 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     for scene in scenes:
         for name, parameter in parameters_of(scene).items():
             known.setdefault(name, []).append(parameter)
-    asked = which.model_dump(exclude_none=True)
-    for name in asked.keys() - {*PLAIN}:
+    requested = which.model_dump(exclude_none=True)
+    for name in requested.keys() - {*PLAIN}:
         if name not in known:
-            raise StudyError(name, asked[name], one_of(name, (*PLAIN, *known)))
-        asked[name] = _value(name, asked[name], known[name])
-    return asked
+            raise StudyError(name, requested[name], one_of(name, (*PLAIN, *known)))
+        requested[name] = _value(name, requested[name], known[name])
+    return requested
 
 
 def _value(name: str, given: Any, parameters: Sequence[Parameter]) -> Any:

@@ -71,8 +71,8 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
     """
     kept = _kept(store, name) if is_id(name) else None
     if kept:
-        told = {"id": kept.id, "name": kept.name, "summary": kept.summary}
-        return scene_schema(kept) | told
+        entry = {"id": kept.id, "name": kept.name, "summary": kept.summary}
+        return scene_schema(kept) | entry
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
     return scene_schema(scene_named(name))

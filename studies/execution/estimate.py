@@ -93,7 +93,7 @@ class Bounds:
             naming the bound, and the setting that holds it
         """
         likely = estimate.cpu_seconds[1] if estimate.cpu_seconds else None
-        asked = {
+        requested = {
             "runs": estimate.runs,
             "unknowns": estimate.unknowns,
             "increments": estimate.longest,
@@ -101,13 +101,13 @@ class Bounds:
             "bytes": estimate.bytes,
         }
         for bound in fields(self):
-            self._refuse(bound.name, asked[bound.name])
+            self._refuse(bound.name, requested[bound.name])
 
-    def _refuse(self, name: str, asked: float | None) -> None:
+    def _refuse(self, name: str, requested: float | None) -> None:
         most = getattr(self, name)
-        if most is not None and asked is not None and asked > most:
+        if most is not None and requested is not None and requested > most:
             allowed = f"at most {most:g}: {_MEANING[name]} (setting max_{name})"
-            raise StudyError(f"estimate.{name}", round(asked), allowed)
+            raise StudyError(f"estimate.{name}", round(requested), allowed)
 
 
 _MEANING = {
@@ -137,17 +137,17 @@ def estimate(study: Study, store: Store) -> Estimate:
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
     fixed = _PER_RUN * to_compute + _PER_PATH * paths
     low, likely, high = (fixed + each for each in seconds)
-    told = scene.effort is not None
+    known = scene.effort is not None
     return Estimate(
         runs=study.size,
         to_compute=to_compute,
         paths=paths,
-        unknowns=unknowns if told else None,
-        increments=increments if told else None,
-        longest=longest if told else None,
-        cpu_seconds=(low, likely, high) if told else None,
+        unknowns=unknowns if known else None,
+        increments=increments if known else None,
+        longest=longest if known else None,
+        cpu_seconds=(low, likely, high) if known else None,
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
-        basis=pace.basis if told else f"{scene.name} does not tell the work of its paths",
+        basis=pace.basis if known else f"{scene.name} does not estimate the work of its paths",
     )
 
 

@@ -143,12 +143,12 @@ def run_study(
     started = time.monotonic()
     if not isinstance(study, Study):
         study = Study.from_dict(study, scene)
-    asked = False
+    stop_requested = False
 
     def stop() -> bool:
-        nonlocal asked
-        asked = asked or (should_stop is not None and should_stop())
-        return asked
+        nonlocal stop_requested
+        stop_requested = stop_requested or (should_stop is not None and should_stop())
+        return stop_requested
 
     access = Access(scheduler) if isinstance(scheduler, str) else scheduler
     if access and not store.directory.exists():
@@ -169,7 +169,7 @@ def run_study(
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
             work.compute(workers or os.cpu_count() or 1, access, stop)
-        stopped = asked and bool(wanted - work.computed)
+        stopped = stop_requested and bool(wanted - work.computed)
         combined = result(study, store, complete=not wanted, stopped=stopped)
     return StudyOutcome(
         study_id=study.id,

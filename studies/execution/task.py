@@ -98,15 +98,15 @@ def walk(
         with contextlib.suppress(Exception):  # the file has the row too
             report({"path": task.path.id, "row": row})
 
-    told, since = -1.0, 0.0
+    reported, since = -1.0, 0.0
 
     def monitor(fraction: float) -> None:
-        nonlocal told, since
+        nonlocal reported, since
         now = time.monotonic()
         try:
-            if fraction >= min(told + _WORTH, 1.0) or now >= since + _SILENCE:
+            if fraction >= min(reported + _WORTH, 1.0) or now >= since + _SILENCE:
                 report({"path": task.path.id, "fraction": float(fraction)})
-                told, since = fraction, now
+                reported, since = fraction, now
             stop = should_stop()
         except Exception as error:  # the worker is closing, which is not the fault of a run
             raise StopAsked from error

@@ -67,11 +67,11 @@ def _combined(
             ran.add(what_ran(global_attributes(run)))
             if SYMMETRIC in run.attrs:  # a run without a record lacks it
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    told = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
+    attrs = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
     store.clear_directory(target)
     with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
         with h5netcdf.File(disk, "w") as file:
-            file.attrs.update(told | {"id": study.id, SYMMETRIC: int(halves == {1})})
+            file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})
             frame.create_axes(file)
             frame.create_fields(file)
             frame.write_small(file)

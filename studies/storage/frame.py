@@ -144,8 +144,8 @@ class Frame:
                 _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
         for name, share in self.fractions.items():
             words = f"{name} / the largest {name} of the run"
-            told = {"long_name": words, "units": "1"}
-            _write(file, f"{name}{FRACTION}", (name,), share, told, complete=True)
+            attrs = {"long_name": words, "units": "1"}
+            _write(file, f"{name}{FRACTION}", (name,), share, attrs, complete=True)
 
     def create_fields(self, file: h5netcdf.File) -> None:
         """Create the variables that are written run by run.

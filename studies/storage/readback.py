@@ -39,7 +39,7 @@ _BARE = b"This is a netCDF dimension but not a netCDF variable"
 
 
 @dataclass(frozen=True, slots=True)
-class _Expected:
+class _Required:
     """What a variable must be: its dimensions, values, and attributes; others are free."""
 
     dims: tuple[str, ...]
@@ -76,7 +76,7 @@ def verified(path: Path, case: Case, outcome: Record | str, keep: str = "") -> d
 
 
 def _read(
-    path: Path, expected: Mapping[str, _Expected]
+    path: Path, expected: Mapping[str, _Required]
 ) -> tuple[dict[str, Any], dict[str, np.ndarray], list[str]]:
     """Return the attributes of a file, the values of its variables, and the differences."""
     import h5py  # not needed by a complete study
@@ -100,7 +100,7 @@ def _read(
 
 def _expected(
     case: Case, outcome: Record | str, sweep: tuple[str, ...], keep: str
-) -> Iterator[tuple[str, _Expected]]:
+) -> Iterator[tuple[str, _Required]]:
     """Yield names of variables and their expected content."""
     known = parameters_of(case.scene)
     record = None if isinstance(outcome, str) else outcome
@@ -112,19 +112,19 @@ def _expected(
     for name in sweep:
         words = {"long_name": known[name].description, "units": known[name].unit}
         attributes = {key: text or None for key, text in words.items()}
-        yield name, _Expected((name,), np.array([getattr(parameters, name)]), attributes)
+        yield name, _Required((name,), np.array([getattr(parameters, name)]), attributes)
     for name, text in (("status", status), ("message", message)):
         value = np.full(ones, text, dtype=object)
-        yield name, _Expected(sweep, value, LABEL_ATTRIBUTES[name])
+        yield name, _Required(sweep, value, LABEL_ATTRIBUTES[name])
     if record is None:
         return
     for name, labels in record.coordinates.items():
-        yield name, _Expected((name,), np.asarray(labels), _words(name, case.scene))
+        yield name, _Required((name,), np.asarray(labels), _words(name, case.scene))
     for name, (dims, array) in record.fields.items():
         full = np.reshape(np.asarray(array, dtype=float), ones + np.shape(array))
-        yield name, _Expected((*sweep, *dims), full, _words(name, case.scene))
+        yield name, _Required((*sweep, *dims), full, _words(name, case.scene))
     for name, number in record.scalars.items():
-        yield name, _Expected(sweep, np.full(ones, number, dtype=float), _words(name, case.scene))
+        yield name, _Required(sweep, np.full(ones, number, dtype=float), _words(name, case.scene))
     if keep and record.mesh is not None:
         yield from _expected_mesh(record.mesh())
 
@@ -146,7 +146,7 @@ def _words(name: str, scene: Scene) -> dict[str, Any]:
     }
 
 
-def _expected_mesh(fields: MeshFields) -> Iterator[tuple[str, _Expected]]:
+def _expected_mesh(fields: MeshFields) -> Iterator[tuple[str, _Required]]:
     """Yield the expected variables of the mesh; absent node numbers are NaN."""
     cells = [nodes for _, nodes in fields.bodies.values()]
     table = np.full((sum(map(len, cells)), max(c.shape[1] for c in cells)), np.nan)
@@ -163,16 +163,16 @@ def _expected_mesh(fields: MeshFields) -> Iterator[tuple[str, _Expected]]:
     }
     elements = json.dumps({name: element for name, (element, _) in fields.bodies.items()})
     corners = np.where(faces == NO_NODE, np.nan, faces)
-    yield "mesh", _Expected((), np.zeros(()), {"face_node_connectivity": "mesh_face_nodes"})
-    yield "mesh_face_nodes", _Expected(("mesh_face", "mesh_corner"), corners, {"start_index": 0})
-    yield "mesh_body", _Expected(("mesh_face",), of, flags)
-    yield "mesh_cell_nodes", _Expected(("mesh_cell", "mesh_cell_node"), table, {"start_index": 0})
-    yield "mesh_cell_body", _Expected(("mesh_cell",), of_cell, flags | {"elements": elements})
-    yield "time", _Expected(("time",), np.arange(len(fields.stages), dtype=float), {"units": None})
+    yield "mesh", _Required((), np.zeros(()), {"face_node_connectivity": "mesh_face_nodes"})
+    yield "mesh_face_nodes", _Required(("mesh_face", "mesh_corner"), corners, {"start_index": 0})
+    yield "mesh_body", _Required(("mesh_face",), of, flags)
+    yield "mesh_cell_nodes", _Required(("mesh_cell", "mesh_cell_node"), table, {"start_index": 0})
+    yield "mesh_cell_body", _Required(("mesh_cell",), of_cell, flags | {"elements": elements})
+    yield "time", _Required(("time",), np.arange(len(fields.stages), dtype=float), {"units": None})
     stages = np.array(list(fields.stages), dtype=object)
-    yield "mesh_stage", _Expected(("time",), stages)
+    yield "mesh_stage", _Required(("time",), stages)
     for axis, x in zip("xy", fields.X, strict=True):
-        yield f"mesh_node_{axis}", _Expected(("mesh_node",), x, {"units": "mm"})
+        yield f"mesh_node_{axis}", _Required(("mesh_node",), x, {"units": "mm"})
     at = list(fields.stages.values())
     parts = {f"displacement_{a}": ("mm", [s["displacement"][k] for s in at])
              for k, a in enumerate("xy")}  # fmt: skip
@@ -181,7 +181,7 @@ def _expected_mesh(fields: MeshFields) -> Iterator[tuple[str, _Expected]]:
     parts |= {"mises": ("MPa", [s["mises"] for s in at]),
               "plastic_strain": ("1", [s["plastic_strain"] for s in at])}  # fmt: skip
     for name, (units, values) in parts.items():
-        yield f"mesh_{name}", _Expected(("time", "mesh_node"), np.stack(values), {"units": units})
+        yield f"mesh_{name}", _Required(("time", "mesh_node"), np.stack(values), {"units": units})
 
 
 def _of_mesh(name: str, dims: tuple[str, ...]) -> bool:
@@ -208,7 +208,7 @@ def _of_the_whole(
 
 
 def _compared(
-    name: str, variable: h5py.Dataset, expected: _Expected, scales: Mapping[Any, str]
+    name: str, variable: h5py.Dataset, expected: _Required, scales: Mapping[Any, str]
 ) -> tuple[np.ndarray, list[str]]:
     """Return the stored values of a variable, and its differences.
 

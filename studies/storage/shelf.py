@@ -47,10 +47,10 @@ def kept(directory: Path, scene_id: str) -> FileScene | None:
     if len(Path(scene_id).parts) != 1 or not path.is_file():
         return None
     try:
-        told = json.loads(path.read_bytes())
-        names = mesh_names(told["content"])
+        saved = json.loads(path.read_bytes())
+        names = mesh_names(saved["content"])
         meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
-        scene = file_scene(Description(told["file"], told["content"], meshes))
+        scene = file_scene(Description(saved["file"], saved["content"], meshes))
     except (OSError, ValueError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise StudyError("scene", scene_id, f"is stored damaged, post it again: {reason}") from None

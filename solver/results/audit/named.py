@@ -112,15 +112,15 @@ class NamedPlacesCheck:
         places = Located(self._source.plain(body), X)
         for k, stage in enumerate(self._run.view.stages):
             fields = self._source.fields(body, stage)
-            for name, told, nodal in (
+            for name, recorded, nodal in (
                 ("stress", stress[k], fields.stress),
                 ("mises", mises[k], np.maximum(fields.mises, 0.0)),
                 ("plastic_strain", strain[k], flowed(fields)),
             ):
                 own = places.of(nodal)
                 own = own if name == "stress" else np.maximum(own, 0.0)
-                self._out.add(f"{kind}_{name}", told, own, self._scale(name, nodal))
-                self._out.absent(f"{kind}_{name}", told, places.outside)
+                self._out.add(f"{kind}_{name}", recorded, own, self._scale(name, nodal))
+                self._out.absent(f"{kind}_{name}", recorded, places.outside)
         return places
 
     # -- contact and forces ------------------------------------------------------------------
@@ -140,11 +140,11 @@ class NamedPlacesCheck:
                     self._out.add(name, self._field(name)[k], own, float(np.abs(found.X).max()))
                 for name in ("pressure", "shear", "pressure_deformed", "gap", "slip"):
                     values = _on_slave(found, name)
-                    told = self._field(f"contact_{name}")[k, j]
+                    recorded = self._field(f"contact_{name}")[k, j]
                     scale = self._scale(name, values)
                     if name in ("gap", "slip"):  # after unloading only rounding may be left
                         scale = max(found.way, self._least[name])
-                    self._out.add(f"contact_{name}", told, between(s, found.s, values), scale,
+                    self._out.add(f"contact_{name}", recorded, between(s, found.s, values), scale,
                                   self._share(found, name))  # fmt: skip
 
     def _increments(self) -> None:
@@ -164,8 +164,8 @@ class NamedPlacesCheck:
                 contact[pair.master[0]] += found.touching.on_master.sum(axis=0)
                 for name, sign in (("normal", 1.0), ("tangential", -1.0)):
                     own = sign * getattr(state.contacts[k], name).sum()
-                    told = self._field(f"contact_{name}_force")[k, near[-1]]
-                    self._out.add(f"contact_{name}_force", told, own, state.force_scale)
+                    recorded = self._field(f"contact_{name}_force")[k, near[-1]]
+                    self._out.add(f"contact_{name}_force", recorded, own, state.force_scale)
             for j, name in enumerate(self._source.system.all_names):
                 body = self._source.system.model.body(name)
                 self._part(body, j, int(near[-1]), contact[name], state, measured=finite)
@@ -190,16 +190,16 @@ class NamedPlacesCheck:
                 own[0] = np.nan  # radial forces balance around the axis
         share = LIMIT / MEASURED if measured else 1.0
         for name, value in zip(("reaction_x", "reaction_y"), own, strict=True):
-            told = self._field(name)[j, increment]
-            if np.isfinite(told):
-                self._out.add(name, told, value, state.force_scale, share)
+            recorded = self._field(name)[j, increment]
+            if np.isfinite(recorded):
+                self._out.add(name, recorded, value, state.force_scale, share)
 
     # -- numbers -----------------------------------------------------------------------------
 
     def _number(self, number: RequestedNumber) -> None:
         """Compare an extreme value and its place, an integral or an extent."""
         kind, _, part = number.of.partition(".")
-        told, share = self._record.scalars[number.name], 1.0
+        recorded, share = self._record.scalars[number.name], 1.0
         if number.contact is not None:
             found = self._source.tractions(
                 self._places.contacts.index(number.contact), number.stage
@@ -210,7 +210,7 @@ class NamedPlacesCheck:
                 return
             if (kind, number.take) == ("pressure", "extent"):
                 share = LIMIT / MEASURED if found.measured else 1.0
-                self._out.add(number.name, told, found.length, s[-1], share)
+                self._out.add(number.name, recorded, found.length, s[-1], share)
                 return
             values = np.where(np.isnan(values) & ~found.closed, 0.0, values) if kind in (
                 "pressure", "shear") else values  # fmt: skip
@@ -222,7 +222,7 @@ class NamedPlacesCheck:
             return
         if number.take in ("maximum", "minimum"):
             own = np.nanmax(values) if number.take == "maximum" else np.nanmin(values)
-            self._out.add(number.name, told, own, scale, share)
+            self._out.add(number.name, recorded, own, scale, share)
             place = [self._record.scalars[f"{number.name}_{axis}"] for axis in "xy"]
             off = np.hypot(*(X - np.array(place)[:, None]))
             there = values[off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()]
@@ -233,9 +233,9 @@ class NamedPlacesCheck:
         values = np.nan_to_num(values)
         if number.take == "integral":
             whole, most = (float((v[1:] + v[:-1]) @ np.diff(s) / 2) for v in (values, abs(values)))
-            self._out.add(number.name, told, whole, max(most, self._least[kind] * s[-1]), share)
+            self._out.add(number.name, recorded, whole, max(most, self._least[kind] * s[-1]), share)
             return
-        self._out.add(number.name, told, _above_zero(values, s), s[-1], share)
+        self._out.add(number.name, recorded, _above_zero(values, s), s[-1], share)
 
     def _values(self, number: RequestedNumber, kind: str, part: str) -> tuple[Array, Array]:
         """Return the values (n,) of a field of a body or line, and their positions (2, n)."""

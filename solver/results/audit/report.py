@@ -246,5 +246,5 @@ def _beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[
 def warnings(figures: Mapping[str, float]) -> tuple[str, ...]:
     """Return the warnings that follow from figures."""
     shear = figures.get("audit_surface_shear", 0.0)
-    told = f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
-    return (told,) if shear > _SURFACE_SHEAR else ()
+    message = f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
+    return (message,) if shear > _SURFACE_SHEAR else ()

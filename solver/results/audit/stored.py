@@ -104,14 +104,14 @@ class _Viewed:
     def _coordinates(self) -> None:
         """Compare the coordinates in the record with the declared places."""
         for name, declared in self._view.coordinates.items():
-            told = self._record.coordinates.get(name, np.zeros(0))
+            recorded = self._record.coordinates.get(name, np.zeros(0))
             if declared.dtype.kind != "f":
-                same = told.shape == declared.shape and bool((told == declared).all())
+                same = recorded.shape == declared.shape and bool((recorded == declared).all())
                 self._out.add(name, float(same), 1.0, 1.0)
-            elif told.shape != declared.shape:
+            elif recorded.shape != declared.shape:
                 self._out.add(name, 0.0, 1.0, 1.0)
             else:
-                self._out.add(name, told, declared, float(np.abs(declared).max()))
+                self._out.add(name, recorded, declared, float(np.abs(declared).max()))
 
     def _held(self) -> None:
         """Compare displacements with those that supports and loads prescribe."""
@@ -194,8 +194,8 @@ class _Viewed:
             for k, stage in enumerate(view.stages if name in flat else ()):
                 own = sampled(nodal, stage)
                 own = own if nodal is _stress else np.maximum(own, 0.0)
-                told = flat[name][k][..., at]
-                self._against(name, told, own, bodies, self.stress_scale, stage)
+                recorded = flat[name][k][..., at]
+                self._against(name, recorded, own, bodies, self.stress_scale, stage)
         strains = {"plastic_strain": (view.unloaded,), "map_plastic_strain": view.stages}
         for name, stages in strains.items():
             for k, stage in enumerate(stages if name in flat else ()):
@@ -314,11 +314,11 @@ class _Viewed:
         self, name: str, body: int, own: Array, stress: Array, places: Array, axes: tuple[str, ...]
     ) -> None:
         """Compare extremes (4,), and the stress (4, n_nodes) at the places that are stored."""
-        told = self._stored(name)
+        recorded = self._stored(name)
         at = [self._stored(f"{name}_{axis}") for axis in axes]
-        if told is None or any(one is None for one in at):
+        if recorded is None or any(one is None for one in at):
             return
-        self._out.add(name, told[body], own, self.stress_scale)
+        self._out.add(name, recorded[body], own, self.stress_scale)
         where = np.stack([np.asarray(one)[body] for one in at])  # (n_axes, 4)
         for component in np.flatnonzero(np.isfinite(where).all(axis=0)):
             off = np.abs(places - where[:, component, None]).max(axis=0)
