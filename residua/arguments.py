@@ -27,22 +27,22 @@ def parser() -> argparse.ArgumentParser:
     one = add("run", commands.run)
     one.add_argument("study", type=Path, metavar="STUDY.toml")
     one.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
-    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one a core)")
+    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
     for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
         one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
     one.add_argument(
         "--stall-seconds", type=float, metavar="S", default=Limits().stall_seconds,
-        help="give a path up after so long without progress (default: %(default)g)",
+        help="end a path after this time without progress (default: %(default)g)",
     )  # fmt: skip
-    one.add_argument("--path-seconds", type=float, metavar="S", help="give a path up after so long")
-    one.add_argument("--memory", metavar="SIZE", help="most memory of a process, such as 2GB")
+    one.add_argument("--path-seconds", type=float, metavar="S", help="end a path after this time")
+    one.add_argument("--memory", metavar="SIZE", help="largest memory of a process, such as 2GB")
     one.add_argument(
         "--patience", type=float, metavar="S",
-        help="end after so long without a worker that takes the work (default: wait)",
+        help="end after this time without a worker that accepts tasks (default: wait)",
     )  # fmt: skip
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
-    one.add_argument("--dry-run", action="store_true", help="tell what it would cost, and end")
+    one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")
@@ -56,18 +56,18 @@ def parser() -> argparse.ArgumentParser:
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
     )  # fmt: skip
-    one.add_argument("--field", help="residual_stress, or map_stress where nothing is released")
+    one.add_argument("--field", help="default: residual_stress, or map_stress if not released")
     one.add_argument("--component")
     one.add_argument(
         "--zoom", type=float, metavar="MM",
-        help="only this close to the contact's centre, or to its edge where half of the bodies "
-        "was computed",
+        help="only within this distance of the contact's centre, or of its edge if half of the "
+        "bodies was computed",
     )  # fmt: skip
     one.add_argument(
         "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
-        help="of a map, only this part [mm]",
+        help="only this part of a map [mm]",
     )  # fmt: skip
-    one.add_argument("--over", metavar="AXIS", help="of lines, one for each value of this axis")
+    one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=Path, required=True, metavar="PNG")
 
@@ -77,7 +77,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--vtu", type=Path, required=True, metavar="FOLDER", help="where they go")
 
     one = add("serve", commands.serve)
-    one.add_argument("--host", help="default: 127.0.0.1; elsewhere callers need API keys")
+    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
     one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
     one.add_argument("--data", type=Path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
@@ -110,8 +110,8 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
         one.add_argument("--url", default="http://127.0.0.1:8000")
         one.add_argument(
             "--api-key-file", type=Path, metavar="FILE",
-            help="holds the API key (default: environment variable RESIDUA_API_KEY); an argument "
-            "would show the key to everybody on this machine",
+            help="contains the API key (default: environment variable RESIDUA_API_KEY); as an "
+            "argument the key would be visible to everybody on this machine",
         )  # fmt: skip
         if name == "submit":
             one.add_argument("study", type=Path, metavar="STUDY.toml")

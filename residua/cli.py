@@ -5,20 +5,20 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from residua.neighbours import stranger
+from residua.neighbours import wrong_package
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status.
 
-    0: all went well. 1: not all runs are ok: some failed, or something kept them from being
-    computed, such as another process in the directory. 2: bad input, or other packages than those
-    of this command. 130: interrupted.
+    0: success. 1: not all runs are ok: some failed, or could not be computed, for instance because
+    another process computes in the directory. 2: bad input, or Python finds other packages of the
+    same names. 130: interrupted.
     """
-    if reason := stranger():
+    if reason := wrong_package():
         return complain(reason, BAD_INPUT)
-    from residua.arguments import parser  # imports the neighbours, which are known now
+    from residua.arguments import parser  # imports the other packages, which are checked now
     from solver.errors import ModelError
     from solver.parts import load_own_parts
     from studies.errors import (
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output has left; say no more
+        sys.stderr.close()  # the reader of the output has closed it: print nothing more
         return OK
     except OSError as error:
         return complain(error, FAILED)

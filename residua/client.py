@@ -1,4 +1,4 @@
-"""The command line's side of the HTTP service."""
+"""A client of the HTTP service, for the command line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Service:
     Parameters
     ----------
     url : its root, such as ``http://localhost:8000``
-    key : API key, where the service asks for one
+    key : API key, if the service requires one
     """
 
     def __init__(self, url: str, key: str | None = None) -> None:
@@ -79,19 +79,19 @@ class Service:
 
 
 def api_key(path: Path | None) -> str | None:
-    """Return the key in the file ``path``, or in the environment; no error shows any of it."""
+    """Return the key in the file ``path``, or in the environment; errors never show the key."""
     if path is None:
         return _plain("RESIDUA_API_KEY", os.environ.get("RESIDUA_API_KEY", "")) or None
     try:
         text = path.read_text(encoding="ascii", errors="replace")
-    except OSError as error:  # whoever took the option for the key itself has typed it here
-        allowed = f"must be a file that holds the key: {error.strerror}"
+    except OSError as error:  # the text may be the key itself, typed by mistake: do not show it
+        allowed = f"must be a file that contains the key: {error.strerror}"
         raise StudyError("--api-key-file", "…", allowed) from None
     return _plain("--api-key-file", text)
 
 
 def _plain(source: str, text: str) -> str:
-    """Return a key that a header can carry: what else it holds may end up in an error."""
+    """Return the key, or raise `StudyError` if a header cannot contain it."""
     key = text.strip()
     if not re.fullmatch(r"[\w-]*", key, re.ASCII):
         raise StudyError(source, "…", "must hold one key: letters, digits, '-' and '_'")
@@ -99,7 +99,7 @@ def _plain(source: str, text: str) -> str:
 
 
 def _accept(answer: httpx.Response) -> None:
-    """Raise `Refused` with the words of the service's problem document, if it is one."""
+    """Raise `Refused` with the text of the service's problem document, if it is one."""
     if answer.is_success:
         return
     answer.read()

@@ -1,4 +1,4 @@
-"""What the command ``residua`` does: one function a subcommand, each returning an exit status."""
+"""The subcommands of ``residua``: one function for each, which returns an exit status."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ def run(options: argparse.Namespace) -> int:
             should_stop=lambda: bool(interrupted),
         )
     progress.close()
-    told = report(study, store, outcome)
+    printed = report(study, store, outcome)
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
-    print(f"{told.text.rstrip()}, {computed}")
-    written = {outcome.dataset: outcome.anew} | dict.fromkeys(told.files, told.anew)
+    print(f"{printed.text.rstrip()}, {computed}")
+    written = {outcome.dataset: outcome.anew} | dict.fromkeys(printed.files, printed.anew)
     for path, anew in written.items():
         print(f"{'wrote' if anew else 'kept'} {path}")
     if outcome.stopped:
@@ -78,7 +78,7 @@ def scenes(options: argparse.Namespace) -> int:
 
 
 def show(options: argparse.Namespace) -> int:
-    """Print what is known of a run, a study or all studies of a directory."""
+    """Print the results of a run, a study or all studies of a directory."""
     from studies.views.reading import begun_studies, find_datasets, open_netcdf, present_datasets
     from studies.views.tables import messages, run_details, runs_table
 
@@ -97,7 +97,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Draw a field of one run, or one value a run over the sweep."""
+    """Draw a field of one run, or one value per run over the sweep."""
     from studies.views.plots.picture import picture
     from studies.views.reading import open_study
 
@@ -114,7 +114,7 @@ def plot(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write the fields at the nodes of a run, which its study keeps, as files for ParaView."""
+    """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
     from solver.errors import ModelError
     from solver.results.export import write_vtu
     from studies.storage.ugrid import read
@@ -183,14 +183,14 @@ def fetch(service: Any, options: argparse.Namespace) -> str:
 
 @contextmanager
 def _interruption() -> Iterator[list[int]]:
-    """Give a list that is empty until Ctrl-C; a second Ctrl-C does not wait."""
+    """Give a list that is empty until Ctrl-C; a second Ctrl-C stops at once."""
     received: list[int] = []
 
     def receive(number: int, frame: object) -> None:
         if received:
             raise KeyboardInterrupt
         received.append(number)
-        print("\nstopping; what is finished is kept", file=sys.stderr)
+        print("\nstopping; finished runs are kept", file=sys.stderr)
 
     before = signal.signal(signal.SIGINT, receive)
     try:
@@ -200,13 +200,13 @@ def _interruption() -> Iterator[list[int]]:
 
 
 def _save(drawn: Any, path: Path) -> None:
-    """Write a figure in the format that the name of the file asks for."""
+    """Write a figure in the format given by the ending of the file name."""
     kinds = drawn.canvas.get_supported_filetypes()
     kind = path.suffix.removeprefix(".").lower() or "png"
     if kind not in kinds:
         raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
     with _written("--out", path) as part:
-        drawn.savefig(part, format=kind, dpi=drawn.dpi)  # its own default is that of the start
+        drawn.savefig(part, format=kind, dpi=drawn.dpi)  # matplotlib's default is another dpi
 
 
 @contextmanager
@@ -223,7 +223,7 @@ def _written(option: str, path: Path) -> Iterator[Path]:
 
 
 def _selection(texts: Sequence[str]) -> dict[str, str]:
-    """Return what ``--select`` asks for, each name once."""
+    """Return the names and values of ``--select``, each name once."""
     chosen: dict[str, str] = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))

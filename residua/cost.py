@@ -1,4 +1,4 @@
-"""What a study will cost, in words."""
+"""The estimated cost of a study, as text."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from studies.execution.estimate import Estimate, estimate
 from studies.storage.store import Store
 
 _LONG = 3600.0
-"""Seconds of processor time from which `residua run` says so before it begins."""
+"""Seconds of processor time above which `residua run` prints the estimate before it begins."""
 
 _UNITS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 
 def dry_run(study: Study, store: Store) -> str:
-    """Return what computing `study` into `store` would cost."""
+    """Return the estimated cost of computing `study` into `store`."""
     found = estimate(study, store)
     unknown = "not known"
     lines = {
@@ -25,21 +25,21 @@ def dry_run(study: Study, store: Store) -> str:
         else f"{found.increments} in all, at most {found.longest} on a path",
         "processor time": _time(found) or unknown,
         "disk": f"about {_size(found.bytes)}",
-        "told from": found.basis,
+        "estimated from": found.basis,
     }
     table = (f"{name:<16}{text}" for name, text in lines.items())
     return "\n".join([f"{study.name}: nothing is computed or written", *table])
 
 
 def long_run(study: Study, store: Store) -> str:
-    """Return one line that tells of more than an hour of processor time; else nothing."""
+    """Return one line if the study takes more than an hour of processor time; else empty."""
     try:
         found = estimate(study, store)
-    except Exception:  # a damaged catalogue, which computing makes anew, keeps nobody from work
+    except Exception:  # a damaged catalogue must not prevent computing, which makes it again
         return ""
     if found.cpu_seconds is None or found.cpu_seconds[1] < _LONG:
         return ""
-    return f"{study.name}: {_time(found)} of processor time; --dry-run tells more"
+    return f"{study.name}: {_time(found)} of processor time; --dry-run shows more"
 
 
 def _time(found: Estimate) -> str:
@@ -51,7 +51,7 @@ def _time(found: Estimate) -> str:
 
 
 def _short(number: float) -> str:
-    """Return a number with two digits that count."""
+    """Return a number with two significant digits."""
     return f"{number:.0f}" if number >= 10 else f"{number:.1f}"
 
 

@@ -1,4 +1,4 @@
-"""Who may talk to whom: API keys of the service, certificates of scheduler and workers."""
+"""Subcommands for API keys of the service, and certificates of scheduler and workers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def keys(options: argparse.Namespace) -> int:
     from service.keys import Keys, KeysError
     from service.settings import Settings
 
-    # The other settings do not matter here, and may name what is not there yet.
+    # The other settings do not matter here, and may name files that do not exist yet.
     data = options.data or os.environ.get("RESIDUA_DATA") or Settings.model_fields["data"].default
     try:
         options.act(Keys(Path(data)), options)
@@ -26,7 +26,7 @@ def keys(options: argparse.Namespace) -> int:
 
 
 def add(known: Any, options: argparse.Namespace) -> None:
-    """Make a key and print it; a running service knows it at once."""
+    """Make a key and print it; a running service accepts it at once."""
     print(known.add(options.name, options.scope))
     print("residua: keep the key now; it is not stored and not shown again", file=sys.stderr)
 
@@ -38,12 +38,12 @@ def list_(known: Any, options: argparse.Namespace) -> None:
 
 
 def remove(known: Any, options: argparse.Namespace) -> None:
-    """Make a key worthless, at once."""
+    """Remove a key; a running service refuses it at once."""
     known.remove(options.name)
 
 
 def certificates(options: argparse.Namespace) -> int:
-    """Write certificate and key with which scheduler, workers and service know each other."""
+    """Write the certificate and key that scheduler, workers and service share."""
     from studies.execution.certificates import write_certificates
 
     for path in write_certificates(options.out):

@@ -1,7 +1,8 @@
-"""Whether the packages that Python finds are those of this command.
+"""Check that Python finds the packages of this command, and no others of the same names.
 
 Their names are common words. Another package of the same name, or a folder in the directory where
-Python was started, may come first; then an import fails with an error that does not tell why.
+Python was started, may be found first; an import then fails with an error that is hard to
+understand.
 """
 
 from __future__ import annotations
@@ -10,13 +11,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 NEIGHBOURS = ("solver", "studies", "service")
-"""The packages that stand beside this one."""
+"""The packages that must be in the same folder as this one."""
 
 
-def stranger() -> str:
-    """Return one line about a package that is not the one beside this; nothing where all are.
+def wrong_package() -> str:
+    """Return one line about the first package that Python finds elsewhere; empty if none.
 
-    No package is imported for that.
+    No package is imported for this check.
     """
     home = Path(__file__).parents[1]
     for name in NEIGHBOURS:
@@ -32,7 +33,7 @@ def stranger() -> str:
 
 
 def _place(name: str) -> Path | None:
-    """Return the folder of a package, or the file of a module; None where Python finds neither."""
+    """Return the folder of a package, or the file of a module; None if Python finds neither."""
     spec = find_spec(name)
     if spec is None:
         return None

@@ -1,4 +1,4 @@
-"""How far a study is, on the terminal or in a log."""
+"""The progress of a study, on the terminal or in a log."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _REDRAW = 0.1
 
 
 class Progress:
-    """A bar on one line of a terminal; elsewhere a plain line for each run.
+    """A bar on one line of a terminal; otherwise a plain line for each run.
 
     Parameters
     ----------
-    study : names the runs by their place in the sweep
+    study : the study, for the position of each run in the sweep
     stream : where to write; standard error by default
     """
 
@@ -41,14 +41,14 @@ class Progress:
         self._waits: set[str] = set()
 
     def __call__(self, event: StudyEvent) -> None:
-        """Take in an event."""
+        """Process an event."""
         if self._begun is None:
             self._begun = event.progress
             if event.kind == "path" and event.fraction == 0.0:  # nothing is done yet
                 self._reused = round(event.progress * self._size)
             if self._reused and not self._bar:
-                told = f"{self._reused} of {self._size} runs are there already"
-                print(told, file=self._stream, flush=True)
+                text = f"{self._reused} of {self._size} runs exist already"
+                print(text, file=self._stream, flush=True)
         if event.kind == "waiting" and event.message and event.message not in self._waits:
             self._waits.add(event.message)
             left = "\n" if self._bar and self._drawn else ""
@@ -79,12 +79,12 @@ class Progress:
         bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
         reused = f" ({self._reused} were there)" if self._reused else ""
         runs = f"{self._reused + self._seen} of {self._size} runs{reused}{failed}"
-        left = "  putting the data set together" if progress >= 1.0 else self._remaining(progress)
+        left = "  combining the data set" if progress >= 1.0 else self._remaining(progress)
         text = f"{bar} {100 * progress:3.0f} %  {runs}{left}"
         print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)
 
     def _remaining(self, progress: float) -> str:
-        """Return the time left, at the pace so far."""
+        """Return the remaining time, at the pace so far."""
         gained = progress - (self._begun or 0.0)
         if gained <= 0.02 or progress >= 1.0:
             return ""

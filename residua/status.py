@@ -1,4 +1,4 @@
-"""How a command ends: its exit status, and what it says when something went wrong."""
+"""Exit statuses of the command, and its message on an error."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def complain(reason: object, status: int) -> int:
-    """Say why a command ends, and return its exit status."""
+    """Print why a command ends, and return its exit status."""
     print(f"residua: {reason}", file=sys.stderr)
     return status

@@ -1,1 +1,1 @@
-"""Studies over HTTP: submit, watch, and fetch what they found."""
+"""Studies over HTTP: submit, watch, and fetch results."""

@@ -1,4 +1,4 @@
-"""Who gets in: under a name of ours, from no foreign page, with a key that allows it."""
+"""Access control: host name, origin of web pages, API key and scope."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SAFE = ("GET", "HEAD", "OPTIONS")
 NEEDED = [
     (re.compile(pattern, re.DOTALL), scope)
     for pattern, scope in (
-        # A browser sends no key with the address of a page; these tell what is no secret.
+        # A browser sends no key with the address of a page; these pages contain no secrets.
         (r"(GET|HEAD|OPTIONS) /(health|docs(/.*)?|openapi\.json)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
         (r"POST /(scenes|studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
@@ -29,7 +29,7 @@ NEEDED = [
         (r".*", Scope.ADMIN),
     )
 ]
-"""The scope that a request needs: the first that fits, so that what is new is for admin."""
+"""The scope that a request needs: the first match; requests without a match need ``admin``."""
 
 HOST = re.compile(r"(?:\[([\da-f:.]+)\]|([^\s:/@\[\]]+))(?::\d*)?", re.IGNORECASE)
 FORM = re.compile(r"multipart/form-data\s*;.*", re.IGNORECASE)
@@ -37,7 +37,7 @@ JSON = re.compile(r"application/(?:[\w.-]+\+)?json\s*(?:;.*)?", re.IGNORECASE)
 
 
 def needed(request: Request) -> Scope | None:
-    """Return the scope a request needs; nothing where strangers are welcome."""
+    """Return the scope that a request needs; None if it needs no key."""
     path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
     deletes = "?purge" if "purge" in request.query_params else ""
     words = f"{request.method} {path}{deletes}"
@@ -45,14 +45,14 @@ def needed(request: Request) -> Scope | None:
 
 
 class Gate:
-    """Middleware that turns away before anything of a request is read.
+    """Middleware that refuses a request before its body is read.
 
-    What the caller may do is left in ``request.state.caller``: a `Scope`, or None for a stranger.
+    The caller's scope is stored in ``request.state.caller``: a `Scope`, or None without a key.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, keys: Keys) -> None:
         self.app = app
-        self.asked = settings.keys_asked
+        self.keys_needed = settings.keys_required
         self.keys = keys
         self.one = CapacityLimiter(1)
         self.names = {
@@ -60,7 +60,7 @@ class Gate:
         }
 
     async def __call__(self, connection: Connection, receive: Receive, send: Send) -> None:
-        """Answer with a problem document, or hand the request on."""
+        """Answer with a problem document, or pass the request on."""
         answer = self.app
         if connection["type"] == "http":
             request = Request(connection)
@@ -68,7 +68,7 @@ class Gate:
                 self.check_host(request.headers.getlist("host"))
                 check_page(request)
                 request.state.caller = Scope.ADMIN
-                if self.asked:  # in a thread: the disk may hang
+                if self.keys_needed:  # in a thread: the disk may hang
                     request.state.caller = await run_sync(self.caller, request, limiter=self.one)
                 check_content(request)
             except HTTPException as refusal:
@@ -76,9 +76,9 @@ class Gate:
         await answer(connection, receive, send)
 
     def check_host(self, given: list[str]) -> None:
-        """Refuse names that are not ours: a foreign page may give its own name our address.
+        """Refuse unknown host names: another site may let its own name point to this address.
 
-        An address cannot be given another meaning.
+        A numerical address is always accepted.
         """
         found = HOST.fullmatch(given[0]) if len(given) == 1 else None
         name = (found[1] or found[2]).lower().removesuffix(".") if found else ""
@@ -89,7 +89,7 @@ class Gate:
             )
 
     def caller(self, request: Request) -> Scope | None:
-        """Return what the caller may do, once that is known to be enough."""
+        """Return the caller's scope, or raise `HTTPException` if it is not sufficient."""
         wanted, header = needed(request), request.headers.get("authorization", "")
         if not header and wanted is None:
             return None
@@ -114,7 +114,7 @@ class Gate:
 
 
 def check_page(request: Request) -> None:
-    """Refuse what another site's page sends: browsers say so, other clients say nothing.
+    """Refuse requests that change something from another site's page; browsers send its origin.
 
     References
     ----------
@@ -131,7 +131,7 @@ def check_page(request: Request) -> None:
 
 
 def check_content(request: Request) -> None:
-    """Refuse a body that does not say that it is JSON; of a scene, that it is a form of files."""
+    """Refuse a body without the content type JSON, or, for a scene, a form with files."""
     headers = request.headers
     path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
     if path.rstrip("/") == "/scenes":

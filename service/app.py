@@ -52,11 +52,11 @@ OPEN_STREAMS_SECONDS = 2
 """Time that open event streams are given when the service stops."""
 
 WAITING_CONNECTIONS = 256
-"""Connections that are taken in one go, before they are counted."""
+"""Number of connections that the system queues before they are accepted and counted."""
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """Return the application, owner of the data directory until it has been shut down.
+    """Return the application, which has the lock of the data directory until it is shut down.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
         If callers need a key and there is none.
     """
     keys = Keys(settings.data)
-    if settings.keys_asked and not keys.all():
+    if settings.keys_required and not keys.all():
         raise KeysError(
             f"{settings.published or settings.host} is open to others, who need an API key; make "
             f"one: residua keys add NAME --scope admin --data {shlex.quote(str(settings.data))}"
@@ -108,7 +108,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
     app.state.probe = Probe()
-    # Each is outside of those before it: what the others refuse is measured and logged too.
+    # Each is outside of the previous ones, so that refused requests are measured and logged too.
     longest = {"/scenes": settings.max_scene_bytes}
     app.add_middleware(body_limit, limit=settings.max_body_bytes, longest=longest)
     app.add_middleware(Gate, settings=settings, keys=keys)
@@ -117,16 +117,16 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(logs.RequestLog, observe=metrics.observe)
     errors.install(app)
     for router in routes.ROUTERS:
-        needs_key = settings.keys_asked and "health" not in router.tags
+        needs_key = settings.keys_required and "health" not in router.tags
         app.include_router(router, dependencies=[Security(BEARER)] if needs_key else [])
     app.mount("/docs", ASSETS, name="docs")
     return app
 
 
 def open_store(directory: Path) -> Store:
-    """Return the store in ``directory``, its catalogue in line with the runs that are there."""
+    """Return the store in ``directory``, with its catalogue updated to the files of the runs."""
     store = Store(directory)
-    # Whoever computes here without the service has just done the same; the pool does it too.
+    # A process that computes here without the service has just done this; the pool does it too.
     with contextlib.suppress(StoreBusy, StoreFull), store.writing():
         pass
     return store
@@ -138,9 +138,9 @@ def serve(
     data: Path | str | None = None,
     scheduler: str | None = None,
 ) -> None:
-    """Serve until a signal comes; a study that is running then resumes at the next start.
+    """Serve until a signal comes; a running study resumes at the next start.
 
-    What is None comes from the environment, see `Settings`.
+    Arguments that are None come from the environment, see `Settings`.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def serve(
         server_header=False,
         log_config=None,
         access_log=False,
-        # Without a proxy that is known, anybody on this machine could write other names in the log.
+        # Without a known proxy, anybody on this machine could put other addresses in the log.
         proxy_headers=settings.forwarded_allow_ips is not None,
         forwarded_allow_ips=settings.forwarded_allow_ips,
     )

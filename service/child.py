@@ -25,7 +25,7 @@ OUTDATED = "the solver has changed since the study was accepted: post it again"
 
 
 def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> None:
-    """Compute what is missing of the study in the order, and tell how it goes."""
+    """Compute the missing runs of the study in the order, and report its progress."""
     store = Store(order["data"], held=True)
     study = Study.known(order["study"], store.scene)
     if study.id != order["id"]:
@@ -53,7 +53,7 @@ def tell(event: StudyEvent, outlet: Outlet) -> None:
 
 
 def prepare() -> None:
-    """Load what every study needs: dask, netCDF, and the sources that make the ids of runs."""
+    """Load the modules that every study needs: dask, netCDF, and the sources for the run ids."""
     import studies.execution.grid
     import studies.storage.combine  # noqa: F401
 
@@ -61,7 +61,7 @@ def prepare() -> None:
 
 
 def main() -> None:
-    """Read the order and carry it out."""
+    """Read the order and compute its study."""
     outlet = claim_stdout()
     beat(outlet)
     prepare()

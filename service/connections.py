@@ -1,4 +1,4 @@
-"""Connections that cannot stop the service: limited in number, and in the time they may take."""
+"""Limits on connections, in number and time, so that slow clients cannot block the service."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from service.headers import HEADERS
 from service.settings import Settings
 
 MACOS_FILES = 10_240
-"""Most file descriptors a process of macOS may have, whatever its limit says."""
+"""Largest number of file descriptors of a process on macOS, whatever its limit says."""
 
 OTHER_FILES = 256
-"""File descriptors that are kept for all but connections and the files they send."""
+"""Number of file descriptors reserved for uses other than connections and the files they send."""
 
 
 class Connection(H11Protocol):
-    """One connection of uvicorn's, with deadlines for what the client does.
+    """A connection of uvicorn with deadlines for the client.
 
-    A request, head and body, must arrive within ``arrival_seconds``; who is late is answered 408.
-    A client that stops reading its answer for ``answer_seconds`` is cut off. Where all
-    ``connections`` are taken, the one that has sent no whole request for the longest time makes
-    room for the new one, or else one that is being answered: neither half-open connections nor
-    streams of events keep others out.
+    A request, head and body, must arrive within ``arrival_seconds``; a late one is answered 408. A
+    client that does not read its answer for ``answer_seconds`` is disconnected. If all
+    ``connections`` are in use, a new one replaces the one that has waited longest without a whole
+    request, or else one that is being answered. So neither half-open connections nor streams of
+    events block other clients.
     """
 
     settings: ClassVar[Settings]
@@ -38,14 +38,14 @@ class Connection(H11Protocol):
     answer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Find room for the connection, and wait for its request."""
+        """Accept the connection, if necessary in place of another, and wait for its request."""
         super().connection_made(transport)
         if len(self.connections) > self.settings.connections:
             self._make_room()
         self._watch()
 
     def data_received(self, data: bytes) -> None:
-        """Take what the client sends, and see whether that completes its request."""
+        """Process data of the client, and check whether its request is complete."""
         super().data_received(data)
         self._watch()
 
@@ -55,24 +55,24 @@ class Connection(H11Protocol):
         self.answer = self.loop.call_later(self.settings.answer_seconds, self.transport.abort)
 
     def resume_writing(self) -> None:
-        """Go on sending."""
+        """Continue to send."""
         super().resume_writing()
         if self.answer is not None:
             self.answer.cancel()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave no deadline behind."""
+        """Cancel the deadlines."""
         for deadline in (self.arrival, self.answer):
             if deadline is not None:
                 deadline.cancel()
         super().connection_lost(exc)
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what is no HTTP."""
+        """Answer data that is not HTTP."""
         self.refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def refuse(self, status: HTTPStatus, detail: str) -> None:
-        """Answer with a problem document, unless an answer has begun, and hang up."""
+        """Answer with a problem document, unless an answer has begun, and close the connection."""
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             later = LATER if status is HTTPStatus.SERVICE_UNAVAILABLE else {}
             answer = problem(
@@ -87,7 +87,7 @@ class Connection(H11Protocol):
         self.transport.close()
 
     def _watch(self) -> None:
-        """Set the deadline when a request begins to arrive, and lift it when it is there."""
+        """Set the deadline when a request begins to arrive, and cancel it when it is complete."""
         arriving = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if arriving and self.arrival is None and not self.transport.is_closing():
             self.arrival = self.loop.call_later(self.settings.arrival_seconds, self._late)
@@ -97,13 +97,13 @@ class Connection(H11Protocol):
 
     def _late(self) -> None:
         if self.conn.their_state is h11.IDLE and not self.conn.trailing_data[0]:
-            self.transport.close()  # it never said a word
+            self.transport.close()  # it has not sent anything
         else:
             seconds = self.settings.arrival_seconds
             self.refuse(HTTPStatus.REQUEST_TIMEOUT, f"the request took more than {seconds} s")
 
     def _make_room(self) -> None:
-        """End the connection that can best be spared, or else this one."""
+        """Close the connection that matters least, or else this one."""
         spare = {
             each: ends
             for each in self.connections - {self}
@@ -117,22 +117,22 @@ class Connection(H11Protocol):
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too many requests at a time")
 
     def _ends(self) -> float | None:
-        """Time at which this connection ends; None while the service works for it."""
-        if self.transport.is_closing():  # and has not been read to its end
+        """Time at which this connection ends; None while the service computes its answer."""
+        if self.transport.is_closing():  # but its answer has not been read to the end
             return 0.0
         if deadline := self.arrival or self.timeout_keep_alive_task:
             return deadline.when()
-        # Who follows events asks for them again, and files can be fetched in parts.
+        # A client of events can reconnect, and files can be fetched in parts.
         return math.inf if self.cycle.response_started else None
 
 
 def limited(settings: Settings) -> type[Connection]:
-    """Return the class of the connections, and let this process have as many files as it may.
+    """Return the class of the connections, and raise this process's limit of open files.
 
-    Each connection may send a file; the number of connections is limited to what that leaves.
+    Each connection may send a file, so the number of connections is limited by that of open files.
     """
     files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    for wanted in (most, MACOS_FILES):  # where "any number" is said, it is not meant
+    for wanted in (most, MACOS_FILES):  # macOS refuses its own limit if that is "unlimited"
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
             files = wanted

@@ -1,4 +1,4 @@
-"""What routes may ask for; they see nothing else of the service."""
+"""The dependencies of routes, which are all that they use of the service."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from studies.storage.runfile import stamp, verify
 
 
 def held(name: str) -> Any:
-    """Return a dependency on what the application holds under a name.
+    """Return a dependency on an object that the application stores under a name.
 
-    It is a coroutine: the framework runs functions in a thread of its pool, where they wait for
-    all that is slow.
+    It is a coroutine, because the framework runs plain functions in its thread pool, where they
+    would wait behind slow ones.
     """
 
     async def get(request: Request) -> Any:
@@ -56,7 +56,7 @@ def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
 
 
 def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
-    """Return the catalogue's row of the run named in the path, if its file is still that one."""
+    """Return the catalogue's row of the run in the path, if its file is unchanged."""
     row, path = store.catalogue.run(run_id), store.run_path(run_id)
     if row is None or not path.is_file():
         raise NotFound(f"no run has the id {run_id}")
@@ -66,7 +66,7 @@ def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
 
 
 async def get_caller(request: Request) -> Scope | None:
-    """Return what the caller may do; None for a stranger, who may ask for little."""
+    """Return the caller's scope; None without a key."""
     scope: Scope | None = request.state.caller
     return scope
 

@@ -1,4 +1,4 @@
-"""Every error leaves as a problem document (RFC 9457); one table maps exception to status."""
+"""Errors as problem documents (RFC 9457); one table maps exceptions to statuses."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from studies.errors import (
 log = logging.getLogger(__name__)
 
 LONGEST_VALUE = 200
-"""Characters of an offending value that are shown back."""
+"""Number of characters of an offending value that the answer shows."""
 
 
 class NotFound(LookupError):
@@ -43,11 +43,11 @@ class Conflict(RuntimeError):
 
 
 class Busy(RuntimeError):
-    """As much of this kind is being done, or waits, as the service allows."""
+    """Too many requests of this kind are being processed, or wait."""
 
 
 class QueueLost(RuntimeError):
-    """The file of the queue is gone or damaged; the service makes it anew from the studies."""
+    """The file of the queue is missing or damaged; the service makes it again from the studies."""
 
 
 STATUS: dict[type[Exception], HTTPStatus] = {
@@ -68,13 +68,13 @@ STATUS: dict[type[Exception], HTTPStatus] = {
 NO_ROOM = "no room is left on the disk of the data directory"
 
 LATER = {"retry-after": "10"}
-"""Header that tells when to ask again what may succeed then [s]."""
+"""Header with the time after which a repeated request may succeed [s]."""
 
 MEDIA_TYPE = "application/problem+json"
 
 
 class ProblemDocument(BaseModel):
-    """What went wrong, in the form of RFC 9457."""
+    """An error, in the form of RFC 9457."""
 
     type: str = "about:blank"
     title: str
@@ -88,7 +88,7 @@ CONTENT = {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}}
 ANSWERS: dict[int | str, dict[str, Any]] = {
     code: {"description": "Problem", "content": CONTENT} for code in ("4XX", "5XX")
 }
-"""How the description of the service announces its errors."""
+"""Errors in the OpenAPI description of the service."""
 
 REFUSED: dict[int | str, dict[str, Any]] = {
     422: {
@@ -97,7 +97,7 @@ REFUSED: dict[int | str, dict[str, Any]] = {
         "content": CONTENT,
     }
 }
-"""How it announces that what is valid depends on more than the form of a request."""
+"""Errors in this description for requests of the right form with values that are not allowed."""
 
 
 class Problem(Response):
@@ -106,7 +106,7 @@ class Problem(Response):
     media_type = MEDIA_TYPE
 
     def render(self, content: ProblemDocument) -> bytes:
-        """Encode in ASCII: what a client sent may hold lone surrogates."""
+        """Encode in ASCII, because a client's text may contain lone surrogates."""
         return json.dumps(content.model_dump(), allow_nan=False).encode("ascii")
 
 
@@ -117,7 +117,7 @@ def problem(
     errors: Sequence[dict[str, Any]] = (),
     headers: dict[str, str] | None = None,
 ) -> Problem:
-    """Return the problem document for one failed request, None for one that never arrived."""
+    """Return the problem document for a failed request; None is one that did not arrive whole."""
     document = ProblemDocument(
         title=status.phrase,
         status=status.value,
@@ -129,12 +129,12 @@ def problem(
 
 
 def status_of(exc: Exception) -> HTTPStatus:
-    """Return the status of an exception, that of its nearest ancestor in the table."""
+    """Return the HTTP status of an exception: that of its nearest ancestor in the table."""
     return next(STATUS[kind] for kind in type(exc).__mro__ if kind in STATUS)
 
 
 def shown(value: object) -> str | int | float | bool | None:
-    """Return an offending value as JSON can carry it, cut to a readable length."""
+    """Return an offending value as a JSON value, cut to a readable length."""
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int | float) and abs(value) < 2**53:
@@ -144,7 +144,7 @@ def shown(value: object) -> str | int | float | bool | None:
 
 
 def dotted(location: Sequence[str | int]) -> str:
-    """Return a pydantic location as ``sweep.friction[2]``, without the part of the request."""
+    """Return a pydantic location as ``sweep.friction[2]``, without ``body`` or ``query``."""
     path = location[1:] if len(location) > 1 else location
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
@@ -194,27 +194,27 @@ def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer with an error of one sentence."""
     status = status_of(exc)
     later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
-    told = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
-    said = told.get(type(exc), str(exc))
+    texts = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
+    said = texts.get(type(exc), str(exc))
     return problem(request, status, said, headers=later)
 
 
 def on_unusable(request: Request, exc: Unusable) -> Problem:
-    """Answer what only the operator can mend, without the path."""
+    """Answer an error that only the operator can correct, without the path."""
     log.error("%s", exc)
     return problem(request, status_of(exc), f"{exc.field}: {exc.allowed}", headers=LATER)
 
 
 def on_system_error(request: Request, exc: OSError) -> Problem:
-    """Answer what the system refused, without the path."""
+    """Answer an error of the operating system, without the path."""
     log.error("%s", exc)
     detail = f"the data directory cannot be used: {exc.strerror or 'see the log of the service'}"
     return problem(request, status_of(exc), detail, headers=LATER)
 
 
 def on_http_error(request: Request, exc: HTTPException) -> Response:
-    """Answer what the framework refuses itself: unknown paths, methods, large bodies."""
-    if isinstance(exc.__cause__, StudyError):  # from within the framework's reading of the body
+    """Answer errors of the framework: unknown paths, methods, large bodies."""
+    if isinstance(exc.__cause__, StudyError):  # raised while the framework reads the body
         return on_field_error(request, exc.__cause__)
     headers = dict(exc.headers or {})
     status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
@@ -222,7 +222,7 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
         headers["allow"] = offered(request, headers.pop("Allow"))
         if request.method == "OPTIONS":
             return Response(status_code=HTTPStatus.NO_CONTENT, headers=headers)
-    if status is HTTPStatus.BAD_REQUEST:  # a body that Python's JSON reader gave up
+    if status is HTTPStatus.BAD_REQUEST:  # a body that is not valid JSON
         form = request.headers.get("content-type", "").lower().startswith("multipart")
         kind = "a form of files" if form else "JSON"
         allowed = f"{kind} that can be read ({exc.__cause__ or exc.detail})"
@@ -231,8 +231,8 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
 
 
 def on_unexpected(request: Request, exc: Exception) -> Problem:
-    """Answer a defect without showing its inside; the server writes the traceback to its log."""
-    # No middleware sees this answer, which is made outside of them all.
+    """Answer an unexpected error without its details; the traceback goes to the log."""
+    # This answer does not pass through the middleware.
     known = {**HEADERS, "x-request-id": REQUEST.get()}
     status, detail = HTTPStatus.INTERNAL_SERVER_ERROR, "the service failed; see its log"
     return problem(request, status, detail, headers=known)

@@ -1,7 +1,6 @@
-"""Studies examined before they are accepted.
+"""Check studies before they are accepted, in a separate process.
 
-To check and name every run of a large study takes seconds of computing, and the memory that goes
-with it.
+To check every run of a large study and to make its id takes seconds, and memory.
 """
 
 from __future__ import annotations
@@ -16,9 +15,9 @@ from service.settings import Settings
 from studies import Bounds, Estimate, Store, Study, estimate
 
 WAITING = 100
-"""Studies that may wait to be examined."""
+"""Number of studies that may wait to be checked."""
 SECONDS = 120
-"""Time that the examination of a study may take."""
+"""Longest time of the check of a study [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +26,9 @@ class Examined:
 
     Attributes
     ----------
-    study : checked
+    study : the checked study
     runs : ids of its runs in the order of its cases
-    estimate : what it costs
+    estimate : its estimated cost
     """
 
     study: Study
@@ -38,11 +37,11 @@ class Examined:
 
 
 class Examiner:
-    """Examines studies, one after the other.
+    """Checks studies, one after the other.
 
     Parameters
     ----------
-    settings : what a study may cost
+    settings : with the bounds on the cost of a study
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -55,7 +54,7 @@ class Examiner:
         Raises
         ------
         StudyError
-            For anything wrong with it, or when it asks for more than the settings allow.
+            If it has a mistake, or its cost exceeds the settings.
         Busy
             If too many others wait, or the process was killed.
         """
@@ -66,7 +65,7 @@ class Examiner:
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
-    """Check a study, name its runs and tell what it costs; in a process of its own."""
+    """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
     study = Study.known(content, store.scene)
     bounds.check_size(study)

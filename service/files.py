@@ -18,12 +18,12 @@ UNCHANGED: dict[int | str, dict[str, Any]] = {
 }
 NETCDF: dict[int | str, dict[str, Any]] = {
     200: {"content": {MEDIA_TYPE: {}}},
-    206: {"description": "The part that was asked for", "content": {MEDIA_TYPE: {}}},
+    206: {"description": "The requested part", "content": {MEDIA_TYPE: {}}},
     **UNCHANGED,
 }
 
 TAGS = StaticFiles()
-"""Knows when a client has what would be answered: by tags, weak or listed, or else by dates."""
+"""Decides whether a client's copy is up to date: by entity tags, or else by dates."""
 
 RANGE = re.compile(rb"bytes=(?:(?P<first>\d{1,18})-(?P<last>\d{0,18})|-\d{1,18})")
 
@@ -31,8 +31,8 @@ RANGE = re.compile(rb"bytes=(?:(?P<first>\d{1,18})-(?P<last>\d{0,18})|-\d{1,18})
 class PartlyFile(FileResponse):
     """A file of which a client may request one part, or only whether it has changed.
 
-    A range that is malformed, or of several parts, is ignored as HTTP permits (RFC 9110, 14.2):
-    the framework's own answer to it would be no problem document.
+    A range that is malformed, or has several parts, is ignored as HTTP permits (RFC 9110, 14.2):
+    the framework's answer to it would not be a problem document.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -52,7 +52,7 @@ class PartlyFile(FileResponse):
 
 
 def sensible(header: bytes) -> bool:
-    """Tell whether a ``Range`` header asks for one part that does not end before it begins."""
+    """Whether a ``Range`` header requests one part that does not end before it begins."""
     found = RANGE.fullmatch(header)
     return found is not None and (not found["last"] or int(found["first"]) <= int(found["last"]))
 

@@ -1,7 +1,7 @@
-"""Functions called in a process of its own, one after the other, with limits of time and memory.
+"""Call functions in a separate process, one after the other, with limits of time and memory.
 
-To name every run of a large study takes seconds and memory; a mesh can be made so that reading it
-takes either without end. Other requests are answered meanwhile, and the service lives on.
+A large study takes seconds and memory to check, and a malicious mesh could take both without end.
+Meanwhile the service answers other requests.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Guarded:
 
     Parameters
     ----------
-    field : what is read, as errors name it: ``study``, ``scene``
-    waiting : calls that may wait
-    seconds : time that a call may take
+    field : the input that errors name: ``study``, ``scene``
+    waiting : number of calls that may wait
+    seconds : longest time of a call
     """
 
     def __init__(self, field: str, waiting: int, seconds: float) -> None:
@@ -50,16 +50,16 @@ class Guarded:
     async def call(
         self, function: Callable[..., Found], *given: object, name: object, advice: str = ""
     ) -> Found:
-        """Return ``function(*given)`` in one's `turn`; all of it must be picklable.
+        """Return ``function(*given)``, called during a `turn`; all of it must be picklable.
 
         Parameters
         ----------
-        name, advice : what an error of the limits names, and what it tells to do
+        name, advice : value and advice in the error if a limit is exceeded
 
         Raises
         ------
         StudyError
-            where time or memory did not suffice; besides it what the function raises
+            if time or memory did not suffice; errors of the function are raised too
         Busy
             if the process was killed
         """

@@ -1,4 +1,4 @@
-"""Headers that tell a browser what it may do with an answer: look at it here, nothing more."""
+"""Security headers, which restrict what a browser may do with an answer."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ PAGE = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     f"{OURS_ALONE}"
 )
-"""Policy of the interactive documentation, our only page: scripts come from here alone."""
+"""Content security policy of the interactive documentation: only scripts of this service."""
 
 
 class SecurityHeaders:
-    """Middleware that adds the headers to every answer that has none of its own."""
+    """Middleware that adds the headers to every answer that does not set them itself."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand the request on; what comes back gets the headers."""
+        """Pass the request on, and add the headers to the answer."""
 
         async def secured(message: Message) -> None:
             if message["type"] == "http.response.start":

@@ -1,4 +1,4 @@
-"""Scene files examined before they are kept; nothing of what callers send is executed."""
+"""Check scene files before they are stored; nothing in them is executed."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from studies.scenes.scene import FileScene, file_scene, read_scene
 from studies.scenes.table import FILE_NAME
 
 SECONDS = 60
-"""Time that reading a scene may take."""
+"""Longest time of reading a scene [s]."""
 WAITING = 20
-"""Scenes that may wait to be read."""
+"""Number of scenes that may wait to be read."""
 FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
-"""Endings of mesh files that callers may send: of formats that name no other file."""
+"""Permitted endings of mesh files: formats that do not refer to other files."""
 LONGEST = 1_000_000
-"""Bytes that a scene file may have, beside its meshes."""
+"""Largest size of a scene file, without its meshes [bytes]."""
 _FILE = "scene.toml"
 
 
 class Inspector:
-    """Looks at scenes, one after the other."""
+    """Checks scenes, one after the other."""
 
     def __init__(self) -> None:
         self.process = Guarded("scene", WAITING, SECONDS)
@@ -40,7 +40,7 @@ class Inspector:
         Raises
         ------
         StudyError, SceneError
-            with all that is wrong with it
+            with all its mistakes
         Busy
             if too many others wait, or the process was killed
         """
@@ -67,14 +67,14 @@ def inspected(folder: str) -> str:
     try:
         answer = {"content": _read(Path(folder))}
     except SceneError as error:
-        answer = {"mistakes": [_told(each) for each in error.mistakes]}
+        answer = {"mistakes": [_fields_of(each) for each in error.mistakes]}
     except StudyError as error:
-        answer = {"mistakes": [_told(error)]}
+        answer = {"mistakes": [_fields_of(error)]}
     return json.dumps(answer).replace(f"{folder}/", "")
 
 
 def _read(folder: Path) -> Any:
-    """Return the content of the scene of a folder, in which all files are needed and sound."""
+    """Return the content of the scene in a folder; every file must be needed and valid."""
     content = Description.read(folder / _FILE).content
     needed = mesh_names(content)
     for name in sorted({each.name for each in folder.iterdir()} - {_FILE, *needed}):
@@ -84,7 +84,7 @@ def _read(folder: Path) -> Any:
     return content
 
 
-def _told(mistake: StudyError) -> tuple[str, object, str]:
+def _fields_of(mistake: StudyError) -> tuple[str, object, str]:
     return mistake.field, _plain(mistake.value), mistake.allowed
 
 

@@ -1,4 +1,4 @@
-"""One study in the queue: where it stands, and what is wanted of it."""
+"""One study in the queue: its state and its data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNREADABLE = "its row in the queue cannot be read: post the study again"
 
 
 class StudyState(StrEnum):
-    """Where a study stands."""
+    """The state of a study."""
 
     ACCEPTED = "accepted"
     RUNNING = "running"
@@ -38,13 +38,13 @@ class Job:
     Attributes
     ----------
     id : content id of the study
-    name, scene : of the study
+    name, scene : name and scene of the study
     size : number of its runs
-    state, message : where it stands, and why when that needs a reason
-    progress : percentage of the work that is done
+    state, message : its state, and the reason if there is one
+    progress : completed percentage of the work
     since : time of the last retry [ns since 1970], 0 without one: runs that failed before it are
         computed again
-    priority : of two studies, the one with the greater priority is computed first
+    priority : the study with the greater priority is computed first
     submitted, started, finished : ISO 8601, UTC
     """
 
@@ -63,7 +63,7 @@ class Job:
 
 
 def job_of(row: sqlite3.Row) -> Job | None:
-    """Return the job a row of the table stands for; None when the row makes no sense."""
+    """Return the job of a row of the table; None if the row is not valid."""
     found = dict(row)
     try:
         found |= {key: int(found[key]) for key in ("size", "since", "priority")}
@@ -77,16 +77,16 @@ def job_of(row: sqlite3.Row) -> Job | None:
 
 
 def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str, list[str]]:
-    """Return the condition, in SQL, for jobs in a state and of studies with a tag."""
+    """Return the SQL condition for jobs in a state, of studies with a tag, and its values."""
     tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
-    asked = {"state = ?": state, tagged: tag}
-    clauses = [clause for clause, value in asked.items() if value is not None]
-    values = [str(value) for value in asked.values() if value is not None]
+    conditions = {"state = ?": state, tagged: tag}
+    clauses = [clause for clause, value in conditions.items() if value is not None]
+    values = [str(value) for value in conditions.values() if value is not None]
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 
 def verdict(counts: Mapping[str, int]) -> tuple[StudyState, str]:
-    """Return the final state of a study whose runs ended as counted, and the reason."""
+    """Return the final state of a study from the number of its runs by status, and the reason."""
     others = {status: count for status, count in counts.items() if count and status != "ok"}
     if not others:
         return StudyState.SUCCESSFUL, ""

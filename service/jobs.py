@@ -1,8 +1,8 @@
-"""The durable queue: one row of an SQLite file for each study ever accepted.
+"""The durable queue: one row of an SQLite file for each accepted study.
 
-The row alone says what shall be done with a study. Routes write into it what users ask for
-(accept, dismiss, retry); the runner reads that, and writes what was done. A service that starts
-after a crash reads from it what is left to do. A row that cannot be read hides only itself.
+The state of a study is in its row alone. Routes write the requests of users into it (accept,
+dismiss, retry); the runner reads these, and writes the results. After a crash the service reads
+the remaining work from it. A row that cannot be read does not affect other rows.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.ru
 class Jobs:
     """The queue in the file ``path``; safe to use from many threads and processes.
 
-    Methods raise `QueueLost` when the file is gone or damaged, `StoreFull` when the disk is full.
+    Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full.
 
     Parameters
     ----------
-    path : the file; made, or brought into today's form, when the queue is opened
-    longest : most studies that may wait; None for any number
+    path : the file; created, or converted to the current form, when the queue is opened
+    longest : largest number of waiting studies; None for any number
     """
 
     def __init__(self, path: Path, longest: int | None = None) -> None:
@@ -51,15 +51,15 @@ class Jobs:
     def accept(
         self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
     ) -> tuple[Job, bool]:
-        """Return the job of this study, and whether it was not known before.
+        """Return the job of this study, and whether it is new.
 
-        ``runs`` are the ids of its runs in the order of its cases. They are kept, because an
-        edited solver would give other ids, and the study would lose sight of what it computed.
+        ``runs`` are the ids of its runs in the order of its cases. They are stored, because a
+        changed solver would give other ids, and the study would not find its runs.
 
         Raises
         ------
         Busy
-            If as many studies wait as may.
+            If the queue has its largest length.
         """
         with self.transaction() as connection:
             with suppress(NotFound, Conflict):
@@ -68,8 +68,8 @@ class Jobs:
             count = "SELECT COUNT(*) FROM job WHERE state = ?"
             (waiting,) = connection.execute(count, (StudyState.ACCEPTED,)).fetchone()
             if self.longest is not None and waiting >= self.longest:
-                raise Busy(f"{waiting} studies wait already, and no more may: post it later")
-            connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # a row unreadable
+                raise Busy(f"{waiting} studies wait already, the largest number: post it later")
+            connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # an unreadable row
             connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
             connection.executemany(
                 "INSERT INTO run VALUES (?, ?, ?)",
@@ -111,7 +111,7 @@ class Jobs:
             return [row["run"] for row in rows]
 
     def page(self, *, limit: int, offset: int, **which: Any) -> tuple[list[Job], int]:
-        """Return jobs, the latest first, and how many there are altogether; see `wanted`."""
+        """Return a page of jobs, the latest first, and the number of all; filters: `wanted`."""
         where, values = wanted(**which)
         with self.transaction("BEGIN") as connection:
             (total,) = connection.execute(f"SELECT COUNT(*) FROM job {where}", values).fetchone()
@@ -123,16 +123,16 @@ class Jobs:
             return [job for job in found if job is not None], total
 
     def states(self) -> dict[str, int]:
-        """Return the number of jobs by state; a state that no job has is missing."""
+        """Return the number of jobs by state, without states that no job has."""
         with self.transaction("BEGIN") as connection:
             counted = connection.execute("SELECT state, COUNT(*) FROM job GROUP BY state")
             return dict(counted.fetchall())
 
     def take(self, busy: Collection[str] = (), largest: int = sys.maxsize) -> Job | None:
-        """Mark the job whose turn it is as running, and return it.
+        """Mark the next job as running, and return it; None if there is none.
 
-        It has at most ``largest`` runs. It is not one of ``busy``, the jobs that are being
-        computed, and shares no run with them: what it shares with others is computed once.
+        It has at most ``largest`` runs, and shares no run with ``busy``, the jobs that are being
+        computed, so that common runs are computed once.
         """
         others = json.dumps(list(busy))
         with self.transaction() as connection:
@@ -158,7 +158,7 @@ class Jobs:
             return None
 
     def resume(self, busy: Collection[str]) -> None:
-        """Mark jobs as running on which a process works, in a queue made anew."""
+        """Mark jobs as running, in a queue that was made again while processes work on them."""
         with self.transaction() as connection:
             connection.executemany(
                 "UPDATE job SET stood = IIF(state = ?, '', state), state = ?, message = '',"
@@ -167,7 +167,7 @@ class Jobs:
             )
 
     def waiting(self) -> dict[str, str]:
-        """Return what the running jobs wait for, by id; nothing for those that go on."""
+        """Return, by id, the reason for which running jobs wait, without those that do not."""
         with self.transaction("BEGIN") as connection:
             rows = connection.execute(
                 "SELECT id, message FROM job WHERE state = ? AND message != ''",
@@ -182,7 +182,7 @@ class Jobs:
         message: str,
         standing: StudyState = StudyState.RUNNING,
     ) -> None:
-        """Write the end of a job in the given state; one dismissed meanwhile stays so."""
+        """Write the final state of a job; if it was dismissed meanwhile, it stays dismissed."""
         with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET state = ?, message = ?, finished = ?,"
@@ -192,7 +192,7 @@ class Jobs:
             )
 
     def note(self, job_id: str, progress: float, message: str = "") -> None:
-        """Write how far a running job is, and what it waits for, if it does."""
+        """Write the progress of a running job, and the reason for which it waits, if it does."""
         with self.transaction() as connection:
             connection.execute(
                 "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
@@ -200,16 +200,16 @@ class Jobs:
             )
 
     def dismiss(self, job_id: str) -> Job:
-        """Ask that the work on a job stops; asking twice is asking once.
+        """Request that the work on a job stops; a repeated request has no further effect.
 
-        A study that was successful before its retry is so again: its data set is still there.
+        A study that was successful before its retry becomes successful again: its data set exists.
 
         Raises
         ------
         NotFound
             If the job is unknown.
         Conflict
-            If it has come to its end already.
+            If it has ended already.
         """
         with self.transaction() as connection:
             job = self._read(connection, job_id)
@@ -225,14 +225,14 @@ class Jobs:
             return self._read(connection, job_id)
 
     def retry(self, job_id: str) -> Job:
-        """Put a job that came to an end back in the queue, at its end.
+        """Put a job that has ended back into the queue, in the last place.
 
         Raises
         ------
         NotFound
             If the job is unknown.
         Conflict
-            If it is still waiting or running.
+            If it is waiting or running.
         """
         with self.transaction() as connection:
             job = self._read(connection, job_id)
@@ -249,9 +249,9 @@ class Jobs:
     def transaction(
         self, begin: str = "BEGIN IMMEDIATE", mode: str = "rw"
     ) -> Iterator[sqlite3.Connection]:
-        """Give a connection whose changes come at once or never; nobody else writes meanwhile."""
+        """Give a connection for one transaction, during which no other process writes."""
         try:
-            # A file that is gone is not made anew behind the back of those who wrote in it.
+            # A missing file is not created here: other processes may have written to it.
             address = f"{self.path.resolve().as_uri()}?mode={mode}"
             connection = sqlite3.connect(address, uri=True, timeout=30.0, isolation_level=None)
             connection.row_factory = sqlite3.Row
@@ -263,16 +263,16 @@ class Jobs:
             finally:
                 connection.close()
         except sqlite3.DatabaseError as error:
-            raise self._told(error) from error
+            raise self._translated(error) from error
 
-    def _told(self, error: sqlite3.DatabaseError) -> Exception:
-        """Return what an error of SQLite means for the queue."""
+    def _translated(self, error: sqlite3.DatabaseError) -> Exception:
+        """Return the error of the queue for an error of SQLite."""
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
         if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE):  # the latter past a quota
             return StoreFull(str(self.path.parent))
         damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
         if code & 0xFF in damage or not self.path.is_file():
-            return QueueLost(f"{self.path.name} is gone or damaged ({error})")
+            return QueueLost(f"{self.path.name} is missing or damaged ({error})")
         return OSError(f"{self.path.name} cannot be used now: {error}")
 
     @staticmethod

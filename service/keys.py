@@ -1,7 +1,7 @@
 """API keys: made by a command, kept as hashes in a file of the data directory.
 
-A key is 256 random bits, so a plain SHA-256 of it is enough: nobody can try all keys. Salts and
-slow hashes protect what people choose, such as passwords.
+A key is 256 random bits, so a plain SHA-256 is enough: trying all keys is impossible. Salts and
+slow hashes are needed only for passwords that people choose.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from studies.storage.appearing import appearing
 
 
 class Scope(StrEnum):
-    """What a caller may do; each includes those before it."""
+    """The permission of a caller; each includes those before it."""
 
     READ = "read"
     SUBMIT = "submit"
     ADMIN = "admin"
 
     def covers(self, other: Scope) -> bool:
-        """Tell whether who may do this may do the other."""
+        """Whether this scope includes another one."""
         order = list(Scope)
         return order.index(self) >= order.index(other)
 
 
 class KeysError(RuntimeError):
-    """No keys: none was made, or their file cannot be read. Nobody gets in until there are."""
+    """There are no keys, or their file cannot be read; no caller is accepted until there are."""
 
 
 class Key(BaseModel):
@@ -50,17 +50,17 @@ class Key(BaseModel):
 
 
 FILE = TypeAdapter(dict[str, Key])
-"""What the file holds: the keys by name, oldest first."""
+"""Content of the file: the keys by name, oldest first."""
 
 
 class Keys:
-    """The keys of a data directory, read anew for each question: a change counts at once."""
+    """The keys of a data directory, read from the file each time: a change takes effect at once."""
 
     def __init__(self, directory: Path) -> None:
         self.path = directory / "keys.json"
 
     def all(self) -> dict[str, Key]:
-        """Return the keys by name; raise `KeysError` when the file is there and not readable."""
+        """Return the keys by name; raise `KeysError` if the file exists and is not readable."""
         try:
             return FILE.validate_json(self.path.read_bytes())
         except FileNotFoundError:
@@ -70,19 +70,19 @@ class Keys:
             raise KeysError(f"{self.path.name} cannot be read: {reason}") from None
 
     def scope_of(self, text: str) -> Scope | None:
-        """Return what the key ``text`` allows; nothing when it is none of ours.
+        """Return the scope of the key ``text``; None if it is unknown.
 
-        Every hash is compared, in a time that does not depend on where it differs.
+        Every hash is compared, in a time that does not depend on the position of a difference.
         """
         given, known = _digest(text).encode(), self.all().values()
         fits = [key for key in known if hmac.compare_digest(key.sha256.encode(), given)]
         return fits[0].scope if fits else None
 
     def add(self, name: str, scope: Scope) -> str:
-        """Make a key and return its text, which is stored nowhere; the name must be new."""
+        """Make a key and return its text, which is not stored; the name must be new."""
         if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII):
             raise StudyError("name", name, "must be 1 to 64 letters, digits, '.', '_' or '-'")
-        text = f"residua_{secrets.token_urlsafe(32)}"  # no dash first; known at sight in a leak
+        text = f"residua_{secrets.token_urlsafe(32)}"  # no dash first; a leaked key is recognised
         with self._changing() as keys:
             if name in keys:
                 raise StudyError("name", name, "must be new: there is a key of this name")
@@ -90,7 +90,7 @@ class Keys:
         return text
 
     def remove(self, name: str) -> None:
-        """Forget the key of this name."""
+        """Delete the key of this name."""
         with self._changing() as keys:
             if keys.pop(name, None) is None:
                 names = ", ".join(keys) or "none"
@@ -98,9 +98,9 @@ class Keys:
 
     @contextmanager
     def _changing(self) -> Iterator[dict[str, Key]]:
-        """Give the keys to be changed, then replace the file, which only its owner may read."""
+        """Give the keys for a change, then replace the file, which only its owner may read."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        lock = os.open(self.path.parent, os.O_RDONLY)  # commands at the same time take turns
+        lock = os.open(self.path.parent, os.O_RDONLY)  # simultaneous commands wait for each other
         try:
             fcntl.flock(lock, fcntl.LOCK_EX)
             keys = self.all()

@@ -14,11 +14,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 def body_limit(app: ASGIApp, limit: int, longest: Mapping[str, int]) -> ASGIApp:
-    """Return a middleware that hands over no more than ``limit`` bytes of a body, declared or not.
+    """Return a middleware that passes on at most ``limit`` bytes of a body, declared or not.
 
-    Paths of ``longest`` have limits of their own.
-
-    How long the body may take is `service.connections`' concern.
+    Paths in ``longest`` have other limits. The time limit of a body is in `service.connections`.
     """
 
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:

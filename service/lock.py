@@ -9,21 +9,21 @@ from pathlib import Path
 
 
 class DirectoryInUse(RuntimeError):
-    """Another service, or a study it left behind, still works in the directory."""
+    """Another service, or a process it started, still uses the directory."""
 
 
 def lock_directory(directory: Path, patience: float) -> int:
-    """Return the descriptor of a lock on ``directory``, held until its last copy is closed.
+    """Return the descriptor of a lock on ``directory``, valid until its last copy is closed.
 
     Parameters
     ----------
-    directory : the data directory; made when missing
-    patience : how long to wait for its present owner to leave [s]
+    directory : the data directory; created if missing
+    patience : how long to wait for another owner of the lock [s]
 
     Raises
     ------
     DirectoryInUse
-        If the owner stays.
+        If the lock is not released.
     """
     directory.mkdir(parents=True, exist_ok=True)
     path = directory / "service.lock"

@@ -1,4 +1,4 @@
-"""The log: one form for every line, with the ids of what it is about."""
+"""The log: one form for every line, with the ids of study, run and request."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ PLAIN_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 REQUEST: ContextVar[str] = ContextVar("request", default="")
 """Id of the request that is being answered.
 
-It is not put back: each request has a context of its own, and the traceback of one that failed is
-logged at the very end of it.
+It is not reset: each request has a separate context, and the traceback of a failed request is
+logged at its very end.
 """
 
 access = logging.getLogger("service.access")
@@ -32,7 +32,7 @@ LINE = "%(client)s %(method)s %(path)s %(status)s %(milliseconds)s ms"
 
 
 class About(logging.Filter):
-    """Lets every line pass, and adds the ids it is about: those it came with, or the process's."""
+    """Adds ids to every log record: its own, or those of the process."""
 
     def __init__(self, ids: dict[str, str]) -> None:
         super().__init__()
@@ -41,19 +41,19 @@ class About(logging.Filter):
     def filter(self, record: logging.LogRecord) -> bool:
         """Add the ids."""
         known = {"request": REQUEST.get(), **self.ids, **vars(record)}
-        told = {name: known[name] for name in ("request", "study", "run") if known.get(name)}
-        about = "".join(f" {name}={value}" for name, value in told.items())
-        vars(record).update(told, about=about)
+        entry = {name: known[name] for name in ("request", "study", "run") if known.get(name)}
+        about = "".join(f" {name}={value}" for name, value in entry.items())
+        vars(record).update(entry, about=about)
         return True
 
 
 def configure(form: str, **ids: str) -> None:
-    """Send the log of this process, warnings and its last error included, to the error output.
+    """Send the log of this process, with warnings and its last error, to the error output.
 
     Parameters
     ----------
     form : ``"plain"``, or ``"json"`` for an object on each line
-    **ids : what this process is about, such as ``study``
+    **ids : ids of this process, such as ``study``
     """
     json = {
         "()": "pythonjsonlogger.json.JsonFormatter",
@@ -80,8 +80,9 @@ def configure(form: str, **ids: str) -> None:
 class RequestLog:
     """Outermost middleware: gives each request an id, measures it, and logs it.
 
-    Neither headers nor the query are logged: they may hold what is secret. ``observe`` is called
-    with scope, status and seconds of each request; one that fails without an answer counts as 500.
+    Neither headers nor the query are logged, because they may contain secrets. ``observe`` is
+    called with scope, status and seconds of each request; a request that fails without an answer
+    counts as 500.
     """
 
     def __init__(self, app: ASGIApp, observe: Callable[[Scope, int, float], None]) -> None:
@@ -110,7 +111,7 @@ class RequestLog:
         finally:
             seconds = time.perf_counter() - start
             self.observe(scope, status, seconds)
-            told = {
+            entry = {
                 "client": (scope.get("client") or ("-",))[0],
                 "method": scope["method"],
                 "path": quote(scope["path"])[:200],
@@ -119,5 +120,5 @@ class RequestLog:
             }
             for name, value in scope.get("path_params", {}).items():
                 if name in ("study_id", "run_id") and is_id(value):  # not any text of a path
-                    told[name.removesuffix("_id")] = value
-            access.info(LINE, told, extra=told)
+                    entry[name.removesuffix("_id")] = value
+            access.info(LINE, entry, extra=entry)

@@ -1,4 +1,4 @@
-"""Pictures of runs, for answers."""
+"""Pictures of runs as PNG, drawn one at a time."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from studies.storage.runfile import verify
 
 
 class Pictures:
-    """The pictures that are drawn, one at a time, and those last drawn.
+    """Draws pictures, one at a time, and keeps the latest ones.
 
-    Matplotlib shares fonts and the text cache among figures, so that two cannot be drawn at once.
+    Matplotlib shares fonts and the text cache among figures, so two cannot be drawn at once.
 
     Parameters
     ----------
-    queue : pictures that may wait to be drawn
-    memory : size of the pictures that are kept [bytes]
+    queue : number of pictures that may wait to be drawn
+    memory : total size of the pictures that are kept [bytes]
     """
 
     def __init__(self, queue: int, memory: int) -> None:
@@ -38,7 +38,7 @@ class Pictures:
         self.underway: dict[str, asyncio.Task[bytes]] = {}
 
     async def get(self, tag: str, path: Path, query: MapQuery) -> bytes:
-        """Return the picture with this tag, drawn unless it is kept or underway.
+        """Return the picture with this tag; it is drawn unless it is kept or being drawn.
 
         Raises
         ------

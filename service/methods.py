@@ -1,4 +1,4 @@
-"""Methods that follow from the others: HEAD from GET, and OPTIONS from all."""
+"""HTTP methods that follow from others: HEAD from GET, and OPTIONS from all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 def head_is_get(app: ASGIApp) -> ASGIApp:
     """Return a middleware that answers HEAD as GET is answered, without the body.
 
-    Belongs outside of all that decides by method, such as who may do what.
+    It must be outside of middleware that depends on the method, such as access control.
     """
 
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:
@@ -23,7 +23,7 @@ def head_is_get(app: ASGIApp) -> ASGIApp:
             nonlocal complete
             if message["type"] == "http.response.start":
                 await send(message)
-            elif not complete:  # from here on the application is told that the client has left
+            elif not complete:  # from here on the application sees that the client has left
                 complete = True
                 await send({"type": "http.response.body"})
 
@@ -32,13 +32,13 @@ def head_is_get(app: ASGIApp) -> ASGIApp:
         try:
             await app(scope, receive, head_only)
         finally:
-            scope["method"] = "HEAD"  # for those outside, who find the route in the same scope
+            scope["method"] = "HEAD"  # for outer middleware, which has the same scope
 
     return answer
 
 
 def offered(request: Request, known: str) -> str:
-    """Return all methods of a request's path for ``Allow``; one route has named those ``known``."""
+    """Return all methods of a request's path for ``Allow``; ``known`` are those of one route."""
     methods = {"OPTIONS", *known.split(", ")}
     for route in iter_route_contexts(request.app.routes):
         if route.methods and route.matches(request.scope)[0] is not Match.NONE:

@@ -1,4 +1,4 @@
-"""Figures for Prometheus."""
+"""Metrics for Prometheus."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from studies import Store
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
 
 OTHER = "other"
-"""Label of every method and path that no route has: clients cannot make labels without end."""
+"""Label of methods and paths without a route, so that clients cannot create labels without end."""
 
 
 class Metrics(Collector):
-    """The figures of one service, read from its queue and its catalogue at each request."""
+    """The metrics of one service, read from its queue and its catalogue at each request."""
 
     def __init__(self, jobs: Jobs, store: Store, runner: Runner) -> None:
         self.jobs = jobs
@@ -48,7 +48,7 @@ class Metrics(Collector):
         self.seconds.labels(method, route, status).observe(seconds)
 
     def collect(self) -> Iterable[Metric]:
-        """Yield the figures that others keep; those that cannot be read are left out."""
+        """Yield the metrics of queue, catalogue and disk, without those that cannot be read."""
         for name, meaning, kinds, count in (
             ("residua_studies", "Studies by status", StudyState, self.jobs.states),
             (
@@ -66,6 +66,6 @@ class Metrics(Collector):
                 yield family
         with suppress(OSError):
             free = shutil.disk_usage(self.store.directory).free
-            yield GaugeMetricFamily("residua_data_free_bytes", "Room for data", float(free))
+            yield GaugeMetricFamily("residua_data_free_bytes", "Free space for data", float(free))
         alive = float(self.runner.alive)
-        yield GaugeMetricFamily("residua_runner_up", "Whether studies are being taken", alive)
+        yield GaugeMetricFamily("residua_runner_up", "Whether studies are being computed", alive)

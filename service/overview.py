@@ -1,4 +1,4 @@
-"""Jobs as the answers show them, together with what the catalogue knows of their runs."""
+"""Jobs as the answers show them, with the states of their runs from the catalogue."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from studies import Store
 from studies.definition.vocabulary import taken
 
 KEPT = 100
-"""Most answers that are kept."""
+"""Largest number of answers that are kept."""
 
 PENDING = "pending"
 """Status of a run that is not in the catalogue."""
 
 
 def summary(job: Job) -> StudySummary:
-    """Return where a study stands."""
+    """Return the state of a study."""
     return StudySummary(**_columns(job))
 
 
 @dataclass(slots=True)
 class Detail:
-    """One answer: what it was made of, when that was read, and who reads it now."""
+    """One answer: its inputs, the time they were read, and the reading that is under way."""
 
     state: object = None
     content: bytes = b""
@@ -40,9 +40,9 @@ class Detail:
 
 
 class Details:
-    """Studies with the states of their runs, as JSON; what has not changed is not made anew.
+    """Studies with the states of their runs, as JSON; unchanged answers are kept.
 
-    Many may follow one study: one reading serves all requests before it.
+    Many clients may follow one study: one reading serves all requests before it.
     """
 
     def __init__(self, jobs: Jobs, store: Store) -> None:
@@ -51,14 +51,14 @@ class Details:
         self.kept: OrderedDict[tuple[str, int, int], Detail] = OrderedDict()
 
     async def get(self, study_id: str, window: Window) -> bytes:
-        """Return a study, and one by one those of its runs that are in ``window``."""
-        asked = time.monotonic()
+        """Return a study, with those of its runs that are in ``window``."""
+        requested = time.monotonic()
         key = study_id, window.limit, window.offset
         detail = self.kept.setdefault(key, Detail())
         self.kept.move_to_end(key)
         try:
             async with detail.one:
-                if detail.looked < asked:
+                if detail.looked < requested:
                     await run_sync(self._look, study_id, window, detail)
             return detail.content
         finally:
@@ -84,7 +84,7 @@ class Details:
             counts[taken(status, allow)] += number
         if pending := job.size - sum(counts.values()):
             counts[PENDING] = pending
-        axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of a table, its labels
+        axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of tables the labels
         page = self.jobs.runs(job.id, window.limit, window.offset)
         rows = self.store.catalogue.rows(page)
         return StudyDetail(

@@ -1,7 +1,7 @@
 """The process that owns store and workers while studies are computed: ``python -m service.pool``.
 
-Studies share its workers, and the lock of the store that it holds. It is started with the first
-study, and ends when there has been none for some time.
+Studies share its workers and its lock of the store. It starts with the first study, and ends after
+some time without one.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from service.settings import Settings
 from studies.errors import StoreBusy, StoreFull, StudyError
 
 START_SECONDS = 60.0
-"""Time within which the workers must have started."""
+"""Longest time for the start of the workers [s]."""
 
 
 class PoolAway(RuntimeError):
-    """There is no pool, and why; waiting may help."""
+    """There is no pool, for the reason given; waiting may help."""
 
 
 @dataclass(slots=True)
@@ -33,7 +33,7 @@ class Pool:
     Attributes
     ----------
     settings : how many workers, or which scheduler
-    lock : descriptor of the directory's lock, handed on to the process
+    lock : descriptor of the directory's lock, passed on to the process
     """
 
     settings: Settings
@@ -43,7 +43,7 @@ class Pool:
     _one: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     async def access(self) -> dict[str, Any]:
-        """Return how the workers are reached, after starting the process if there is none.
+        """Return the access to the workers; the process is started if there is none.
 
         Raises
         ------
@@ -88,7 +88,7 @@ class Pool:
 
 
 def main() -> None:
-    """Hold the store, and the workers if they are to be our own, until the service says stop."""
+    """Lock the store, and run the workers unless there is a scheduler, until the service stops."""
     from studies import Store
     from studies.execution.cluster import own_workers
 

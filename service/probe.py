@@ -1,4 +1,4 @@
-"""A look at the data directory that holds nobody up."""
+"""Check of the data directory, with a time limit."""
 
 from __future__ import annotations
 
@@ -15,28 +15,31 @@ from service.jobs import Jobs
 from studies.errors import StoreFull
 
 SECONDS = 5.0
-"""Time in which the data directory must answer."""
+"""Time within which the check must end [s]."""
 
 
 class Probe:
-    """Looks at the data directory, once for all who ask meanwhile."""
+    """Checks the data directory; simultaneous requests share one check."""
 
     def __init__(self) -> None:
         self.limiter = CapacityLimiter(1)
         self.underway: asyncio.Task[tuple[bool, dict[str, str] | None]] | None = None
 
-    async def look(self, directory: Path, jobs: Jobs) -> tuple[bool, dict[str, str] | None]:
-        """Return what `look` does, or that nothing can be written or read when that takes long."""
+    async def check(self, directory: Path, jobs: Jobs) -> tuple[bool, dict[str, str] | None]:
+        """Return the result of `check_directory`, or ``(False, None)`` if it takes too long."""
         if self.underway is None or self.underway.done():
-            looking = run_sync(look, directory, jobs, limiter=self.limiter)
-            self.underway = asyncio.create_task(looking)
+            checking = run_sync(check_directory, directory, jobs, limiter=self.limiter)
+            self.underway = asyncio.create_task(checking)
         with move_on_after(SECONDS):
             return await asyncio.shield(self.underway)
         return False, None
 
 
-def look(directory: Path, jobs: Jobs) -> tuple[bool, dict[str, str] | None]:
-    """Return whether files can be written in a directory, and what waits, None if unreadable."""
+def check_directory(directory: Path, jobs: Jobs) -> tuple[bool, dict[str, str] | None]:
+    """Return whether files can be written in a directory, and the waiting jobs by id.
+
+    The second is None if the queue cannot be read.
+    """
     writable, waiting = True, None
     try:
         with tempfile.TemporaryFile(dir=directory) as probe:

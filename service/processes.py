@@ -1,9 +1,9 @@
-"""Processes of the service's own, and how the two sides talk.
+"""Child processes of the service, and the communication with them.
 
-A process gets its order as the first line of its standard input; the end of that input means
-"stop", whether the service stops it or died. It sends lines of JSON on its standard output.
-It inherits the lock of the data directory and holds it until it ends: a service that starts after
-a crash waits for it.
+A process gets its order as the first line of its standard input. The end of that input means
+"stop", whether the service stops it or has died. It sends lines of JSON on its standard output. It
+inherits the lock of the data directory until it ends: a service that starts after a crash waits for
+it.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from typing import Any, TextIO
 from service import logs
 
 LONGEST_LINE = 1_000_000
-"""Bytes of one message a process may send."""
+"""Largest size of a message of a process [bytes]."""
 
 BEAT_SECONDS = 5.0
-"""Time between two signs of life; who takes a process for frozen must wait for longer."""
+"""Time between two signs of life [s]; a process counts as frozen only after a longer time."""
 
 STDIN = 0
 
 
 async def start(module: str, lock: int) -> Process:
-    """Start ``python -m module``; it loads what it needs, then waits for its order.
+    """Start ``python -m module``; it loads its modules, then waits for its order.
 
     Raises
     ------
@@ -47,7 +47,7 @@ async def start(module: str, lock: int) -> Process:
         stdout=PIPE,
         limit=LONGEST_LINE,
         pass_fds=(lock,),
-        start_new_session=True,  # an interrupt from a terminal is the service's to handle
+        start_new_session=True,  # the service handles an interrupt from a terminal
     )
 
 
@@ -58,7 +58,7 @@ def send(process: Process, order: Mapping[str, Any]) -> None:
 
 
 async def end(process: Process, grace: float) -> None:
-    """Ask a process to stop by closing its input, and kill it when it does not."""
+    """Stop a process by closing its input, and kill it if it does not end."""
     assert process.stdin is not None
     process.stdin.close()
     try:
@@ -70,28 +70,28 @@ async def end(process: Process, grace: float) -> None:
 
 
 class Outlet:
-    """Sends messages to the service, one JSON text a line."""
+    """Sends messages to the service, one JSON text per line."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
         self.one = threading.Lock()
 
     def send(self, kind: str, content: Mapping[str, Any]) -> None:
-        """Write one message; when the service no longer reads, the work goes on."""
+        """Write one message; if the service no longer reads, the work continues."""
         with contextlib.suppress(BrokenPipeError), self.one:
             self.stream.write(json.dumps({"kind": kind, "content": content}) + "\n")
             self.stream.flush()
 
 
 def claim_stdout() -> Outlet:
-    """Keep the standard output for messages: what libraries print goes to the error output."""
+    """Reserve the standard output for messages: output of libraries goes to the error output."""
     stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     return Outlet(stream)
 
 
 def beat(outlet: Outlet) -> None:
-    """Say now and then that this process is alive, as long as it is."""
+    """Send a sign of life at regular intervals, until the process ends."""
 
     def go_on() -> None:
         while True:
@@ -102,12 +102,12 @@ def beat(outlet: Outlet) -> None:
 
 
 def read_order() -> dict[str, Any]:
-    """Return the order, the first line of the standard input; from then on the log is ready."""
+    """Return the order, the first line of the standard input, and configure the log."""
     text = b""
     while not text.endswith(b"\n"):
         piece = os.read(STDIN, 65536)
         if not piece:
-            raise SystemExit(0)  # nothing to do: nobody has sent an order, or will
+            raise SystemExit(0)  # the input has ended without an order
         text += piece
     order: dict[str, Any] = json.loads(text)
     logs.configure(os.environ.get("RESIDUA_LOG_FORMAT", "plain"), study=order.get("id", ""))
@@ -117,8 +117,8 @@ def read_order() -> dict[str, Any]:
 def watch_stdin(grace: float) -> threading.Event:
     """Return an event that is set when the other end of the standard input closes.
 
-    A process that has not ended ``grace`` seconds later ends itself: a service that died cannot
-    kill it, and the next one waits for its lock.
+    A process that has not ended ``grace`` seconds later kills itself: a service that died cannot
+    do it, and the next service waits for the lock.
     """
     stop = threading.Event()
 
@@ -135,7 +135,7 @@ def watch_stdin(grace: float) -> threading.Event:
 
 @dataclass(slots=True)
 class Starter:
-    """Starts processes of one module, each before it is needed: to load takes a second or two.
+    """Starts processes of one module in advance, because loading takes a second or two.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Starter:
     _starting: bool = False
 
     async def prepare(self) -> None:
-        """Start the next process, unless it is there already; where that fails, `give` does."""
+        """Start the next process, unless there is one; if that fails, `give` starts it."""
         if self._ready is None and not self._starting:
             self._starting = True
             with contextlib.suppress(OSError):
@@ -156,7 +156,7 @@ class Starter:
             self._starting = False
 
     async def give(self, order: Mapping[str, Any]) -> Process:
-        """Return a process that has this order.
+        """Return a process that has received this order.
 
         Raises
         ------

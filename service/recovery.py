@@ -1,4 +1,4 @@
-"""The queue as the service starts: all studies of the directory; made anew where it is lost."""
+"""The queue at the start of the service: with all studies of the directory, and repaired."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ log = logging.getLogger(__name__)
 def open_queue(
     path: Path, store: Store, longest: int | None, computed: Collection[str] = ()
 ) -> Jobs:
-    """Return the queue; one that is missing or damaged is made from the studies of the store.
+    """Return the queue; a missing or damaged one is made again from the studies of the store.
 
-    A damaged file is kept under another name. A study with a data set has ended, as the data set
-    tells; one without is accepted, and computed; one of ``computed``, on which a process works
-    now, is running.
+    A damaged file is kept under another name. A study with a data set gets its final state from
+    the data set. One without is accepted, and computed. One in ``computed``, on which a process
+    works now, is running.
     """
     try:
         if path.exists():
@@ -33,7 +33,7 @@ def open_queue(
             return jobs
     except QueueLost as error:
         damaged = path.with_name(f"{path.name}.damaged")
-        log.error("%s: kept as %s, and made anew from the studies", error, damaged.name)
+        log.error("%s: kept as %s, and made again from the studies", error, damaged.name)
         if damaged.is_dir():
             shutil.rmtree(damaged)
         damaged.unlink(missing_ok=True)
@@ -44,14 +44,14 @@ def open_queue(
     for file in sorted(store.directory.glob("studies/*/study.json")):
         _find(file, jobs, store)
     jobs.resume(computed)
-    # What a writer in the lost file left behind would be taken for a part of the new one.
+    # A journal of the lost file would be applied to the new one.
     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
-    part.replace(path)  # at once: until then the queue is lost, not empty
+    part.replace(path)  # at once, so that the queue is never seen empty
     return Jobs(path, longest)
 
 
 def _adopt(jobs: Jobs, store: Store) -> None:
-    """Put studies into the queue that ``residua run`` has computed in this directory."""
+    """Add the studies to the queue that ``residua run`` has computed in this directory."""
     for file in sorted(store.directory.glob("studies/*/study.json")):
         study_id = file.parent.name
         try:
@@ -62,11 +62,11 @@ def _adopt(jobs: Jobs, store: Store) -> None:
 
 
 def _find(file: Path, jobs: Jobs, store: Store) -> None:
-    """Put a study of the directory into the queue, if this version of the solver knows it."""
+    """Add a study of the directory to the queue, if this version of the solver accepts it."""
     try:
         study = Study.known(json.loads(file.read_text(encoding="utf-8")), store.scene)
     except (OSError, ValueError) as error:  # StudyError is a ValueError
-        log.warning("studies/%s: not found again: %s", file.parent.name, error)
+        log.warning("studies/%s: not restored: %s", file.parent.name, error)
         return
     if study.id != file.parent.name:
         return

@@ -1,9 +1,9 @@
-"""What is deleted: runs, studies, and studies beyond the age or the size the operator keeps.
+"""Deletion of runs and studies: on request, and of studies beyond the operator's age or size.
 
-A check and what it allows are one transaction of the queue: no study that needs the files is
-accepted or begun between them. A study is ``dismissed`` before it loses a file, and its row goes
-last. After a crash in the middle the row says what is true: a study without a result. To delete it
-again, or to retry it, ends what was begun.
+A check and the deletion are one transaction of the queue: no study that needs the files can be
+accepted or begun in between. A study is ``dismissed`` before its first file is deleted, and its row
+is deleted last. After a crash in between, its row therefore shows a study without a result.
+Deleting it again, or a retry, completes the work.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from studies import Store, Study
 log = logging.getLogger(__name__)
 
 INTERVAL = 300.0
-"""Seconds between two looks at what has become too old or too large."""
+"""Seconds between two checks of age and size."""
 
-DELETED = "deleted in part: delete it again to end that, or retry it"
-"""Message of a study that is being deleted; true also when a crash left it so."""
+DELETED = "deleted in part: delete it again to complete that, or retry it"
+"""Message of a study that is being deleted; also correct after a crash."""
 
 
 @dataclass(frozen=True, slots=True)
 class Keeper:
-    """Deletes what nobody needs.
+    """Deletes runs and studies that are not needed.
 
     Attributes
     ----------
-    jobs, store : what there is
-    computes : whether a process may still work on the study of this id
-    days, size : age [days] and bytes beyond which studies that have ended are deleted, the oldest
-        first; None for no limit
+    jobs, store : the queue and the store
+    computes : (study id) -> whether a process may still work on it
+    days, size : age [days] and total size [bytes] beyond which studies that have ended are deleted,
+        the oldest first; None for no limit
     """
 
     jobs: Jobs
@@ -51,7 +51,7 @@ class Keeper:
     size: int | None = None
 
     def delete_run(self, run_id: str) -> None:
-        """Delete a run; a study that waits or runs and needs it is a `Conflict`."""
+        """Delete a run; raise `Conflict` if a waiting or running study needs it."""
         with self.jobs.transaction() as queue:
             users = queue.execute(
                 "SELECT id, state FROM job WHERE id IN (SELECT job FROM run WHERE run = ?)",
@@ -64,18 +64,18 @@ class Keeper:
             self.store.discard([run_id])
 
     def purge(self, study_id: str) -> int:
-        """Delete a study, its data set and its runs that no other study needs.
+        """Delete a study, its data set, and those of its runs that no other study needs.
 
         Returns
         -------
-        Bytes that are free now.
+        Number of bytes freed.
 
         Raises
         ------
         NotFound
             If the study is unknown.
         Conflict
-            If it waits or runs, or its process has not ended yet.
+            If it is waiting or running, or its process has not ended yet.
         """
         with self._ended(study_id) as queue:
             queue.execute(
@@ -99,9 +99,9 @@ class Keeper:
         return freed
 
     def sweep(self) -> None:
-        """Purge the studies of the queue that are too old, and the oldest while all is too large.
+        """Purge studies that are too old, and the oldest ones while the total size is too large.
 
-        What only the command line has computed stays.
+        Studies that only the command line has computed are kept.
         """
         if self.days is None and self.size is None:
             return
@@ -125,7 +125,7 @@ class Keeper:
 
     @asynccontextmanager
     async def working(self) -> AsyncIterator[None]:
-        """Sweep now and then, in a thread, while the context is open."""
+        """Sweep at intervals, in a thread, while the context is open."""
         stop = asyncio.Event()
 
         async def work() -> None:
@@ -133,7 +133,7 @@ class Keeper:
                 try:
                     await asyncio.to_thread(self.sweep)
                 except Exception:
-                    log.exception("what is too old or too large could not be deleted")
+                    log.exception("studies beyond the age or size could not be deleted")
                 with suppress(TimeoutError):
                     await asyncio.wait_for(stop.wait(), INTERVAL)
 
@@ -158,9 +158,10 @@ class Keeper:
             yield queue
 
     def _needed_elsewhere(self) -> set[str]:
-        """Return the runs of studies that the queue does not know: those of the command line.
+        """Return the runs of studies that are not in the queue: those of the command line.
 
-        One that cannot be read, or has another id today, cannot be computed again: it needs no run.
+        A study that cannot be read, or whose id has changed, cannot be computed again, and needs no
+        run.
         """
         with self.jobs.transaction("BEGIN") as queue:
             known = {row["id"] for row in queue.execute("SELECT id FROM job")}
@@ -176,7 +177,7 @@ class Keeper:
 
 
 def size(path: Path) -> int:
-    """Return the bytes of a file, or of all files below a directory; 0 when there is none."""
+    """Return the bytes of a file, or of all files below a directory; 0 if there is none."""
     total = 0
     for each in (path, *path.rglob("*")):
         with suppress(FileNotFoundError):

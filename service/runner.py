@@ -1,4 +1,4 @@
-"""Takes studies from the queue and has each computed by a child process, several at once."""
+"""Takes studies from the queue and computes each in a child process, several at once."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ from studies.errors import StoreFull
 log = logging.getLogger(__name__)
 
 SILENCE_SECONDS = 20.0
-"""Time after which a process that reports nothing is logged."""
+"""Time without a report after which a process is logged [s]."""
 
 SMALL = 100
-"""Most runs of a study for which a place is kept."""
+"""Largest number of runs of a study for which the last place is reserved."""
 
 SILENT = "its process says nothing: it is frozen, or the machine is overloaded"
 
 
 @dataclass(slots=True)
 class Attempt:
-    """What one start of a study brought.
+    """The result of one start of a study.
 
     Attributes
     ----------
-    progress : percentage of the study that is done
-    heard : when its process last said anything [s]
-    waiting : what the study waits for; empty when it goes on
-    runs : number of runs that got an outcome
-    counts : runs by status when the study ended; None when it did not
+    progress : completed percentage of the study
+    heard : time of the last message of its process [s]
+    waiting : reason for which the study waits; empty if it does not
+    runs : number of runs that were finished
+    counts : number of runs by status at the end of the study; None if it did not end
     reason : why it did not end
-    patient : whether waiting helps: no scheduler answers, another process uses the directory
-    hopeless : whether every further start would end in the same way
+    patient : whether waiting helps: no scheduler answers, or another process uses the directory
+    hopeless : whether every further start would fail in the same way
     """
 
     progress: float
@@ -62,14 +62,14 @@ class Attempt:
 
 @dataclass(slots=True)
 class Runner:
-    """The one consumer of the queue.
+    """The only consumer of the queue.
 
     Attributes
     ----------
-    settings, jobs : how to compute, and what
+    settings, jobs : settings of the service, and its queue
     pool : the workers, and the lock of the store
-    starter : of the processes that compute
-    restore : makes a queue anew that is gone or damaged; it takes the studies that are computed
+    starter : starts the child processes
+    restore : (ids of the studies being computed) -> makes a missing or damaged queue again
     """
 
     settings: Settings
@@ -83,11 +83,11 @@ class Runner:
 
     @property
     def alive(self) -> bool:
-        """Whether studies are being taken from the queue."""
+        """Whether the runner is working."""
         return self._task is not None and not self._task.done() and not self._stopping.is_set()
 
     def computes(self, job_id: str) -> bool:
-        """Tell whether a process may still work on a study, although it was stopped."""
+        """Whether a process may still work on a study, even if the study was stopped."""
         return job_id in self._studies
 
     @contextlib.asynccontextmanager
@@ -112,7 +112,7 @@ class Runner:
                     await asyncio.gather(self.pool.close(), self.starter.close())
                 trouble = ""
             except (QueueLost, StoreFull, OSError) as error:
-                if trouble != (trouble := str(error)):  # once, however long it lasts
+                if trouble != (trouble := str(error)):  # log it only once
                     log.error("no study can be begun: %s", trouble)
                 if isinstance(error, QueueLost):
                     await self._restore()
@@ -125,9 +125,10 @@ class Runner:
         await asyncio.gather(self.pool.close(), self.starter.close())
 
     async def _next(self) -> bool:
-        """Begin the study whose turn it is; tell whether there was one, and room for it.
+        """Begin the next study; return whether there was one, and a free place for it.
 
-        The last place is kept for a small one. This costs no time, since all share the workers.
+        The last place is reserved for a small study. This costs no time, since all studies share
+        the workers.
         """
         places = self.settings.studies_at_once
         free = places - len(self._studies)
@@ -143,11 +144,11 @@ class Runner:
     async def _restore(self) -> None:
         try:
             await asyncio.to_thread(self.restore, list(self._studies))
-        except Exception as error:  # of the disk, or of what lies there
-            log.error("the queue cannot be made anew: %s", error)
+        except Exception as error:  # of the disk, or of the files on it
+            log.error("the queue cannot be made again: %s", error)
 
     async def _carry_out(self, job: Job) -> None:
-        """Compute a study; one whose end cannot be written is taken again a little later."""
+        """Compute a study; if its end cannot be written, it is tried again a little later."""
         try:
             await self._compute(job)
         except (QueueLost, StoreFull, OSError) as error:
@@ -160,7 +161,7 @@ class Runner:
             del self._studies[job.id]
 
     async def _compute(self, job: Job) -> None:
-        """Start a study until it ends; give up after too many starts in a row without a new run."""
+        """Start a study until it ends; give up after too many starts in a row without new runs."""
         barren, progress, patient_since = 0, job.progress, time.monotonic()
         if await self._unwanted(job):  # such as deleted, just before `computes` knew it
             return
@@ -186,7 +187,7 @@ class Runner:
             await self._pause(self.settings.poll_seconds * (10 if attempt.patient else 2**barren))
 
     async def _attempt(self, job: Job, progress: float) -> Attempt:
-        """Start one child and follow its events; stop it when study or service shall stop."""
+        """Start one child and follow its events; stop it if the study or the service stops."""
         try:
             child = await self._start(job)
         except PoolAway as error:
@@ -195,7 +196,7 @@ class Runner:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
         except Conflict as error:  # its row is damaged
             return Attempt(progress, reason=str(error), hopeless=True)
-        attempt, told = Attempt(progress), (progress, "")
+        attempt, reported = Attempt(progress), (progress, "")
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
@@ -208,17 +209,17 @@ class Runner:
                 if attempt.runs:  # while the workers compute, there is time
                     await self.starter.prepare()
                 now = attempt.progress, self._plain(waiting)
-                if told != now and await self._write(self.jobs.note, job.id, *now):
-                    told = now
+                if reported != now and await self._write(self.jobs.note, job.id, *now):
+                    reported = now
         finally:
             await processes.end(child, self.settings.grace_seconds)
             await asyncio.wait({events})
         if unread := events.exception():
             about = {"study": job.id}
-            log.error("its process sent what cannot be read", exc_info=unread, extra=about)
+            log.error("its process sent an unreadable message", exc_info=unread, extra=about)
             return Attempt(
                 attempt.progress,
-                reason=f"its process sent what cannot be read: {type(unread).__name__}: {unread}",
+                reason=f"its process sent an unreadable message: {type(unread).__name__}: {unread}",
             )
         return attempt
 
@@ -244,13 +245,13 @@ class Runner:
             return True
         try:
             return (await asyncio.to_thread(self.jobs.get, job.id)).state is not StudyState.RUNNING
-        except (QueueLost, StoreFull, OSError):  # the work goes on, and is found again later
+        except (QueueLost, StoreFull, OSError):  # the work continues, and is found again later
             return False
         except NotFound:
             return True
 
     async def _write(self, write: Callable[..., None], *what: Any) -> bool:
-        """Write how a study goes; tell whether it could be: the work goes on without."""
+        """Write the state of a study; return whether that succeeded. The work continues anyway."""
         try:
             await asyncio.to_thread(write, *what)
         except (QueueLost, StoreFull, OSError) as error:

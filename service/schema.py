@@ -1,4 +1,4 @@
-"""Tables of the queue, and how a queue of an earlier form is brought into today's."""
+"""Tables of the queue, and the conversion of a queue of an earlier form."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ FIRST_FORM = (
 
 
 def prepare(connection: sqlite3.Connection, new: bool) -> None:
-    """Make the tables of a new file; bring those of another into today's form.
+    """Create the tables of a new file; convert those of an older file to the current form.
 
     Raises
     ------
     sqlite3.DatabaseError
-        If the file is damaged, empty, or none of ours.
+        If the file is damaged, empty, or not a queue.
     StudyError
         If a later version of the service has made it.
     """

@@ -1,4 +1,4 @@
-"""What a query of runs asks for, checked against the scenes."""
+"""Check of a query of runs against the parameters of the scenes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""
 
 KEPT = 100
-"""Scenes of callers whose parameters a request may name, the newest."""
+"""Number of posted scenes, the newest, whose parameters a query may use."""
 
 PLAIN = ("scene", "status", *Window.model_fields)
-"""What a request may name beside the parameters of the scenes."""
+"""Names in a query that are not parameters of scenes."""
 
 
 def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     Parameters
     ----------
     which : the query
-    directory : of the store, which may keep scenes of callers
+    directory : directory of the store, which may have posted scenes
 
     Raises
     ------
@@ -52,12 +52,12 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     for scene in scenes:
         for name, parameter in parameters_of(scene).items():
             known.setdefault(name, []).append(parameter)
-    asked = which.model_dump(exclude_none=True)
-    for name in asked.keys() - {*PLAIN}:
+    requested = which.model_dump(exclude_none=True)
+    for name in requested.keys() - {*PLAIN}:
         if name not in known:
-            raise StudyError(name, asked[name], one_of(name, (*PLAIN, *known)))
-        asked[name] = _value(name, asked[name], known[name])
-    return asked
+            raise StudyError(name, requested[name], one_of(name, (*PLAIN, *known)))
+        requested[name] = _value(name, requested[name], known[name])
+    return requested
 
 
 def _value(name: str, given: Any, parameters: Sequence[Parameter]) -> Any:

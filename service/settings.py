@@ -1,4 +1,4 @@
-"""What an operator may set, by argument or by an environment variable ``RESIDUA_…``."""
+"""Settings of the service, by argument or by an environment variable ``RESIDUA_…``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from studies.execution.limits import Limits
 
 
 def _words(given: Any) -> Any:
-    """Return the parts of a text in which commas stand between them."""
+    """Return the parts of a text that are separated by commas."""
     return [word.strip() for word in given.split(",")] if isinstance(given, str) else given
 
 
@@ -125,7 +125,7 @@ class Settings(BaseSettings):
 
     @property
     def limits(self) -> Limits:
-        """What the work on a study may take."""
+        """Limits on the execution of a study."""
         return Limits(
             stall_seconds=self.stall_seconds,
             path_seconds=self.path_seconds,
@@ -135,7 +135,7 @@ class Settings(BaseSettings):
 
     @property
     def bounds(self) -> Bounds:
-        """What a study may ask for."""
+        """Bounds on the cost of a study."""
         return Bounds(
             runs=self.max_runs,
             unknowns=self.max_unknowns,
@@ -146,7 +146,7 @@ class Settings(BaseSettings):
 
     @property
     def outside_access(self) -> dict[str, Any] | None:
-        """How the outside scheduler is reached; None when the workers are our own."""
+        """Access to the scheduler; None if the service starts its own workers."""
         if self.scheduler is None:
             return None
         files = {"ca": self.scheduler_ca, "cert": self.scheduler_cert, "key": self.scheduler_key}
@@ -154,10 +154,10 @@ class Settings(BaseSettings):
         return Access(self.scheduler, **given).to_dict()
 
     @property
-    def keys_asked(self) -> bool:
-        """Whether callers need a key: by where we listen, never by where they seem to come from.
+    def keys_required(self) -> bool:
+        """Whether callers need a key. It depends on the address of the service, not the caller's.
 
-        Behind a proxy on this machine every caller comes from 127.0.0.1.
+        Behind a proxy on this machine every caller has the address 127.0.0.1.
         """
         host = self.published or self.host
         address = address_of(host)
@@ -166,9 +166,9 @@ class Settings(BaseSettings):
 
 
 def chosen(**given: Any) -> Settings:
-    """Return the settings: what is given and not None, the rest from the environment.
+    """Return the settings: arguments that are not None, the rest from the environment.
 
-    A `StudyError` names the variable that is wrong.
+    A `StudyError` names the wrong variable.
     """
     try:
         settings = Settings(**{name: each for name, each in given.items() if each is not None})
@@ -179,12 +179,12 @@ def chosen(**given: Any) -> Settings:
         name = f"RESIDUA_{first['loc'][0]}".upper()
         raise StudyError(name, first["input"], first["msg"]) from None
     for part in ("limits", "outside_access", "bounds"):
-        getattr(settings, part)  # what it refuses is refused now, not when a study needs it
+        getattr(settings, part)  # raises errors now, not when a study needs it
     return settings
 
 
 def address_of(host: str) -> IPv4Address | IPv6Address | None:
-    """Return the address that a host is given by; nothing for a name."""
+    """Return the address of a host that is given by a number; None for a name."""
     try:
         return ip_address(host)
     except ValueError:

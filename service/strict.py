@@ -1,4 +1,4 @@
-"""Requests whose JSON names nothing twice: Python's reader would keep the last and say nothing."""
+"""Refuse JSON objects with a name that occurs twice; Python's reader silently keeps the last."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class SolverError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base class of the errors that this package raises."""
 
 
 class ModelError(SolverError, ValueError):
@@ -44,16 +44,16 @@ class NotConverged(SolverError):
 
 
 class WindowTooSmall(NotConverged):
-    """A steady pass yields, or touches, as far as its mesh was made for; a larger one may do."""
+    """Plastic zone or contact of a steady pass reaches the edge of its mesh: use a larger one."""
 
 
 class NoContact(NotConverged):
-    """No contact forces meet the conditions of a contact; on another shape there may be some."""
+    """The contact problem has no solution for this shape of the surfaces; for another it may."""
 
 
 class LimitLoad(NotConverged):
-    """The load cannot grow beyond ``reached``: a body flows plastically, or slides off."""
+    """No equilibrium exists above the load ``reached``: a body flows plastically, or slides off."""
 
 
 class Spins(LimitLoad):
-    """A wheel is turned by more than its contact bears where all of it slips."""
+    """The driving moment of a wheel exceeds the friction of its whole contact, which slips."""

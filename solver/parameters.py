@@ -22,9 +22,10 @@ def described(default: Any, description: str) -> Any:
 
 
 def by_accuracy(description: str) -> Any:
-    """Return the field of a number that ``accuracy`` sets where none is given.
+    """Return the field of a number that ``accuracy`` sets if the user gives none.
 
-    Its default is None; `ElasticParameters.usual` says the number, and no object is built without.
+    Its default is None; when the object is built, the number of `ElasticParameters.usual` takes
+    its place.
     """
     return described(None, f"{description}; left out, `accuracy` sets it")
 
@@ -83,14 +84,14 @@ def _rules(kind: Any) -> tuple[_Rule, ...]:
 
 @lru_cache(maxsize=128)
 def _left_out(kind: Any) -> frozenset[str]:
-    """Return the fields that need not be given and have no default of their own."""
+    """Return the fields whose default is None: they may be left out."""
     return frozenset(item.name for item in fields(kind) if item.default is None)
 
 
 def _taken_apart(hint: Any) -> tuple[Any, tuple[str, ...], tuple[Any, ...]]:
     """Return the type, the permitted words and the limits of ``hint``: a number, words, or both."""
     of, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if of is tuple:  # what it holds is for its owner to check
+    if of is tuple:  # the class with the field checks the entries
         return tuple, (), ()
     if of is Literal:
         return str, arguments, ()

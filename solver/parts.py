@@ -1,9 +1,9 @@
 """Parts that studies and scene files name by a word: hardening rules, friction laws, loads.
 
-A part is a frozen dataclass whose fields are its parameters; it says its word where it is defined.
-What studies and scene files accept, and what the documentation lists, is made of these
-declarations. Files of one's own, named in the environment variable ``RESIDUA_PARTS``, add parts
-like those of the package.
+A part is a frozen dataclass whose fields are its parameters; a decorator on the class gives its
+word. Studies, scene files and the documentation take their lists of words and parameters from
+these declarations. A user's own files, named in the environment variable ``RESIDUA_PARTS``, add
+parts in the same way.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ T = TypeVar("T")
 C = TypeVar("C", bound=type[Any])
 
 SETTING = "RESIDUA_PARTS"
-"""Environment variable that names Python files with parts of one's own, joined as in ``PATH``."""
+"""Environment variable that names Python files with a user's own parts, joined as in ``PATH``."""
 
 
 class Parts(Generic[T]):
@@ -33,8 +33,8 @@ class Parts(Generic[T]):
     Parameters
     ----------
     kind : the parameter that names one of them, such as ``hardening``
-    alike : whether a parameter that several parts have must be declared alike; false where each
-        part has a table of its own
+    alike : whether parts that share a parameter must declare it in the same way; False if each
+        part has its own table in a scene file
     """
 
     def __init__(self, kind: str, *, alike: bool = True) -> None:
@@ -57,7 +57,7 @@ class Parts(Generic[T]):
                 raise ModelError(self.kind, word, f"is the word of {before.__qualname__} already")
             self._known[word] = part
             if self._alike:
-                self.parameters()  # refuses those that do not go together
+                self.parameters()  # raises if two parts declare one parameter differently
             return part
 
         return named
@@ -74,7 +74,7 @@ class Parts(Generic[T]):
         return known[word]
 
     def all(self) -> Mapping[str, type[T]]:
-        """Return word -> class, those of files of one's own too."""
+        """Return word -> class, including those of the user's own files."""
         load_own_parts()
         return self._known
 
@@ -95,24 +95,24 @@ class Parts(Generic[T]):
                     field.default,
                     field.metadata,
                 ):
-                    allowed = f"declares its parameter {name} as no other part does"
+                    allowed = f"declares its parameter {name} differently from another part"
                     raise ModelError(self.kind, word, allowed)
         return found
 
     def fields(self, cls: C) -> C:
-        """Add the word, which the class declares as text, and all parameters to a class's fields.
+        """Decorate a class: annotate its word with all words, and add all parameters as fields.
 
-        It stands below ``dataclass``, which makes fields of them.
+        Write it below ``@dataclass``, which turns the annotations into fields.
 
         Raises
         ------
         ModelError
             when a class that it inherits from has a field of one of these names
         ImportError
-            while a file of one's own runs: its parts are not known yet
+            while a user's own file is being run: its parts are not known yet
         """
         if _RUNNING:
-            raise ImportError("it imports scenes, which are made of its parts")
+            raise ImportError("it imports scenes, whose parameters include those of its parts")
         cls.__annotations__[self.kind] = Literal[tuple(self)]
         for name, (hint, field) in self.parameters().items():
             if name in getattr(cls, "__dataclass_fields__", {}):
@@ -151,14 +151,14 @@ def _declared(part: Any) -> Declared:
 
 
 def own_files() -> tuple[Path, ...]:
-    """Return the files of one's own that ``RESIDUA_PARTS`` names."""
+    """Return the user's own files that ``RESIDUA_PARTS`` names."""
     given = os.environ.get(SETTING, "")
     return tuple(Path(each).resolve() for each in given.split(os.pathsep) if each)
 
 
 @cache
 def load_own_parts() -> None:
-    """Run the files of one's own, once in a process.
+    """Run the user's own files, once in a process.
 
     Raises
     ------
@@ -185,14 +185,14 @@ def load_own_parts() -> None:
 
 
 _RUNNING: list[str] = []
-"""Files of one's own that run now."""
+"""The user's own files that are running now."""
 
 
 def run_again(one: Any, other: Any) -> bool:
-    """Whether a class or function is another one, whose file ran twice: as script and as parts."""
+    """Whether two objects come from one definition whose file ran as script and as parts."""
     return (one.__qualname__, _file(one)) == (other.__qualname__, _file(other))
 
 
 def _file(part: Any) -> str:
-    """Return the file of a class; a script that is run has one name, the file it loads another."""
+    """Return the file of a class or function; the module's name differs when it runs as script."""
     return str(getattr(sys.modules.get(part.__module__), "__file__", part.__module__))

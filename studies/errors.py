@@ -1,4 +1,4 @@
-"""Errors of studies, a class for each kind; words for what is allowed."""
+"""Errors of studies, a class for each kind, and texts that say what is allowed."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SceneError(StudyError):
 
 
 class Unusable(StudyError):
-    """What the operator provides cannot be used now, such as a directory; no study is at fault."""
+    """A resource of the operator, such as a directory, cannot be used."""
 
 
 class StoreBusy(RuntimeError):
@@ -58,7 +58,7 @@ class StoreBusy(RuntimeError):
 
 
 class StoreFull(RuntimeError):
-    """No room is left for results: running again computes the rest, once there is some.
+    """The disk is full: with free space, running again computes the rest.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class RunUnreadable(RuntimeError):
 
 
 class FileDiffers(RuntimeError):
-    """The file of a run would say something else than what was computed and audited.
+    """The file of a run would differ from the computed and audited results.
 
     Parameters
     ----------
@@ -107,12 +107,12 @@ class FileDiffers(RuntimeError):
 
     def __str__(self) -> str:
         first, more = "; ".join(self.differences[:3]), len(self.differences) - 3
-        told = first + (f"; and {more} more differences" if more > 0 else "")
-        return f"the file would not say what was computed, and is not kept: {told}"
+        listed = first + (f"; and {more} more differences" if more > 0 else "")
+        return f"the file would differ from the computed results, and is not kept: {listed}"
 
 
 class CatalogueDamaged(RuntimeError):
-    """The catalogue cannot be used; whoever computes next makes it anew from the runs."""
+    """The catalogue cannot be used; the next computation makes it again from the runs."""
 
 
 class GridLost(ConnectionError):
@@ -157,10 +157,10 @@ _WORDS = {
     "too_long": "must have at most {max_length}",
     "string_pattern_mismatch": "must match {pattern}",
 }
-"""What is allowed where pydantic finds an error of a type."""
+"""Type of a pydantic error -> what is allowed."""
 
 
 def worded(error: Mapping[str, Any]) -> str:
-    """Return what is allowed in place of what an error of pydantic is about."""
+    """Return what is allowed for the input of a pydantic error."""
     words = _WORDS.get(error["type"])
     return words.format(**error.get("ctx", {})) if words else str(error["msg"])

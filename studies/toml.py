@@ -1,4 +1,4 @@
-"""TOML files read: studies and scenes."""
+"""Read TOML files of studies and scenes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
     Raises
     ------
     StudyError
-        for ``field`` with the value ``name``, where it is none
+        for ``field`` with the value ``name``, if the text is not TOML
     """
     try:
         tables = tomllib.loads(data.decode("utf-8-sig"))

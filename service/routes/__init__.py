@@ -1,4 +1,4 @@
-"""The resources, a module each."""
+"""The resources, one module for each."""
 
 from service.routes import estimate, health, manual, metrics, runs, scenes, studies
 

@@ -1,4 +1,4 @@
-"""What a study costs, before it is submitted."""
+"""The estimated cost of a study, before it is submitted."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ async def health(
 
     Without a key, where keys are required, the answer is the status alone.
     """
-    writable, waiting = await probe.look(settings.data, jobs)
+    writable, waiting = await probe.check(settings.data, jobs)
     ready = writable and waiting is not None and runner.alive
     if not ready:
         response.status_code = HTTPStatus.SERVICE_UNAVAILABLE

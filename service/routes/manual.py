@@ -1,4 +1,4 @@
-"""The description of the service as a page that needs nothing from elsewhere."""
+"""The description of the service as a page that works without the internet."""
 
 from __future__ import annotations
 
@@ -34,5 +34,5 @@ def page() -> HTMLResponse:
 
 @router.get("/start.js")
 def start() -> Response:
-    """Return what starts it."""
+    """Return the script that starts it."""
     return Response(SCRIPT, media_type="text/javascript")

@@ -1,4 +1,4 @@
-"""Figures for those who watch the service."""
+"""Metrics for monitoring."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ router = APIRouter(tags=["metrics"])
 
 @router.get("/metrics", response_class=PlainTextResponse)
 def metrics(figures: TheMetrics) -> Response:
-    """Return figures in the text format of Prometheus."""
+    """Return metrics in the text format of Prometheus."""
     return Response(generate_latest(figures.registry), media_type=CONTENT_TYPE_LATEST)

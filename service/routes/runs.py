@@ -1,4 +1,4 @@
-"""Runs: search, look at, fetch, see."""
+"""Runs: search, show, fetch, draw."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 
 
 class Stem(StringConvertor):
-    """A name without a suffix: what a run offers is not what its file offers."""
+    """A name without a suffix, so that ``/runs/{id}`` does not match ``/runs/{id}.nc``."""
 
     regex = "[^/.]+"
 

@@ -1,4 +1,4 @@
-"""What can be computed, and what it takes; scenes of the callers' own."""
+"""Scenes: list, parameters, and posting of the caller's own scene files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from studies.storage.shelf import newest
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
 LISTED = 100
-"""Scenes of callers that are listed, the newest first."""
+"""Number of posted scenes that are listed, the newest first."""
 
 
 @router.get("")
@@ -71,8 +71,8 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
     """
     kept = _kept(store, name) if is_id(name) else None
     if kept:
-        told = {"id": kept.id, "name": kept.name, "summary": kept.summary}
-        return scene_schema(kept) | told
+        entry = {"id": kept.id, "name": kept.name, "summary": kept.summary}
+        return scene_schema(kept) | entry
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
     return scene_schema(scene_named(name))

@@ -33,14 +33,14 @@ class Candidates:
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
-    lines : tangential over normal force, whose least is the bound [N]
-    motion : (n or 2n,) gap, and slip when there is friction [mm]
-    apart : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
-    forces : the contact forces of the current iterate in the same order [N]
-    status : (n,) of the current iterate
-    untimed : (n,) whether it touched since then, at a time that is not known
+    lines : the friction bound, the least of these lines: tangential over normal force [N]
+    motion : (n or 2n,) gap, and with friction also slip [mm]
+    uncounted : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
+    forces : (n or 2n,) normal, and with friction tangential forces of the current iterate [N]
+    status : (n,) of the current iterate, as in `solver.contact.problem`
+    untimed : (n,) whether the vertex touched since the last state, at a time that is not known
     rows : one per part, None for a part without contact surface
-    covered : for each interface, the share of the hats of its candidates that faces the master
+    covered : for each interface, the share of each candidate's hat function that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
@@ -49,7 +49,7 @@ class Candidates:
     vertices: tuple[NDArray[np.int64], ...]
     lines: BoundLines
     motion: NDArray[np.float64]
-    apart: NDArray[np.float64]
+    uncounted: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
     untimed: NDArray[np.bool_]
@@ -66,7 +66,7 @@ class Candidates:
 
     @property
     def places(self) -> list[slice]:
-        """For each interface, where its candidates are among all."""
+        """For each interface, the slice of its candidates in the arrays of all."""
         return _places(self.vertices)
 
     def smooth(self) -> Candidates:
@@ -89,7 +89,7 @@ class Candidates:
         return np.asarray(rows.block @ u[rows.dofs])
 
     def touched(self, part: int) -> NDArray[np.int64]:
-        """Return the unknowns of a part that contact forces act on."""
+        """Return the indices of the unknowns of a part on which contact forces act."""
         rows = self.rows[part]
         if rows is None:
             return np.zeros(0, dtype=np.int64)
@@ -123,8 +123,8 @@ class Candidates:
     def work(self, before: tuple[ContactState, ...]) -> tuple[float, float]:
         """Return the work of friction and of the bodies against contact in an increment [N mm].
 
-        Forces are the mean of those before and after. Contact then takes work only at vertices
-        that open or close within the increment, where the mean is not the true history.
+        Both use the mean of the forces before and after. Work against contact is then zero except
+        at vertices that open or close within the increment, where the mean is not the true history.
         """
         normal, friction = 0.0, 0.0
         each = zip(before, self.vertices, self.gaps, self.places, strict=True)
@@ -137,7 +137,7 @@ class Candidates:
             normal -= float(force[moved] @ opened[moved]) / 2
             if len(self.motion) > self.n:
                 shear = state.tangential[vertices] + self.forces[self.n :][here]
-                friction -= float(shear @ (self.motion[self.n :] + self.apart)[here]) / 2
+                friction -= float(shear @ (self.motion[self.n :] + self.uncounted)[here]) / 2
         return friction, normal
 
     def states(
@@ -176,13 +176,13 @@ class Candidates:
 
 
 def _places(vertices: Sequence[NDArray[np.int64]]) -> list[slice]:
-    """Return where the candidates of each interface are among all."""
+    """Return for each interface the slice of its candidates in the arrays of all."""
     ends = accumulate(map(len, vertices), initial=0)
     return [slice(first, last) for first, last in pairwise(ends)]
 
 
 def no_candidates(system: System) -> Candidates:
-    """Return no candidates: the bodies are taken apart."""
+    """Return an empty set of candidates: the bodies are separated."""
     empty = np.zeros(0)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = tuple(None for _ in system.parts)
@@ -219,7 +219,7 @@ def find_candidates(
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
     m = 2 * n if frictional else n
-    motion, apart, beyond = np.zeros(m), np.zeros(n), np.inf
+    motion, uncounted, beyond = np.zeros(m), np.zeros(n), np.inf
     lines: list[BoundLines] = []
     untimed = np.zeros(n, dtype=bool)
     pieces: list[list[ContactRows]] = [[] for _ in system.parts]
@@ -230,9 +230,9 @@ def find_candidates(
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        apart[normal] = np.where(before.touching, 0.0, _apart(before, span))[at]
-        untimed[normal] = np.isnan(apart[normal])
-        apart[normal] = np.nan_to_num(apart[normal])
+        uncounted[normal] = np.where(before.touching, 0.0, _slip_before_contact(before, span))[at]
+        untimed[normal] = np.isnan(uncounted[normal])
+        uncounted[normal] = np.nan_to_num(uncounted[normal])
         shear = system.bound(pair, pairing, start, time).at(at)
         lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -244,7 +244,7 @@ def find_candidates(
         slip = np.zeros(len(pairing.gap))
         if frictional:
             slip = interface.slip(pairing, u, start.u)
-            motion[tangent] = slip[at] - apart[normal]
+            motion[tangent] = slip[at] - uncounted[normal]
         slips.append(slip)
 
     def gather(name: str) -> NDArray[np.float64]:
@@ -256,7 +256,7 @@ def find_candidates(
         vertices=tuple(vertices),
         lines=BoundLines.joined(lines),
         motion=motion,
-        apart=apart,
+        uncounted=uncounted,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
         untimed=untimed,
@@ -268,11 +268,11 @@ def find_candidates(
     )
 
 
-def _apart(before: ContactState, span: float) -> NDArray[np.float64]:
+def _slip_before_contact(before: ContactState, span: float) -> NDArray[np.float64]:
     """Return the slip (n,) before contact, if gap and slip continue at their last rates [mm].
 
-    A vertex that would not close within ``span`` touches at its end. NaN where the gap does not
-    close, or its rates are not known.
+    A vertex that would close later than ``span`` is taken to touch at its end. NaN where the gap
+    does not close, or its rates are not known.
     """
     closing, sliding = before.rates * span
     share = np.divide(before.gap, -closing, out=np.full_like(closing, np.nan), where=closing < 0)
@@ -282,7 +282,7 @@ def _apart(before: ContactState, span: float) -> NDArray[np.float64]:
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:
     """Return the vertices near contact.
 
-    A floating body comes down from any distance: its nearest vertex always counts.
+    The nearest vertex of a body held by contact alone always counts, at any distance.
     """
     margin = _MARGIN * pairing.length
     if floating:

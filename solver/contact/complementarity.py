@@ -1,10 +1,10 @@
 """The frictional contact problem on the contact points, solved exactly.
 
-`solver.contact.problem` states it. Active sets by semismooth Newton solve nearly every instance in
-a few dense solves. Where the sets cycle, the friction bound is lagged: each pass is a convex
-problem, solved by Lemke's method, and gives the active sets a better start. (Lemke's method on the
-whole frictional problem in A. Klarbring's form, Ingenieur-Archiv 56 (1986) 529-541, ends in a ray
-for most instances: its matrix is not copositive.)
+`solver.contact.problem` states it. A semismooth Newton method on the active sets solves nearly
+every instance in a few dense solves. If the sets cycle, the friction bound is held at its value of
+the previous pass: each pass is then a convex problem, solved by Lemke's method, and gives a better
+start for the active sets. (Lemke's method on the whole frictional problem in A. Klarbring's form,
+Ingenieur-Archiv 56 (1986) 529-541, ends in a ray for most instances: its matrix is not copositive.)
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ _TOLERANCE = LEAST_FRICTION
 _ROUNDING = 1e-14
 _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
-"""Relative residual of a least-squares solution that may be rounding. Where there is no solution it
-is larger: the part of the load that contact cannot balance, even under the least friction."""
+"""Relative residual of a least-squares solution up to which it counts as rounding. Without a
+solution it is larger: the part of the load that contact cannot balance, even with tiny friction."""
 _KNOWN = 1e-8
 
 
 def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
     """Return the solution, or None when there is none or none was found.
 
-    ``start`` (n,) is the status to begin with, usually that of the iteration before.
+    ``start`` (n,) is the initial status of the points, usually that of the previous iteration.
     """
     if problem.n == 0:
         empty = np.zeros(0)
@@ -49,7 +49,7 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
 
 
 def _at_rest(problem: ContactProblem) -> bool:
-    """Whether no point touches and no force acts: then a body that floats stays where it is."""
+    """Whether no point touches and no force acts: a body held by contact alone then stays put."""
     gaps = problem.offset[: problem.n]
     force, length = replace(problem, balance=np.zeros(0)).scales
     apart = bool((gaps > _TOLERANCE * length).all())
@@ -59,9 +59,9 @@ def _at_rest(problem: ContactProblem) -> bool:
 def change_of(
     problem: ContactProblem, solution: ContactSolution, offset: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the change of a solution's forces (m,) and motions with the offset, statuses kept.
+    """Return the change of forces (m,) and rigid motions (k,) with the offset, at fixed status.
 
-    Tangential forces at their limit stay there.
+    Tangential forces at their bound stay there.
     """
     lines = problem.lines
     piece = lines.piece(solution.forces[: problem.n])
@@ -85,8 +85,8 @@ def _forces(
         stick = stick[rough[stick]]
     if not len(closed) and not k:
         return np.zeros(len(problem.offset)), np.zeros(0)
-    # columns of F: each normal force carries the friction force of a slipping point, but for what
-    # does not depend on it and is known
+    # columns of F: a normal force, together with the share of friction proportional to it where
+    # the point slips; the constant share of friction is known
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
     known = np.zeros(len(problem.offset))
     P[closed, np.arange(len(closed))] = 1.0
@@ -105,14 +105,14 @@ def _forces(
     S[size:, :size] = problem.A.T @ P
     rhs = -np.concatenate([problem.offset[rows], problem.balance])
     rhs -= np.concatenate([problem.W[rows] @ known, problem.A.T @ known])
-    # forces and motions differ in size by the compliance: scale the rows
+    # forces and motions differ in magnitude by the compliance: scale the rows
     weight = np.ones(size + k)
     if k and size:
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
     rhs *= weight
-    # fewer conditions than motions: the body can turn about the one point it stands on. Factors of
-    # the singular matrix would turn it by rounding; the least-squares solution does not turn it
+    # fewer conditions than rigid motions: the body can rotate about its only contact point. A
+    # factorisation of the singular matrix would rotate it by rounding; least squares does not
     free = 0 < size < k
     if not free:
         _, _, solution, info = linalg.lapack.dgesv(S, rhs)
@@ -140,7 +140,7 @@ def _solves(
 def _active_sets(
     problem: ContactProblem, start: NDArray[np.int64], piece: NDArray[np.int64]
 ) -> ContactSolution | None:
-    """Return the solution that is reached from a status, or None where the sets cycle.
+    """Return the solution that is reached from a status, or None if the active sets cycle.
 
     ``piece`` (n,) belongs to the status: the line of the bound that a sliding point is on.
     """
@@ -148,7 +148,7 @@ def _active_sets(
     rough, steepest = lines.rough, lines.slope.max(axis=0)
     force, length = problem.scales
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
-    # under little friction: a small part of the force it carries, but not less than rounding
+    # with little friction: a small part of the tangential force, but not less than rounding
     tiny_shear = force * np.clip(_ACCURATE * steepest, _ROUNDING, _TOLERANCE)
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
@@ -188,10 +188,10 @@ def _active_sets(
 
 
 def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
-    """Solve in passes, each a convex problem with the friction bound of the pass before.
+    """Solve in passes, each a convex problem with the friction bound of the previous pass.
 
-    After every pass the active sets start again from its status, so that the solution is exact
-    and the passes themselves need not converge.
+    After every pass the active-set method restarts from its status. The solution is therefore
+    exact, and the passes themselves need not converge.
     """
     n, lines, rough = problem.n, problem.lines, problem.lines.rough
     force, _ = problem.scales
@@ -223,8 +223,8 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
 def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
     """Whether forces and motions meet all conditions.
 
-    Passes can find a solution that no set of statuses gives: where no force turns a body, every
-    rotation that keeps its open points open is a solution.
+    Passes can find a solution that belongs to no set of statuses: if no force rotates a body,
+    every rotation that keeps its open points open is a solution.
     """
     n, (force, length) = problem.n, problem.scales
     motion = problem.offset + problem.W @ F + problem.A @ q

@@ -1,4 +1,4 @@
-"""What small sliding leaves out as bodies move: when ``auto`` pairs straight surfaces anew."""
+"""When ``sliding = "auto"`` goes from small to finite sliding, because the bodies have moved."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _STILL, _FAR = 0.01, 0.5
-"""Motion along the partner / side of an element: below the first nothing is left out, above the
-second surfaces are paired anew, before the audit finds fault with small sliding."""
+"""Ratios of the slip to the length of an element edge. Below the first, small sliding is exact
+enough; above the second, the pair becomes finite, before the audit rejects small sliding."""
 _GAP = 1e-3
-"""Ratio of the error of the gap to the side of an element, above which they are."""
+"""Ratio of the gap error to the length of an element edge; above it the pair becomes finite."""
 
 
 def followed(system: System, before: State, after: State) -> State | None:
-    """Return the state before an increment with those pairs finite that drift in it.
+    """Return the state before an increment with finite sliding for the pairs that need it.
 
-    None where small sliding does for all pairs.
+    None if small sliding is accurate enough for all pairs.
     """
     each = zip(system.interfaces, after.contacts, strict=True)
     drifting = [_drifts(interface, after, contact) for interface, contact in each]
@@ -35,7 +35,7 @@ def followed(system: System, before: State, after: State) -> State | None:
 
 
 def _drifts(interface: Interface, state: State, contact: ContactState) -> bool:
-    """Whether a pair that may choose leaves out too much; means weighted with the force."""
+    """Whether an ``auto`` pair needs finite sliding; means are weighted with the normal force."""
     pressed = contact.normal > 0
     small = interface.reference
     if small is None or contact.finite or interface.declared.sliding != "auto":

@@ -1,8 +1,8 @@
 """Contact must stay on the surfaces of its pair.
 
-The boundary of a body may continue beyond the end of a contact surface. Contact there is not part
-of the problem, so a state in which contact has reached such an end is wrong, even in equilibrium.
-Where the surface ends at a corner of the body, contact ends there as well.
+The boundary of a body may continue beyond the end of a contact surface. The model has no contact
+there, so a state in which contact has reached such an end is wrong, even in equilibrium. If the
+surface ends at a corner of the body, contact may reach that end.
 """
 
 from __future__ import annotations

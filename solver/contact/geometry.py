@@ -2,9 +2,9 @@
 
 Slave edges are cut where the master's vertices project on them, so every integrand is smooth
 on its segment and a uniform pressure passes across non-matching meshes exactly (up to the
-curvature of the edges). Points are projected along the slave's continuous normal field in the
-current configuration, which breaks at corners. Gap and slip are means over the reference area:
-weights that changed with the strain would need derivatives of their own.
+curvature of the edges). Points are projected along the slave's normals in the current
+configuration; these are continuous except at corners. Gap and slip are means over the reference
+area, because weights that change with the strain would have to be differentiated too.
 
 M.A. Puso, T.A. Laursen, Comput. Methods Appl. Mech. Engng 193 (2004) 601-629; A. Popp et al.,
 Int. J. Numer. Meth. Engng 79 (2009) 1354-1391.
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6
 _LAST_STEP = 1e-9
-"""Step of Newton's method after which the next one would be rounding."""
+"""Step of Newton's method below which the projection has converged: the next is rounding."""
 _BEYOND = 1.5
 _OPPOSED = 0.25
-"""Least cosine of the angle between a surface that faces another and its opposite."""
+"""Least cosine of the angle between one normal and the opposite of the other, of facing edges."""
 _EDGE_TOLERANCE = 1e-8
 _MIN_COVERED = 1e-3
 
@@ -136,8 +136,8 @@ def _nearest(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Return the master edge that faces each point and is nearest, and whether there is one.
 
-    A surface faces another where their normals are opposed, within 75 degrees, however far ahead,
-    and up to ``reach`` behind, where the bodies overlap.
+    An edge faces a point if the normals are opposite within 75 degrees, at any distance in front
+    of the slave, and up to ``reach`` [mm] behind it, where the bodies overlap.
     """
     passing = _cross(normals[:, :, None], x[:, None, master.vertices] - points[:, :, None])
     point, edge = _near(passing[:, :-1], passing[:, 1:])
@@ -174,7 +174,7 @@ def pair(
 ) -> Pairing:
     """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm].
 
-    A master farther than ``reach`` [mm] behind the slave does not face it.
+    A master that lies more than ``reach`` [mm] behind the slave does not face it.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
     normals = end_normals(xs, slave)
@@ -213,7 +213,7 @@ def _integrate(
     distance: NDArray[np.float64],
     weight: NDArray[np.float64],
 ) -> Pairing:
-    """Sum the points into rows, one per slave vertex."""
+    """Sum the integration points into rows, one per slave vertex."""
     k = slave.edges.shape[1]
     Ns = shape_functions(xi, k)
     Nm = shape_functions(eta, master.edges.shape[1])

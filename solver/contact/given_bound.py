@@ -21,10 +21,10 @@ def given_bound(
     """Return forces and rigid motions when |T| <= bound is given, or None if there are none.
 
     z = (N, tau, back), w = (gap, fore, sigma) with tau = T / bound + 1, sigma = 1 - T / bound
-    and slip = fore - back: the matrix is positive semidefinite but for the scale of its
-    columns, so the method ends with a solution where one exists. Measured in units of its bound, a
-    tangential force is as exact as a normal one, even under the least friction. Rigid motions
-    are eliminated by a principal pivot on as many contact forces as there are motions.
+    and slip = fore - back. Up to a scaling of its columns the matrix is positive semidefinite, so
+    the method finds a solution if one exists. A tangential force is measured in units of its bound,
+    and so is as accurate as a normal force, even with tiny friction. Rigid motions are eliminated
+    by a principal pivot on as many contact forces as there are motions.
     """
     # imported only here: importing the compiler is slow, and Lemke's method is rarely needed
     from solver.contact.lemke import lemke
@@ -80,7 +80,7 @@ def _eliminate(
     balance: NDArray[np.float64],
     held: NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Exchange the normal forces ``held`` with their gaps, and remove the rigid motions."""
+    """Exchange the normal forces ``held`` with their gaps, and eliminate the rigid motions."""
     N, k = M.shape[0], len(held)
     rest = np.setdiff1d(np.arange(N), held)
     block = np.zeros((2 * k, 2 * k))

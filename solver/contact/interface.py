@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A contact pair, as it was declared, on its two parts.
+    """A declared contact pair on its two parts of the system.
 
-    ``hot`` is what heat takes of the yield stress of slave and master; ``reference`` is the pairing
+    ``hot`` gives how heat lowers the yield stress of slave and master; ``reference`` is the pairing
     before loading, which small sliding keeps.
     """
 
@@ -47,7 +47,7 @@ class Interface:
 
     @property
     def rough(self) -> bool:
-        """Whether it carries shear."""
+        """Whether the contact carries shear."""
         return self.law.rough
 
     @property
@@ -60,7 +60,7 @@ class Interface:
 
     @property
     def finite(self) -> bool:
-        """Whether the surfaces are paired anew as they move, from the beginning on."""
+        """Whether sliding is finite from the beginning: surfaces are paired in each iteration."""
         return self.reference is None
 
     @property
@@ -73,8 +73,8 @@ class Interface:
     ) -> Pairing:
         """Return gap, area and derivative rows at displacements ``u`` and a time.
 
-        With ``finite`` the surfaces are paired as they are, else as before loading if the pair is
-        one of small sliding.
+        With ``finite`` the surfaces are paired in their current positions; without it a pair of
+        small sliding keeps the pairing before loading.
         """
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
@@ -82,7 +82,7 @@ class Interface:
     def strength(self, pairing: Pairing, time: float) -> NDArray[np.float64]:
         """Return the shear yield stress (n,) of the weaker body at a time [MPa].
 
-        That is the body whose mean shear yield stress under the hat of a vertex is less.
+        The weaker body is the one with the lower mean shear yield stress under a vertex's hat.
         """
         least = np.full(len(pairing.gap), np.inf)
         for part, hot, rows in zip(self.parts, self.hot, pairing.normal, strict=True):
@@ -99,7 +99,7 @@ class Interface:
     ) -> NDArray[np.float64]:
         """Return the slip (n,) of the slave's vertices at displacements ``u`` [mm].
 
-        It counts from the displacements ``since``, from those before loading when absent.
+        Slip counts from the displacements ``since``, or from those before loading if absent.
         """
         slip = np.zeros(len(pairing.gap))
         for (number, part, chain), rows in zip(self.sides, pairing.tangent, strict=True):
@@ -137,7 +137,7 @@ def surfaces_of(
 ) -> dict[tuple[str, str], Surface]:
     """Return the surfaces of all pairs in the numbering of the whole bodies.
 
-    Where a surface continues as the surface of another pair, contact may pass on: no end is there.
+    If a surface continues as the surface of another pair, contact may pass over that end.
     """
     found = {
         side: wholes[side[0]].chain(side[1])
@@ -187,7 +187,8 @@ def interface_of(
             raise ModelError(
                 "contacts", (contact.slave, contact.master),
                 "these surfaces do not face each other: before loading no normal of the slave "
-                "meets the master from outside; check the boundaries and where the bodies are",
+                "reaches the outside of the master; check the boundaries and the positions of the "
+                "bodies",
             )  # fmt: skip
     hot = [part.hot(chain) for part, (_, chain) in zip(both, sides, strict=True)]
     return Interface(

@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from solver.fem.surface import Surface
 
 _CORNER = float(np.cos(np.radians(40.0)))
-"""Cosine of the turn between two edges, beyond which they meet in a corner."""
+"""Cosine of the angle between the normals of two edges; at a larger angle they form a corner."""
 _STRAIGHT = 1e-6
-"""Turn of the normal [rad] that rounding may make; the sagitta of an element is 1e-7 of it then."""
+"""Change of the normal along a surface [rad] up to which it counts as straight, as rounding may
+cause it; the sagitta of an element is then 1e-7 of its length."""
 
 
 def _edge_normal(x: NDArray[np.float64], surface: Surface, xi: float) -> NDArray[np.float64]:
@@ -31,8 +32,8 @@ def _edge_normal(x: NDArray[np.float64], surface: Surface, xi: float) -> NDArray
 def end_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
     """Return unit normals (2, 2, n_edges) at the starts and the ends of the edges.
 
-    Edges that meet share the mean of both, but at a corner of the body before loading: there, and
-    at the ends of the chain, each has its own.
+    Two edges share the mean of their normals at the vertex between them. At a corner of the
+    undeformed body, and at the ends of the chain, each edge keeps its own normal.
     """
     start, end = _edge_normal(x, surface, -1.0), _edge_normal(x, surface, 1.0)
     before = _edge_normal(surface.X, surface, 1.0)[:, :-1]
@@ -46,6 +47,6 @@ def end_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]
 
 
 def is_curved(surface: Surface) -> bool:
-    """Whether the normals of a surface turn along it, before any load."""
+    """Whether the normal changes along a surface before any load."""
     n = np.hstack([_edge_normal(surface.X, surface, xi) for xi in (-1.0, 1.0)])
     return bool(np.ptp(n, axis=1).max() > _STRAIGHT)

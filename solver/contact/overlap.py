@@ -1,7 +1,7 @@
 """Bodies that overlap before loading: by how much, and how much is allowed.
 
 Bodies with a small overlap are pushed apart before any load acts. A large overlap is a mistake in
-the model: small strains cannot undo it, and it is not known through which surface a point entered.
+the model: small strains cannot remove it, and the surface through which a point entered is unknown.
 """
 
 from __future__ import annotations

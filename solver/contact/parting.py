@@ -1,4 +1,4 @@
-"""Bodies that overlap before loading, moved apart as a whole where nothing holds them."""
+"""Remove overlap before loading by rigid motions of bodies that no support holds."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _ROUNDS = 5
-"""Times the motion is found anew: curved surfaces do not move apart along straight lines."""
+"""Number of times the motion is computed: surfaces that are curved need corrections."""
 _FARTHEST = 5.0
-"""Ratio of the motion to the overlap, above which bodies are not moved: a wedge or a taper would
-leave its fit."""
+"""Ratio of the motion to the overlap; above it bodies are not moved: a wedge or a taper would
+lose its fit."""
 _HELD = 1e-9
-"""Residual of the dual problem, below which no motion parts the bodies."""
+"""Residual of the dual problem; below it no rigid motion removes the overlap."""
 
 
 def parted(system: System, state: State) -> State:
-    """Return the state with floating bodies moved until nothing overlaps, else the same state.
+    """Return the state with floating bodies moved until nothing overlaps.
 
-    It is the same too where they would have to move by much more than they overlap.
+    The state is returned unchanged if no motion removes the overlap, or only a much larger one.
 
     The smallest rigid motion q for which ``gap + A q >= 0`` is that of least distance (Lawson and
     Hanson 1974, chapter 23): of r, the residual of ``min |E y - f|, y >= 0`` with the rows of
-    ``E' = [A, -gap]`` and f the last unit vector, ``q = -r / r_last``. There is none where r is
-    zero: bodies that are clamped press each other apart.
+    ``E' = [A, -gap]`` and f the last unit vector, ``q = -r / r_last``. If r is zero, no such motion
+    exists: the overlap of bodies that are supported is removed by their deformation.
     """
     ends = np.cumsum([part.rigid.shape[1] for part in system.parts])
     moved, overlap = state, 0.0

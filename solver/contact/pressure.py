@@ -21,8 +21,7 @@ def contact_pressure(
     The multiplier field is piecewise linear. Its means under the hats have the same resultant as
     its values at the vertices, without the oscillation of these next to a sharp corner.
 
-    They are over the area before loading: what the stress of the slave, whose strains are small,
-    balances.
+    Forces are divided by the area before loading, as the small strains of the slave imply.
     """
     contact, chain = state.contacts[interface], system.interfaces[interface].slave_surface
     pairing = system.pairing(state, interface)

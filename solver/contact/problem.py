@@ -5,7 +5,7 @@ motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction
 
     (gap, slip) = offset + W F + A q        0 = balance + A' F
     N >= 0, gap >= 0, N gap = 0
-    |T| <= s,  slip = 0 where below,  T = -s sign(slip) where equal
+    |T| <= s,  slip = 0 where |T| < s,  T = -s sign(slip) where |T| = s
     s = min_k (slope_k N + level_k),  the lines of a law of friction (`solver.model.friction`)
 """
 
@@ -33,7 +33,7 @@ class ContactProblem:
     ----------
     W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without
     offset : (m,) gap and slip at zero force [mm]
-    lines : tangential over normal force at each point [N]; their least is the bound
+    lines : the friction bound at each point, the least of lines of tangential over normal force [N]
     A : (m, k) gap and slip of the free rigid motions
     balance : (k,) resultants of all other forces on those motions [N]
     """

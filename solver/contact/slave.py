@@ -1,9 +1,8 @@
-"""Which surface of a pair is the slave, whose vertices bear the contact forces.
+"""Choose the slave of a pair: the surface whose vertices carry the contact forces.
 
-Contact forces can be no finer than the vertices that bear them, and no finer than the displacements
-that answer them. A rigid body has no such displacements: it bears forces only where its edges are
-like those of its partner. Of two curved surfaces, which touch in a narrow zone, the one with much
-longer edges would not see that zone.
+Contact forces need displacements of the same resolution. A rigid body has no displacement unknowns
+at its vertices: it is the slave only if its edges are about as long as those of its partner. Two
+curved surfaces touch in a narrow zone; the surface with much longer edges would not resolve it.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ if TYPE_CHECKING:
     from solver.model.model import ContactPair, Model
 
 _RIGID = (0.4, 1.1)
-"""Edges of a rigid slave / those of its partner."""
+"""Permitted range of the edge length of a rigid slave over that of its partner."""
 _COARSE = 2.0
-"""Ratio of the edges of a slave to those of its partner, above which the partner is the slave
-where they are curved."""
+"""Ratio of the edge length of a slave to that of its partner; above it the partner becomes the
+slave if one of them is curved."""
 _NEAR = 0.01
-"""Ratio of the distance beyond the nearest one to the edge, up to which a vertex is near
+"""Ratio of (distance of a vertex - least distance) to the edge length; up to it the vertex is near
 contact."""
 
 
 def with_slaves(model: Model, surfaces: Mapping[tuple[str, str], Surface]) -> Model:
-    """Return the model with slave and master of a pair exchanged where the slave bears no forces.
+    """Return the model with slave and master exchanged in the pairs where that is better.
 
-    ``surfaces`` are those of all pairs.
+    ``surfaces`` has the surfaces of all pairs, by body and boundary.
     """
     return replace(model, contacts=tuple(_ordered(model, c, surfaces) for c in model.contacts))
 
@@ -57,7 +56,7 @@ def _ordered(
 
 
 def _edges(slave: Surface, master: Surface) -> float:
-    """Return the edges of the slave / those of the master, the median where contact is near."""
+    """Return the median ratio of slave to master edge lengths, of the vertices near contact."""
     at, partner = slave.X[:, slave.vertices].T, master.X[:, master.vertices].T
     distance, nearest = cKDTree(partner).query(at)
     own, its = slave.spacing, master.spacing

@@ -20,12 +20,12 @@ class ContactState:
     """What a contact pair carries from one increment to the next, one value per slave vertex.
 
     ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
-    surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` tells
+    surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` says
     whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
-    master faces the vertex [mm]; ``slipped`` is the sum of all its slip in contact, forth and back,
-    since the first increment [mm]; ``rates`` (2, n) are those of gap and slip over time in the last
-    increment, NaN where not known. ``finite`` tells whether the surfaces are paired anew as they
-    move, or always as before loading.
+    master faces the vertex [mm]; ``slipped`` is the accumulated length of its slip in contact since
+    the first increment, without regard to direction [mm]; ``rates`` (2, n) are the rates of gap and
+    slip in the last increment, NaN where not known. ``finite`` says whether the surfaces are paired
+    in their current positions, or always as before loading.
     """
 
     normal: NDArray[np.float64]
@@ -48,7 +48,7 @@ class ContactState:
     ) -> ContactState:
         """Return the state of vertices without forces, those that touch sticking.
 
-        What they have slipped ``before`` is kept.
+        The accumulated slip of the state ``before`` is kept.
         """
         n = len(touching)
         slipped = np.zeros(n) if before is None else before.slipped
@@ -66,7 +66,7 @@ class State:
     """A converged state of the whole system; never changed, only replaced.
 
     ``time`` is the load factor where the pressures of the bodies have no amplitude.
-    ``force_scale`` is the largest force level met so far, to which tolerances refer [N].
+    ``force_scale`` is the largest force level so far, to which tolerances refer [N].
     """
 
     time: float
@@ -86,11 +86,11 @@ class Energy:
     external : work of loads, of prescribed motions and of heat
     plastic : work of stress on plastic strain, by the mean of stress before and after
     friction : work of friction on slip, positive
-    contact : work against contact where points open or close within an increment: an error of
-        integration; and work on contact forces that are taken away with the bodies apart
+    contact : work against contact where points open or close within an increment, which is an
+        integration error; and the work of contact forces that vanish when bodies are separated
     supplied : external work of all increments in which it is positive: it grows with every cycle,
         as errors of integration do
-    scale : the largest of these terms so far, or what is rounding of what acts (`System.least`)
+    scale : the largest of these terms so far, at least the rounding level of `System.least`
     """
 
     stored: float = 0.0
@@ -107,23 +107,22 @@ def _none() -> NDArray[np.float64]:
 
 
 _LITTLE = 0.01
-"""Ratio of the force of a pair to that of the pair with most, below which its timing does not
-count."""
+"""Ratio of the force of a pair to that of the pair with the largest; below it the timing of the
+pair does not count."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Timing:
-    """How well increments have followed contact in time; all (n_pairs,) [N].
+    """How well increments have resolved contact in time; all (n_pairs,) [N].
 
     Attributes
     ----------
-    untimed : friction that is not known, because vertices touched at unknown times: the sum over
-        increments since the pair was last open, no more than the friction of what sticks
-    friction : most friction that its contact could bear since then
-    passed : normal force times way of its contact along a surface in an increment / its width, at
-        most
-    normal : most normal force
-    stuck : friction that the vertices can bear that stick: one that slips bears what it can
+    untimed : friction that is uncertain, because vertices touched at unknown times: the sum over
+        increments since the pair was last open, at most ``stuck``
+    friction : largest friction that the contact could carry since then
+    passed : largest normal force x (distance that the contact moved in an increment / its width)
+    normal : largest normal force
+    stuck : friction that the sticking vertices can carry; that of slipping vertices is known
     """
 
     untimed: NDArray[np.float64] = field(default_factory=_none)
@@ -134,16 +133,16 @@ class Timing:
 
     @property
     def unknown(self) -> float:
-        """Friction that is not known / most friction, of the worst pair."""
+        """Ratio of the uncertain friction to the largest friction, of the worst pair."""
         return _worst(self.untimed, self.friction)
 
     @property
     def passage(self) -> float:
-        """Way of a contact in an increment / its width, of the worst pair."""
+        """Ratio of a contact's motion in an increment to its width, of the worst pair."""
         return _worst(self.passed, self.normal)
 
     def beside(self, other: Timing) -> Timing:
-        """Return what is unknown and has passed here, of the larger forces of both."""
+        """Return this timing, its ratios referred to the larger forces of both."""
         friction, normal = (
             np.maximum(getattr(self, name), getattr(other, name)) for name in ("friction", "normal")
         )
@@ -162,7 +161,7 @@ class Timing:
 
 
 def _worst(part: NDArray[np.float64], whole: NDArray[np.float64]) -> float:
-    """Return the largest ratio of the pairs whose force is not little."""
+    """Return the largest ratio of ``part`` to ``whole``, of the pairs whose force counts."""
     part, whole = np.broadcast_arrays(part, whole)
     counts = (whole > 0) & (whole >= _LITTLE * whole.max(initial=0.0))
     return float((part[counts] / whole[counts]).max(initial=0.0))
@@ -174,21 +173,21 @@ class Converged:
 
     Attributes
     ----------
-    forces : on each part, in balance with contact: loads, and the forces of supports and
-        prescribed motions [N]
-    contact_forces : of contact on the unknowns of each part [N]
-    responses : of each part at its points
-    iterations : Newton iterations
-    plastic_work : of the increment [N mm]
-    dissipation : least at a point [N mm/mm3]
-    contact_work : work of friction, and against contact, in the increment [N mm]
+    forces : for each part, loads and the forces of supports and prescribed motions on its
+        unknowns; they balance the contact forces [N]
+    contact_forces : contact forces on the unknowns of each part [N]
+    responses : stress and internal variables of each part at its points
+    iterations : number of Newton iterations
+    plastic_work : plastic work of the increment [N mm]
+    dissipation : least dissipation at any point [N mm/mm3]
+    contact_work : work of friction, and work against contact, in the increment [N mm]
     pivoted, blended : iterations whose contact problem needed pivoting, or whose tangent was
         blended with the elastic stiffness
     beyond_end : message that contact has reached the end of a surface; empty if it has not
-    apart : whether the bodies were taken apart in the increment
+    separated : whether the bodies were separated in the increment
     energy : work since the lap began
-    timing : how well contact was followed since then
-    lost : how far its beginning is from what the increment before has left
+    timing : how well contact was resolved in time since then
+    lost : difference between the beginning of this increment and the end of the previous one
     """
 
     start: State
@@ -203,7 +202,7 @@ class Converged:
     pivoted: int
     blended: int
     beyond_end: str = ""
-    apart: bool = False
+    separated: bool = False
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)
     lost: float = 0.0

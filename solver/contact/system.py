@@ -41,15 +41,16 @@ if TYPE_CHECKING:
 
 
 LEAST = 1e-7
-"""Least force that ratios refer to / that of elements that resist what is given by themselves."""
+"""Ratio of the rounding level of forces to the nodal forces of heat, initial stress and prescribed
+motion. Ratios of forces refer to nothing smaller than that level."""
 LEAST_ENERGY = 1e-8
-"""The same of energies: of free expansion a hundred-millionth of 1e-5 is left by rounding."""
+"""The same ratio for energies: free expansion leaves 1e-13 of the energy by rounding."""
 _TOUCHING = 1e-9
-"""Ratio of the gap to the length of the longest contact surface, below which vertices touch."""
+"""Ratio of the gap to the length of the longest contact surface; below it vertices touch."""
 _SET_DOWN = 1e-9
-"""Ratio of the gap to the radius of a wheel that is set down, below which vertices touch."""
+"""Ratio of the gap to the radius of a wheel that is set down; below it vertices touch."""
 _EXPANDED = 8
-"""States of condensed bodies whose displacements are kept: results and audit ask for them often."""
+"""Number of displacement fields of condensed bodies that are kept for results and audit."""
 
 
 def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: str) -> Part:
@@ -69,9 +70,9 @@ class System:
 
     Attributes
     ----------
-    model : the model; slave and master of a pair exchanged where its slave bears no forces
-    names : of the meshed bodies
-    all_names : of these and of the rigid ones after them, in the order of ``parts``
+    model : the model; slave and master of a pair are exchanged where that is better
+    names : names of the meshed bodies
+    all_names : these names, then those of the rigid bodies, in the order of ``parts``
     """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
@@ -142,14 +143,14 @@ class System:
         return A
 
     def least(self, time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] below which all is rounding of what acts.
+        """Return the force [N] and energy [N mm] below which values are rounding.
 
-        A body may give way to heat, initial stress and prescribed motion: of large forces of its
-        elements, which cancel, nothing but their rounding is left.
+        Under heat, initial stress or prescribed motion a body may deform freely: large forces of
+        its elements cancel, and only their rounding remains.
         """
         at, found = self._least
         if at != time:  # an increment asks for it, and then its energy
-            force, energy = np.array([part.resisted(time) for part in self.parts]).T
+            force, energy = np.array([part.clamped(time) for part in self.parts]).T
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
             self._least = time, found
         return found
@@ -200,7 +201,7 @@ class System:
         return self.overlaps(self.initial())
 
     def overlaps(self, state: State) -> bool:
-        """Whether bodies overlap in a state; moving loads are set down so that they touch."""
+        """Whether bodies overlap in a state; False if loads move: these are set down to touch."""
         gaps = (contact.gap for contact in state.contacts)
         return not self.moves and any((gap < -self.touching).any() for gap in gaps)
 
@@ -208,9 +209,9 @@ class System:
     def proportional(self) -> bool:
         """Whether an elastic state depends on the load alone, and not on its history.
 
-        True without friction, and where all facing vertices touch before loading: every status
-        then stays the same while the load grows. A bound of friction that does not grow with the
-        load, such as cohesion and a limit of shear, makes it false.
+        True without friction, or if all facing vertices touch before loading: every status then
+        stays the same while the load grows. It is False if the friction bound is not proportional
+        to the pressure, as with cohesion or a shear limit, and if bodies overlap before loading.
         """
         if self.overlapping or not all(i.law.proportional for i in self.interfaces):
             return False
@@ -219,11 +220,11 @@ class System:
         return bool(conforming) or not any(i.rough for i in self.interfaces)
 
     def bound(self, pair: int, pairing: Pairing, start: State, time: float) -> BoundLines:
-        """Return the lines of shear over pressure at the vertices of a slave [MPa].
+        """Return the friction bound at the vertices of a slave: lines of shear over pressure [MPa].
 
         Parameters
         ----------
-        pairing : of the interface, at the time
+        pairing : pairing of the interface at the time
         start : state at the beginning of the increment
         """
         interface, contact = self.interfaces[pair], start.contacts[pair]
@@ -273,9 +274,9 @@ class System:
         return found
 
     def pairing(self, state: State, pair: int) -> Pairing:
-        """Return how the surfaces of a contact pair lie in a state, paired as its increment did.
+        """Return the pairing of a contact pair in a state, as its increment used it.
 
-        Those of one state are kept.
+        The pairings of the last state are kept in memory.
         """
         for of, number, known in self._paired:
             if of is state and number == pair:
@@ -299,7 +300,7 @@ class System:
         return recovery(self.full(name))
 
     def positions(self, name: str) -> NDArray[np.float64]:
-        """Return where the integration points of a body are (2, n_points) [mm]."""
+        """Return the positions of the integration points of a body (2, n_points) [mm]."""
         return self.full(name).points.reshape(2, -1)
 
     def response(self, name: str, converged: Converged) -> Response:

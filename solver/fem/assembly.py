@@ -1,4 +1,4 @@
-"""Element matrices put together: the pattern once, the values each time."""
+"""Assembly of element matrices: the sparsity pattern once, the values each time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Assembly:
     Parameters
     ----------
     dofs : (n_elements, m) unknowns of each element
-    active : those of all ``n`` unknowns that the matrix has
+    active : unknowns that are rows of the matrix, out of all ``n``
 
     Attributes
     ----------

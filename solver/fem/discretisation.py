@@ -47,12 +47,12 @@ class Discretisation(Nodes, Part):
 
     Attributes
     ----------
-    dofs : (n_elements, 2 n_element_nodes)
+    dofs : (n_elements, 2 n_element_nodes) unknowns of the elements
     B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
     weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
     loads : nodal forces (n,) of pressures and tractions [N]
-    condensable : the same, with the forces of an elastic body whose eigenstrain is held [N]
-    free : unknowns that no support holds, copies left out
+    condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
+    free : unknowns that no support holds, without periodic copies
     active : unknowns of ``free`` that are not pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
     """
@@ -81,7 +81,7 @@ class Discretisation(Nodes, Part):
         self._hold()
 
     def _hold(self) -> None:
-        """Find the held unknowns, the rigid motions left, and one pin for each of these."""
+        """Find the supported unknowns, the remaining rigid motions, and one pin for each motion."""
         self.driven, self._held = prescribed(self)
         fixed = self._held.copy()
         fixed[self.copied[fixed]] = True
@@ -100,7 +100,7 @@ class Discretisation(Nodes, Part):
         return extract(self, boundary)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
-        """Return the operators of this part, whose contact surfaces are given."""
+        """Return the inverse stiffnesses of this part, for its contact surfaces."""
         contact = [surface.dofs for surface in surfaces]
         return Operators(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
 
@@ -117,13 +117,13 @@ class Discretisation(Nodes, Part):
 
     @property
     def side(self) -> float:
-        """Shortest element side that a load of its own moves over [mm]; inf without such a load."""
+        """Shortest element side under the body's moving load [mm]; inf without such a load."""
         if self.body.travelling is None:
             return super().side
         return shortest(self.X, edges_of(self, self.body.travelling.boundary))
 
     def way(self, before: float, after: float) -> float:
-        """Return the way along x of its travelling pressure between two times [mm]."""
+        """Return how far its travelling pressure moves along x between two times [mm]."""
         position = self.body.travelling.position if self.body.travelling else None
         return position.at(after) - position.at(before) if position else 0.0
 
@@ -137,7 +137,7 @@ class Discretisation(Nodes, Part):
 
     @property
     def travels(self) -> bool:
-        """Whether it may move as a whole: only contact holds it, or a side of it is moved."""
+        """Whether it may move as a whole: only contact holds it, or a boundary of it is moved."""
         return super().travels or bool(self.driven.fields.any())
 
     def grows(self, before: float, after: float) -> bool:
@@ -159,16 +159,16 @@ class Discretisation(Nodes, Part):
         return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
 
     def law(self, time: float) -> Law:
-        """Return the law of its points at a time: heat may change it."""
+        """Return the material law of its points at a time; temperature may change it."""
         return self.heat.law(self.body.law, time) if self.heat else self.body.law
 
     def hot(self, surface: Surface) -> Heat | None:
-        """Return what heat takes of the yield stress at a surface; None where it takes nothing."""
+        """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
         heat = Heat.of(self, self.X[:, surface.nodes])
         return heat if heat and heat.strength.fields.any() else None
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
-        """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""
+        """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
         return self._eigenstrains.at(time).reshape(4, -1)
 
     def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
@@ -184,7 +184,7 @@ class Discretisation(Nodes, Part):
 
     @cached_property
     def condensable(self) -> Superposed:
-        """Nodal forces (n,) of all loads on an elastic body, those of its eigenstrain included."""
+        """Nodal forces (n,) of all loads and of the eigenstrain on an elastic body [N]."""
         C = self.body.law.stiffness(self.B.shape[2])
         strains = self._eigenstrains
         pushed = [self.internal_force(C @ strain.reshape(4, -1)) for strain in strains.fields.T]
@@ -192,16 +192,16 @@ class Discretisation(Nodes, Part):
         return Superposed.of(self.n, zip(*both, strict=True))
 
     def force_level(self, time: float) -> float:
-        """Return the size of the forces that load the body at a time, eigenstrain included [N]."""
+        """Return the norm of the forces that load the body at a time, with eigenstrain [N]."""
         if not self._eigenstrains.cases:
             return super().force_level(time)
         return float(np.linalg.norm(self.condensable.at(time)))
 
-    def resisted(self, time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] if each element by itself resisted what is given.
+    def clamped(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] of heat and prescribed motion on clamped elements.
 
-        That is heat, initial stress and prescribed displacements. Forces of elements that cancel
-        at a node are added up here: a body that gives way bears none of them.
+        Heat, initial stress and prescribed displacements act on each element alone. The magnitudes
+        of element forces are added at the nodes, where they cancel in a body that can deform.
         """
         nodal, energy = np.zeros(self.n), 0.0
         if self._eigenstrains.cases:
@@ -220,7 +220,7 @@ class Discretisation(Nodes, Part):
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return ``u`` with prescribed displacements at their values for a time.
 
-        The rest of the body follows elastically, so that no element is torn.
+        The other unknowns follow elastically, so that no single element takes all of the motion.
         """
         if not self.driven.cases:
             return u
@@ -247,7 +247,7 @@ class Discretisation(Nodes, Part):
     def residual(
         self, time: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:
-        """Return external minus internal forces (n,), contact forces left out [N]."""
+        """Return external minus internal forces (n,), without contact forces [N]."""
         del u
         return self.external(time) - self.internal_force(response.stress)
 
@@ -260,11 +260,11 @@ class Discretisation(Nodes, Part):
         return float(tangent), float(elastic)
 
     def most_strained(self, step: NDArray[np.float64]) -> int:
-        """Return the point that a step (n,) strains most."""
+        """Return the number of the point that a step (n,) strains most."""
         return int((self.strain(step) ** 2).sum(axis=0).argmax())
 
     def place(self, point: int) -> tuple[float, float]:
-        """Return where (x, y) a point is [mm]."""
+        """Return the position (x, y) of a point [mm]."""
         x, y = self.points.reshape(2, -1)[:, point]
         return float(x), float(y)
 

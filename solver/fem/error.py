@@ -1,19 +1,18 @@
-"""How far stress is from that of a finer mesh: an estimate by recovery in patches.
+"""Estimate of the discretisation error of stress, by recovery in patches of elements.
 
-The stress of an element is the field through its points. Where the points are fewer than full
-integration asks for (``quad8``, ``tri6``), that is the (bi)linear field they carry; its values at
-them are one order more exact than between them, so that an error measured at the points alone
-would be far too small.
+The stress of an element is the polynomial through the stresses at its integration points; for
+reduced integration (``quad8``, ``tri6``) it is (bi)linear. Stress at these points is one order more
+accurate than between them, so an error measured at the points alone would be far too small.
 
 1. In every element take the stress at its superconvergent points: 2 x 2 in quadratic
    quadrilaterals, 3 in quadratic triangles, the middle of others.
 2. To the elements around each inner vertex fit a polynomial of the degree of the element, by least
    squares.
 3. The recovered stress is the mean of the polynomials of an element's inner vertices, weighted with
-   their linear shape functions. It is one order more exact than the stress, and continuous but for
-   edges between two vertices of the boundary. Where an element has no inner vertex, its vertices at
-   the boundary count, whose patches also take the elements that touch those around them.
-4. The energy of the difference of both, by full integration, estimates that of the error.
+   their linear shape functions. It is one order more accurate than the stress, and continuous
+   except on edges between two vertices of the boundary. If an element has no inner vertex, its
+   boundary vertices count instead; their patches also have the neighbours of the elements around.
+4. The energy of recovered minus computed stress, by full integration, estimates that of the error.
 
 A patch lies in one body: stress may jump where bodies touch.
 
@@ -45,10 +44,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _INWARD = 1e-6
-"""Part of the way to the middle of an element, by which points are moved inside for their weights.
-"""
+"""Fraction of the distance to the element's centre by which nodes are moved inside, for weights."""
 _SMALL = 1e-9
-"""Weight of the terms of highest degree beside the misfit: patches of one row do not tell them."""
+"""Regularisation of the terms of highest degree: a patch of one row does not determine them."""
 
 
 def error_estimate(part: Discretisation, stress: Array) -> tuple[float, float]:
@@ -104,11 +102,11 @@ class ErrorPoints:
     def at_nodes(self, stress: Array) -> Array:
         """Return the recovered stress at the nodes (4, n_nodes): means over the elements there.
 
-        At the boundary it is that of inner vertices, carried on: no value of the edge itself.
+        At the boundary it is extrapolated from inner vertices, without values of the edge itself.
         """
         basis = self._part.basis
         local = np.asarray(basis.elem.doflocs, dtype=float).T
-        # on an edge of the boundary all that is left of the inner vertices is their ratio
+        # on a boundary edge the weights of inner vertices vanish, but their ratio has a limit
         within = local + _INWARD * ((1 / 2 if self._corners == 4 else 1 / 3) - local)
         values = self._recovered(stress, within, np.asarray(basis.mapping.F(local)))
         nodes = self._part.same[basis.element_dofs.T].ravel()
@@ -168,7 +166,7 @@ class ErrorPoints:
         return out
 
     def _within(self, stress: Array, at: Array) -> Array:
-        """Return the field through the points of each element (4, n_elements, n) at local ones."""
+        """Return the stress polynomial of each element (4, n_elements, n) at local points."""
         own = np.asarray(self._part.basis.X)
         terms = _terms(own.shape[1], self._corners)
         through = _powers(at, terms) @ np.linalg.inv(_powers(own, terms))
@@ -199,7 +197,7 @@ class ErrorPoints:
         return fitted, scale
 
     def _patches(self) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-        """Yield vertices (m,) and the elements (m, n) of their patches, those of n together."""
+        """Yield vertices (m,) and their patches (m, n), for each number n of elements."""
         mesh = self._part.basis.mesh
         elements = np.broadcast_to(np.arange(mesh.t.shape[1]), mesh.t.shape)
         ones = np.ones(mesh.t.size)

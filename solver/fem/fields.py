@@ -132,7 +132,7 @@ def _reference(
 
 
 def elastic_energy(part: Part, u: NDArray[np.float64], response: Response, time: float) -> float:
-    """Return the elastic energy of a part [N mm]; of one without points that of its unknowns."""
+    """Return the elastic energy of a part [N mm]; without points, from its condensed stiffness."""
     if part.meshed:
         return float(part.law(time).energy_density(response.stress) @ part.volumes)
     return part.stiffness_along(u, response)[1] / 2

@@ -1,4 +1,4 @@
-"""A change of displacements, carried along with the load that made it."""
+"""Shift a change of displacements along with a moving load, for the prediction of increments."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 
 class Following:
-    """What happens to a part when a load has moved over it, given what happened before.
+    """The shift of a part's displacement changes by a distance along x.
 
-    Unknowns that have none behind them, at the ends of the mesh and where it is graded, follow
-    elastically: without this they would tear the elements beside them.
+    An unknown without another one at this distance behind it, at the ends of the mesh and where it
+    is graded, follows elastically; if it stayed at rest, the elements beside it would be distorted.
 
     Parameters
     ----------
-    way : from one node to another [mm]
+    way : distance, a whole number of element sides [mm]
 
     Attributes
     ----------
-    source : (n,) for each unknown the one that lies ``way`` behind it, -1 where there is none
+    source : (n,) for each unknown the one at the distance ``way`` behind it, -1 if there is none
     """
 
     def __init__(self, part: Part, way: float) -> None:
@@ -46,7 +46,7 @@ class Following:
             self._solver.factorise(upper.data)
 
     def carried(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a change of the unknowns (n,), farther on by the way [mm]."""
+        """Return a change of the unknowns (n,), shifted by the distance [mm]."""
         moved = np.where(self._known, change[self.source], 0.0)
         if len(self._others):
             moved[self._others] = self._solver.solve(-(self._rows @ moved))

@@ -1,4 +1,4 @@
-"""A frame that moves as a whole: the finite motion of rigid bodies and of wheels.
+"""A moving frame: the finite motion of rigid bodies and of wheels.
 
 Its three unknowns q are the displacement c = (x, y) of its centre and the arc w that rotation makes
 at a radius R. A point at X before loading, displaced by d in the frame, is at
@@ -34,7 +34,7 @@ def turning(angle: float) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingFrame:
-    """The frame of a body that moves as a whole.
+    """The frame that moves with a rigid body or with the hub of a wheel.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class MovingFrame:
     radius: float
 
     def motion(self, q: Array) -> RigidMotion:
-        """Return the motion that the unknowns (3,) are."""
+        """Return displacement and rotation for the unknowns (3,)."""
         x, y, arc = (float(value) for value in q)
         return RigidMotion(x, y, arc / self.radius)
 
@@ -60,14 +60,14 @@ class MovingFrame:
         return np.asarray(from_centre + (self.centre + q[:2])[:, None] - X)
 
     def passing(self, X: Array) -> Array:
-        """Return the motion of points X per arc (2, n), in the frame."""
+        """Return the derivative (2, n) of the positions X by the arc, in the frame."""
         x, y = X - self.centre[:, None]
         return np.stack([-y, x]) / self.radius
 
     def rows(self, q: Array, nodal: Array, passing: Array) -> Array:
-        """Return rows (m, 3) on the unknowns, from those on points (m, n, 2) at rest.
+        """Return derivative rows (m, 3) on the unknowns, from rows (m, n, 2) on displacements.
 
-        ``passing`` (2, n) is the motion of the points per arc, in the frame.
+        ``passing`` (2, n) is the derivative of the positions by the arc, in the frame.
         """
         by_arc = (nodal * (self.turned(q) @ passing).T).sum(axis=(1, 2))
         return np.hstack([nodal.sum(axis=1), by_arc[:, None]])

@@ -1,4 +1,4 @@
-"""What heat does to the law of a body: less stiffness, less strength."""
+"""Temperature-dependent material: heat lowers Young's modulus and the yield stress."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from solver.materials import Law
 
 _LEAST = 0.05
-"""Least share of Young's modulus and of the yield stress that heat may leave."""
+"""Least permitted ratio of Young's modulus, and of the yield stress, to its value when cold."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heat:
-    """Losses (n,) of Young's modulus and of the yield stress at places, as shares of both."""
+    """Relative losses (n,) of Young's modulus and of the yield stress at places, times loads."""
 
     modulus: Superposed
     strength: Superposed
 
     @classmethod
     def of(cls, part: Nodes, x: NDArray[np.float64]) -> Heat | None:
-        """Return what the loads of a body take at places (2, n); None if nothing."""
+        """Return the losses that the loads of a body cause at places x (2, n); None if none."""
         both = [(load, load.softening(x)) for load in part.body.every_load]
         lost = [(load, shares) for load, shares in both if shares is not None]
         if not lost:
@@ -41,19 +41,19 @@ class Heat:
         )
 
     def law(self, cold: Law, time: float) -> Law:
-        """Return the law at a time; the cold one as long as nothing has changed."""
+        """Return the law at a time; the cold law itself while nothing has changed."""
         stiff = _left(self.modulus, "modulus_drop", time)
         strong = self.strong(time)
         unchanged = (stiff == 1).all() and (strong == 1).all()
         return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)
 
     def strong(self, time: float) -> NDArray[np.float64]:
-        """Return the share (n,) of the yield stress that is left at a time."""
+        """Return the ratio (n,) of the yield stress at a time to its value when cold."""
         return _left(self.strength, "yield_drop", time)
 
 
 def _left(lost: Superposed, name: str, time: float) -> NDArray[np.float64]:
-    """Return the shares that are left at a time, or raise `ModelError` where too little is."""
+    """Return the remaining ratios at a time, or raise `ModelError` if one is below `_LEAST`."""
     share = 1 - lost.at(time)
     if not share.min() >= _LEAST:
         allowed = f"must be at least {_LEAST:g} at every temperature (time {time:.6g})"

@@ -1,4 +1,4 @@
-"""The loads of a body on its nodes and points."""
+"""The loads of a body as nodal forces, prescribed displacements and eigenstrain at points."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ _DEGREE = 7
 """Polynomial degree up to which forces per volume are integrated exactly, and tractions on straight
 edges."""
 _SAME = 1e-9
-"""Ratio of the difference to the size of what is given, below which it is rounding."""
+"""Ratio of a difference to the larger of two prescribed values; below it they are equal."""
 
 
 @dataclass(frozen=True)
 class Superposed:
-    """Fields that add up, each times the factor of its load.
+    """A sum of fields, each times the factor of its load at a time.
 
     Attributes
     ----------
     cases : the loads
-    fields : (n, n_cases) what each gives at load factor one
+    fields : (n, n_cases) the field of each load at load factor 1
     """
 
     cases: tuple[Load, ...]
@@ -81,9 +81,9 @@ def nodal_forces(part: Nodes) -> Superposed:
 
 
 def _body_forces(part: Nodes, load: Load) -> Array | None:
-    """Return the nodal forces (n,) of the force per volume of a load [N]; None where it has none.
+    """Return the nodal forces (n,) of a load's force per volume [N]; None if it has none.
 
-    The points of the stress, which may be few, do not matter here.
+    They are integrated with more points than the stress.
     """
     if load.body_force(part.X) is None:
         return None
@@ -100,28 +100,28 @@ def _body_forces(part: Nodes, load: Load) -> Array | None:
 
 
 def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
-    """Return the displacements (n,) that loads prescribe [mm], and which unknowns are held at all.
+    """Return the displacements (n,) that loads prescribe [mm], and the unknowns that are held (n,).
 
-    Loads on one boundary add up. Where boundaries meet, each must prescribe the same at all times;
-    a support prescribes no displacement. Raises `ModelError` where they do not.
+    Loads on one boundary add up; a support prescribes zero. Where boundaries share a node, all must
+    prescribe the same displacement at all times, else `ModelError` is raised.
     """
     loads = [load for load in part.body.every_load if load.components]
     each, held = [(load, np.zeros(part.n)) for load in loads], np.zeros(part.n, dtype=bool)
     for axis in (0, 1):
-        courses = _courses(part, loads, axis)
-        for k, course in enumerate(courses):
-            for other in courses[:k]:
-                course.check(other, part)
-            own = course.dofs[~held[course.dofs]]
+        prescriptions = _prescriptions(part, loads, axis)
+        for k, prescription in enumerate(prescriptions):
+            for other in prescriptions[:k]:
+                prescription.check(other, part)
+            own = prescription.dofs[~held[prescription.dofs]]
             for load, field in each:
-                if load in course.loads:
+                if load in prescription.loads:
                     field[own] = load.components[axis]
             held[own] = True
     return Superposed.of(part.n, each), held
 
 
-def _courses(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Course]:
-    """Return what supports and loads prescribe along an axis, one for each boundary."""
+def _prescriptions(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Prescription]:
+    """Return the displacements that supports and loads prescribe along an axis, by boundary."""
     still = [b for b, axes in part.body.supports.items() if "xy"[axis] in axes]
     moved: dict[str, list[Load]] = {}
     for load in loads:
@@ -131,16 +131,18 @@ def _courses(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Course]:
     both: list[tuple[str, str, list[Load]]] = [("supports", b, []) for b in still]
     both += [("displacement", b, own) for b, own in moved.items()]
     return [
-        _Course(f"{kind}.{boundary}", 2 * part.boundary_nodes(boundary) + axis, tuple(own), axis)
+        _Prescription(
+            f"{kind}.{boundary}", 2 * part.boundary_nodes(boundary) + axis, tuple(own), axis
+        )
         for kind, boundary, own in both
     ]
 
 
 @dataclass(frozen=True)
-class _Course:
-    """The displacement over time of unknowns along one axis: the sum of loads, none if supported.
+class _Prescription:
+    """Prescribed displacement over time of a boundary along one axis: a sum of loads, or a support.
 
-    ``name`` is that of what prescribes it.
+    ``name`` is the field of the body that prescribes it.
     """
 
     name: str
@@ -154,12 +156,12 @@ class _Course:
                 for load in self.loads)  # fmt: skip
         return sum(each, np.zeros(len(times)))
 
-    def check(self, other: _Course, part: Nodes) -> None:
+    def check(self, other: _Prescription, part: Nodes) -> None:
         """Raise `ModelError` where the two differ on unknowns that they share."""
         shared = np.intersect1d(self.dofs, other.dofs)
         if not len(shared):
             return
-        times = _telling([*self.loads, *other.loads])
+        times = _comparing([*self.loads, *other.loads])
         mine, others = self.at(times), other.at(times)
         apart = np.abs(mine - others)
         worst = int(apart.argmax())
@@ -169,15 +171,15 @@ class _Course:
         raise ModelError(
             f"{self.name}.{'xy'[self.axis]}", float(f"{mine[worst]:g}"),
             f"must be {others[worst]:g} mm at time {times[worst]:g}, as {other.name} of body "
-            f"{part.body.name!r} has it: "
-            f"they meet at ({x:g}, {y:g}) mm; or shorten one of the boundaries by an element",
+            f"{part.body.name!r} has it, because both boundaries have the node at "
+            f"({x:g}, {y:g}) mm; or shorten one of the boundaries by an element",
         )  # fmt: skip
 
 
-def _telling(loads: Sequence[Load]) -> Array:
-    """Return times (n,) at which sums of amplitudes are equal only if they are so at all times.
+def _comparing(loads: Sequence[Load]) -> Array:
+    """Return times (n,) such that sums of amplitudes equal at these are equal at all times.
 
-    They are linear between knots, at which they may jump: two times between each two knots tell.
+    Amplitudes are linear between knots and may jump at knots: two times in between are enough.
     """
     knots = [load.amplitude.time for load in loads if load.amplitude is not None]
     at = np.unique(np.concatenate([[0.0], *knots]))
@@ -186,9 +188,9 @@ def _telling(loads: Sequence[Load]) -> Array:
 
 
 def eigenstrains(part: Nodes) -> Superposed:
-    """Return the Mandel strain (4 n_points,) that causes no stress: thermal, or of making.
+    """Return the eigenstrain (4 n_points,) of the loads, Mandel: strain that causes no stress.
 
-    An initial stress s is that of the eigenstrain ``-C^-1 s`` in a body that has not moved.
+    An initial stress s has the eigenstrain ``-C^-1 s``, which gives s in the undeformed body.
     """
     x = part.points.reshape(2, -1)
     shape = (4, x.shape[1])
@@ -207,7 +209,7 @@ def eigenstrains(part: Nodes) -> Superposed:
 
 
 def _check_plane(stress: Array) -> None:
-    """Raise `ModelError` where an initial stress (4, n_points) acts across plane stress [MPa]."""
+    """Raise `ModelError` if an initial stress (4, n_points) has a zz component [MPa]."""
     across = np.abs(stress[2])
     if across.max(initial=0.0) > _SAME * np.abs(stress).max(initial=0.0):
         worst = float(stress[2, across.argmax()])
@@ -221,10 +223,10 @@ def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) 
 
 
 def _tractions(part: Nodes, boundary: str, push: Push, points: int) -> Array | None:
-    """Return the nodal forces (n,) of a traction [N]; None where ``push`` gives none.
+    """Return the nodal forces (n,) of a traction [N]; None if ``push`` returns None.
 
-    ``push`` gives the force (2, n) for positions and tangents (2, n), the body on their left; it is
-    a force per area times the length of the tangent.
+    ``push`` takes positions (2, n) and tangents (2, n), which have the body on their left, and
+    returns the force per area times the length of the tangent (2, n).
     """
     edges = edges_of(part, boundary)
     X, edges = part.X[:, edges], part.same[edges]

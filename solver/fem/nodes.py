@@ -1,4 +1,4 @@
-"""The nodes of a body, its quadrature, and the copies of nodes on a periodic body."""
+"""The nodes of a body, its quadrature, and the periodic copies of nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Nodes:
-    """Where the unknowns and the points of one body are.
+    """The unknowns and the integration points of one body, and their positions.
 
     Unknowns are numbered node by node: ``2 * node`` is x, ``2 * node + 1`` is y. Points are
     numbered element by element. Nodes on the far side of a periodic body repeat those on the near
@@ -29,8 +29,8 @@ class Nodes:
     X : (2, n_nodes) node positions [mm]
     n : number of unknowns
     same : (n_nodes,) for each node, the node whose unknowns it uses: itself, unless it is a copy
-    copied : (n,) the same for each unknown
-    period : length after which a periodic body repeats itself, else 0 [mm]
+    copied : (n,) for each unknown, the unknown whose value it takes
+    period : period of a periodic body, else 0 [mm]
     points : (2, n_elements, n_points) positions of the points [mm]
     """
 

@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 
 
 _WINDOWS = 4
-"""Windows kept in memory: a load that moves leaves them one by one."""
+"""Number of windows kept in memory: a moving load passes from one to the next."""
 _SMALL = 0.25
-"""Ratio of the elements of a window to those of the body, above which a window saves too little."""
+"""Ratio of the elements of a window to those of the body; above it a window saves too little."""
 
 
 class Operator(Protocol):
-    """The inverse of a part's stiffness, its pins held."""
+    """The inverse of a part's stiffness, with its pins held."""
 
     def begin(self, force: NDArray[np.float64]) -> Begun:
-        """Return the displacements for nodal forces (n,), those of contact yet to change.
+        """Return the displacements for nodal forces (n,); contact forces may still change.
 
-        The unknowns kept and the change are (n,), and mean something on contact surfaces alone.
+        ``kept`` and the argument of ``finish`` are (n,); only entries on contact surfaces count.
         """
 
     def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -76,7 +76,7 @@ class Analysed:
     part : the body
     contact : active unknowns on its contact surfaces, kept
     kept : (n,) position of each unknown among those kept, -1 for the others
-    solver : of the active unknowns
+    solver : linear solver of the active unknowns
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Analysed:
             self.solver = Windowed(elastic, window[part.active], np.flatnonzero(kept))
 
     def keeps(self, touched: NDArray[np.int64]) -> bool:
-        """Whether all active ones of some unknowns (m,) are kept."""
+        """Whether the unknowns (m,) are kept, as far as they are active."""
         active = np.isin(touched, self.part.active)
         return bool((self.kept[touched[active]] >= 0).all())
 
@@ -147,12 +147,12 @@ class PartOperators(Protocol):
 
     @property
     def elastic(self) -> Operator:
-        """The elastic one."""
+        """The operator of the elastic stiffness."""
 
     def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
-        """Return that of ``(1 - blend) tangent + blend elastic stiffness``.
+        """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``.
 
-        ``touched`` are the unknowns that contact forces act on.
+        ``touched`` are the unknowns on which contact forces act.
         """
 
 
@@ -189,7 +189,7 @@ class Operators:
         return Factored(self._around(response, touched), data)
 
     def _around(self, response: Response, touched: NDArray[np.int64]) -> Analysed:
-        """Return the pattern for a window where the body yields and touches, or the whole one."""
+        """Return the pattern of a window around yielding and contact, or that of the whole body."""
         if linear.chosen(self._name) != "pardiso" or not len(touched):
             return self._analysed
         yielding = response.yielding.reshape(self._part.points.shape[1:]).any(axis=1)

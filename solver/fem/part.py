@@ -1,4 +1,4 @@
-"""What increments need of a body: unknowns, forces, motion of surfaces."""
+"""Interface of a body to the increments: unknowns, forces, motion of surfaces."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 _ROUNDING = float(np.finfo(float).eps)
 _SAME = 1e-6
-"""Ratio of the distance to the size of a body, below which two places are the same."""
+"""Ratio of a distance to the size of a body; below it two places are the same."""
 
 
 def same_unknowns(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the unknowns (2 n,) of the nodes (2, m) at places (2, n), -1 where no node is."""
+    """Return the unknowns (2 n,) of nodes (2, m) at given places (2, n), -1 if no node is there."""
     near = _SAME * float(np.ptp(nodes, axis=1).max())
     _, at = cKDTree(nodes.T).query(places.T, distance_upper_bound=near)
     found = at < nodes.shape[1]
@@ -38,7 +38,7 @@ def same_unknowns(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> ND
 
 
 class Part(ABC):
-    """A body as the increments see it. What is not abstract holds for a meshed body at rest.
+    """A body as the increments use it; methods that are not abstract suit a meshed body at rest.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class Part(ABC):
     free : unknowns that no support holds
     active : those of them that are not pinned to hold its rigid motions
     rigid : (n, n_rigid) rigid motions that the supports leave free
-    moves : whether its load moves over the bodies
-    meshed : whether its unknowns are those of all of its nodes
+    moves : whether its load moves along a body
+    meshed : whether all nodes of its mesh have unknowns
     """
 
     n: int
@@ -65,11 +65,11 @@ class Part(ABC):
     moves: bool = False
     meshed: bool = True
 
-    # -- what each kind of part does by itself -------------------------------------------------
+    # -- each kind of part has its own ---------------------------------------------------------
 
     @abstractmethod
     def operators(self, surfaces: list[Surface], linear_solver: str) -> PartOperators:
-        """Return its inverses of stiffness, for the contact surfaces it has."""
+        """Return the inverse stiffnesses of this part, for its contact surfaces."""
 
     @abstractmethod
     def virgin(self) -> PlasticState:
@@ -83,7 +83,7 @@ class Part(ABC):
     def residual(
         self, time: float, u: NDArray[np.float64], response: Response
     ) -> NDArray[np.float64]:
-        """Return external minus internal forces (n,), contact forces left out [N]."""
+        """Return external minus internal forces (n,), without contact forces [N]."""
 
     @abstractmethod
     def elastic_matrix(self) -> sparse.csr_array:
@@ -91,7 +91,7 @@ class Part(ABC):
 
     @abstractmethod
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
-        """Return the tangent and the elastic quadratic form of a step [N mm]."""
+        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
 
     @abstractmethod
     def plastic_work(
@@ -99,14 +99,14 @@ class Part(ABC):
     ) -> tuple[float, float]:
         """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
 
-    # -- what a meshed body at rest does -------------------------------------------------------
+    # -- for a meshed body at rest -------------------------------------------------------------
 
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
         return surface
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return the displacements of the whole body [mm]; those of a wheel in its hub's frame."""
+        """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""
         del time
         return u
 
@@ -128,29 +128,29 @@ class Part(ABC):
         return self.loads.at(time)
 
     def force_level(self, time: float) -> float:
-        """Return the size of the forces that load the part at a time [N]."""
+        """Return the norm of the forces that load the part at a time [N]."""
         return float(np.linalg.norm(self.external(time)))
 
-    def resisted(self, time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] if each element by itself resisted what is given.
+    def clamped(self, time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] of heat and prescribed motion on clamped elements.
 
-        Loads are not part of it.
+        Forces and pressures do not count.
         """
         del time
         return 0.0, 0.0
 
     def law(self, time: float) -> Law:
-        """Return the law of its points at a time: heat may change it."""
+        """Return the material law of its points at a time; temperature may change it."""
         del time
         return self.body.law
 
     def hot(self, surface: Surface) -> Heat | None:
-        """Return what heat takes of the yield stress at a surface; None where it takes nothing."""
+        """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
         del surface
         return None
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
-        """Return the Mandel strain (4, n_points) that causes no stress: thermal, or of making."""
+        """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
         del time
         return np.zeros((4, len(self.volumes)))
 
@@ -169,10 +169,10 @@ class Part(ABC):
         return np.asarray(self.elastic_matrix().diagonal())
 
     def rounding(self, u: NDArray[np.float64]) -> float:
-        """Return how large out-of-balance forces can be that are rounding [N].
+        """Return the out-of-balance force that rounding can cause at displacements u [N].
 
         Internal forces are differences of stiffness times displacement. Both may be large where
-        forces are small: in long thin elements, in a stiff body that a soft one carries.
+        forces are small: in long thin elements, and in a stiff body on a soft one.
         """
         return _ROUNDING * float(np.linalg.norm(self._diagonal * u))
 
@@ -183,35 +183,38 @@ class Part(ABC):
 
     @property
     def side(self) -> float:
-        """Shortest element side that a load of its own moves over [mm]; inf without such a load."""
+        """Shortest element side under the part's moving load [mm]; inf without such a load."""
         return np.inf
 
     def way(self, before: float, after: float) -> float:
-        """Return the way along x [mm] of the load of a part that moves, between two times."""
+        """Return how far the part's moving load goes along x between two times [mm]."""
         del before, after
         return 0.0
 
     def turn(self, before: float, after: float) -> float:
-        """Return by how much it is turned between two times, where that is prescribed [rad]."""
+        """Return the prescribed rotation between two times [rad]; 0 if none is prescribed."""
         del before, after
         return 0.0
 
     def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
-        """Return the way of a load over this part [mm], as its unknowns were and are."""
+        """Return how far a load that moves by ``way`` goes over this part's material [mm].
+
+        ``before`` and ``after`` are the unknowns (n,) of the part.
+        """
         del before, after
         return way
 
     def sources(self, way: float) -> NDArray[np.int64]:
-        """Return for each unknown the one that lies ``way`` [mm] behind it along x, or -1."""
+        """Return for each unknown (n,) the one a distance ``way`` [mm] behind along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
     def most_strained(self, step: NDArray[np.float64]) -> int:
-        """Return the point that a step (n,) strains most; 0 without points."""
+        """Return the number of the point that a step (n,) strains most; 0 without points."""
         del step
         return 0
 
     def place(self, point: int) -> tuple[float, float]:
-        """Return where (x, y) a point is [mm]; NaN without points."""
+        """Return the position (x, y) of a point [mm]; NaN without points."""
         del point
         return np.nan, np.nan
 
@@ -222,10 +225,10 @@ class Part(ABC):
     def pull_back(
         self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return derivative rows on this part's unknowns, after the numbers of these unknowns.
+        """Return unknowns (m,) of this part and derivative rows (n_rows, m) on these.
 
-        ``block`` holds the rows on the displacements of a surface; its first ``gaps`` rows are
-        derivatives of gaps, the others of slips.
+        ``block`` (n_rows, 2 n_nodes) has the derivatives by the displacements of a surface; its
+        first ``gaps`` rows are those of gaps, the others of slips.
         """
         del u, gaps
         return surface.dofs, block

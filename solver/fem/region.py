@@ -1,7 +1,7 @@
-"""Where a body may yield and touch: a box of elements around where it does.
+"""Boxes around the elements that yield and the nodes in contact, for windows of the tangent.
 
-A box is placed on a coarse lattice. It depends on the elements and nodes it is for, and on nothing
-that was before, and few boxes do for all places on the way of a load.
+Boxes lie on a coarse lattice, so that a few boxes cover all positions of a moving load. A box
+depends only on the elements and nodes it encloses, not on earlier increments.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ Box = tuple[float, float, float, float]
 """Centre (x, y) and half the sides (x, y) [mm]."""
 
 _LATTICE = 8.0
-"""Size of what a box is for / distance of the lattice's points, at most."""
+"""Largest ratio of the enclosed size to the spacing of the lattice."""
 
 
 def box_around(X: NDArray[np.float64]) -> Box:
-    """Return a box that has all nodes X (2, n) inside."""
+    """Return the box of the lattice that encloses all nodes X (2, n)."""
     low, high = X.min(axis=1), X.max(axis=1)
     size = float((high - low).max())
     step = 2.0 ** np.ceil(np.log2(size / _LATTICE))
@@ -32,6 +32,6 @@ def box_around(X: NDArray[np.float64]) -> Box:
 
 
 def inside(box: Box, X: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which points X (2, n) are in a box."""
+    """Return whether points X (2, n) are in a box (n,)."""
     x, y, across, deep = box
     return np.asarray((np.abs(X[0] - x) <= across) & (np.abs(X[1] - y) <= deep))

@@ -1,7 +1,7 @@
-"""A rigid body as the increments see it: three unknowns, finite rotation.
+"""A rigid body as the increments use it: three unknowns, finite rotation.
 
-Unknowns are those of its `MovingFrame`, whose radius is the distance of the farthest point. Motions
-under a force are free, as those of a body held by contact alone; the others are prescribed.
+Its unknowns are those of a `MovingFrame`, whose radius is the distance of the farthest point. A
+motion with a force (`Pushed`) is free, the others are prescribed.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 
 _AXIS = 1e-9
-"""Ratio of the distance from the axis to the size of the body, below which a point is on the
-axis."""
+"""Ratio of the distance from the axis to the size of the body; below it a point is on the axis."""
 
 
 class Unmoved:
@@ -109,7 +108,7 @@ class RigidPart(Part):
     def pull_back(
         self, surface: Surface, u: Array, block: Array, gaps: int
     ) -> tuple[NDArray[np.int64], Array]:
-        """Return derivative rows on the three unknowns, after their numbers."""
+        """Return the three unknowns and derivative rows (n_rows, 3) on them."""
         del gaps
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
         return np.arange(3), self.frame.rows(u, nodal, self.frame.passing(surface.X))
@@ -124,7 +123,7 @@ class RigidPart(Part):
         return super().travels or bool(self._driven.fields.any())
 
     def turn(self, before: float, after: float) -> float:
-        """Return by how much it is turned between two times [rad], 0 where it is free to turn."""
+        """Return the prescribed rotation between two times [rad]; 0 if it is free to turn."""
         if not self._held[2]:
             return 0.0
         return (
@@ -136,7 +135,7 @@ class RigidPart(Part):
         return self.moved(np.zeros(3), 0.0)
 
     def passed(self, before: Array, after: Array, way: float) -> float:
-        """Return 0: it is the same everywhere."""
+        """Return 0: prediction needs no shift for a rigid body."""
         del before, after, way
         return 0.0
 
@@ -167,7 +166,7 @@ class RigidPart(Part):
         return self.external(time)
 
     def elastic_matrix(self) -> sparse.csr_array:
-        """Return no stiffness (3, 3)."""
+        """Return the stiffness (3, 3), which is zero."""
         return sparse.csr_array((3, 3))
 
     def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:

@@ -53,10 +53,10 @@ class _CondensedBody:
 
 
 def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a symmetric stiffness that resists no rigid motion (n, n_rigid) at all.
+    """Return a symmetric stiffness projected so that rigid motions (n, n_rigid) cause no force.
 
-    Rounding of the elimination leaves a little resistance, that of the largest entries of the whole
-    stiffness. Contact forces alone balance a rigid motion: nothing would balance this rest.
+    Rounding of the elimination leaves a small force, in proportion to the largest entries of the
+    whole stiffness. Only contact forces balance a rigid motion; nothing would balance this rest.
     """
     S = 0.5 * (S + S.T)
     Q = np.linalg.qr(rigid)[0]
@@ -67,9 +67,9 @@ def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDAr
 class Substructure(Part):
     """A part with the unknowns of its contact surfaces alone.
 
-    An increment can use it like a `Discretisation`; ``whole`` is the meshed body. ``elastic`` are
-    the unknowns that the condensed stiffness acts on. The body is condensed when its stiffness is
-    first needed: to check a model, or to tell its size, needs none.
+    An increment uses it like a `Discretisation`; ``whole`` is the meshed body. ``elastic`` are
+    the unknowns on which the condensed stiffness acts. The body is condensed when its stiffness is
+    first needed: to check a model, or to count its unknowns, needs none.
     """
 
     meshed = False
@@ -102,9 +102,9 @@ class Substructure(Part):
         nodes = np.searchsorted(self._nodes, surface.nodes)
         return replace(surface, nodes=nodes)
 
-    def resisted(self, time: float) -> tuple[float, float]:
-        """See `Discretisation.resisted`."""
-        return self.whole.resisted(time)
+    def clamped(self, time: float) -> tuple[float, float]:
+        """See `Discretisation.clamped`."""
+        return self.whole.clamped(time)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the operator of an elastic part, which never changes."""
@@ -155,7 +155,7 @@ class Substructure(Part):
         return whole
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return the displacements of the whole body [mm]; those of a wheel in its hub's frame."""
+        """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""
         factors = self.loads.factors(time)
         return self._condensed.expand(u[self.elastic], factors)[self.whole.copied]
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _CORNER = float(np.cos(np.radians(30.0)))
 
 
-@dataclass(frozen=True)  # without slots, which would leave no room for lengths once found
+@dataclass(frozen=True)  # without slots: cached properties need a __dict__
 class Surface:
     """A chain of edges with the body on its left: the outward normal is ``(t_y, -t_x)``.
 
@@ -89,7 +89,7 @@ def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:
     """Return the edges (n_edges, 2 or 3) of a boundary: start, end (, middle) node.
 
     Each has the body on its left. Facet bases of scikit-fem are not used here: they invert the
-    element mapping to a tolerance that elements 1e-5 of the body's size cannot meet.
+    element mapping with an absolute tolerance, too coarse for elements of 1e-5 of the body's size.
     """
     mesh, basis = part.body.mesh, part.basis
     facets = part.body.facets(boundary)
@@ -140,8 +140,8 @@ def extract(part: Nodes, boundary: str) -> Surface:
 def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:
     """Return whether a boundary continues smoothly beyond the start (0) or end (1) of an edge.
 
-    A turn by more than `_CORNER` is a corner. Tangents are compared: the chords of a coarse mesh
-    turn also where the curve is smooth.
+    A change of direction by more than `_CORNER` is a corner. Tangents are compared, not chords,
+    whose direction changes on a coarse mesh although the curve is smooth.
     """
     mesh, basis = part.body.mesh, part.basis
     outside = mesh.boundary_facets()

@@ -1,8 +1,8 @@
 """An elastic wheel, condensed to its rim, with finite rotation.
 
-Unknowns are the elastic displacements d of the rim's nodes in the frame of the hub, which is rigid,
-and the three of this `MovingFrame`. The condensed stiffness acts on d alone and never changes;
-rotation enters through the contact rows only. The axle's advance is prescribed;
+Unknowns are the elastic displacements d of the rim's nodes in the frame of the rigid hub, and the
+three unknowns of this `MovingFrame`. The condensed stiffness acts on d alone and never changes;
+rotation enters only through the derivatives of gap and slip. The advance of the axle is prescribed;
 its height is free and balances the vertical force; rotation is free and balances the moment, or
 is prescribed.
 """
@@ -68,7 +68,7 @@ class Wheel(Substructure):
     # -- kinematics ----------------------------------------------------------------------------
 
     def passing(self, surface: Surface, d: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the motion of material per arc (2, n_nodes), along a rim of constant shape.
+        """Return the derivative (2, n_nodes) of positions by the arc, for a fixed shape of the rim.
 
         ``d`` (2, n_nodes) are the displacements of its nodes in the frame of the hub [mm].
         """
@@ -87,15 +87,14 @@ class Wheel(Substructure):
     def pull_back(
         self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return derivative rows on rim, hub and rotation, after the numbers of these unknowns.
+        """Return the unknowns of rim, hub and rotation, and derivative rows on them.
 
-        Rotation moves the material along the rim, and the shape of the rim stays (`passing`).
-        This needs no work in a round elastic wheel and changes no gap: the moment comes from
-        friction alone, and its arm is the speed at which material passes. If the wheel turned
-        together with its displacements, gaps would change too, and pressure would have a moment.
-        In the continuum this moment compensates the difference of the arms. On a mesh with ten
-        points in contact it has an error of 1e-4 of force times radius, which would turn a wheel
-        that is held by less friction.
+        Rotation moves material along the rim, whose shape stays (`passing`). In a round elastic
+        wheel this takes no work and changes no gap: only friction has a moment, and its lever arm
+        is the speed of the material along the rim per angle. If the displacements turned with the
+        wheel, gaps would change too, and pressure would have a moment. In the continuum that moment
+        compensates the difference of the lever arms; on a mesh with ten points in contact its error
+        is 1e-4 of force times radius, enough to turn a wheel that is held by less friction.
         """
         nodal = block.reshape(len(block), block.shape[1] // 2, 2)
         d, q = u[surface.dofs].reshape(-1, 2).T, u[self._hub :]
@@ -105,9 +104,9 @@ class Wheel(Substructure):
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return ``u`` with the hub at its position for a time; a wheel free to turn rolls there.
+        """Return ``u`` with the hub at its position for a time.
 
-        A prescribed rotation takes its value at that time.
+        A wheel free to turn rolls there; a prescribed rotation takes its value at that time.
         """
         out = u.copy()
         x, turn = self._hub + _X, self._hub + _TURN
@@ -119,20 +118,20 @@ class Wheel(Substructure):
         return out
 
     def way(self, before: float, after: float) -> float:
-        """Return the way of the axle between two times [mm]."""
+        """Return how far the axle moves along x between two times [mm]."""
         return self.axle.position.at(after) - self.axle.position.at(before)
 
     def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
-        """Return the way of the contact along the rim [mm]: none where the wheel is locked."""
+        """Return how far the contact moves along the rim [mm]: 0 if the wheel is locked."""
         del way
         turn = self._hub + _TURN
         return float(before[turn] - after[turn])
 
     def sources(self, way: float) -> NDArray[np.int64]:
-        """Return for each unknown the one an arc ``way`` [mm] behind it, those of the hub itself.
+        """Return for each unknown the one at the arc ``way`` [mm] behind it along the rim, or -1.
 
-        Displacements keep their directions: over a side the frame turns by less than a prediction
-        is exact.
+        Unknowns of the hub are their own. Directions of displacements are not turned: over one
+        element side the frame turns by less than the error of a prediction.
         """
         centre = self.frame.centre[:, None]
         places = turning(-way / self.frame.radius) @ (self.nodes - centre) + centre
@@ -150,9 +149,9 @@ class Wheel(Substructure):
         return self.placed(float(self.axle.position.time[0]))
 
     def placed(self, time: float) -> NDArray[np.float64]:
-        """Return the undeformed wheel at its position for a time.
+        """Return the unknowns of the undeformed wheel at its position for a time.
 
-        A wheel free to turn has the rotation of rolling there from where it was meshed.
+        A wheel free to turn has rolled there from the position at which it was meshed.
         """
         u = np.zeros(self.n)
         u[self._hub + _TURN] = self.frame.radius * self.axle.turned

@@ -50,9 +50,9 @@ class PardisoError(RuntimeError):
 
 
 class Pardiso:
-    """One analysed pattern and the factor of the matrix last given.
+    """One analysed pattern and the factor of the last matrix.
 
-    All unknowns but those ``kept`` are eliminated. The Schur complement on those kept is
+    All unknowns except those ``kept`` are eliminated. The Schur complement on the kept ones is
     factorised densely, so that their compliances cost no sparse solves.
 
     Parameters
@@ -119,9 +119,9 @@ class Pardiso:
         return self.backward(half, self.on_kept(half[self._kept]))
 
     def forward(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the right-hand side (n,) or (n, k) with all unknowns eliminated but those kept.
+        """Return the right-hand side (n,) or (n, k) after the unknowns not kept are eliminated.
 
-        Its values on these are the right-hand side of the Schur complement.
+        Its values on the kept unknowns are the right-hand side of the Schur complement.
         """
         half = np.zeros_like(b)
         self._call(_FORWARD, b, half)

@@ -1,10 +1,10 @@
-"""The Schur complement of a symmetric matrix: some unknowns eliminated once, exactly.
+"""The Schur complement of a symmetric matrix: inner unknowns are eliminated once, exactly.
 
-With k the unknowns kept and i those inside, ``K_ii u_i = f_i - K_ik u_k`` and
+With k the kept and i the inner unknowns, ``K_ii u_i = f_i - K_ik u_k`` and
 
     S u_k = f_k - K_ki K_ii^-1 f_i,   S = K_kk - K_ki K_ii^-1 K_ik
 
-S differs from K_kk in a dense block, on the kept unknowns that meet those inside.
+S differs from K_kk in a dense block, on the kept unknowns that are coupled to inner ones.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.int64]
 
 _COLUMNS = 64
-"""Right-hand sides solved at once."""
+"""Number of right-hand sides that are solved at once."""
 
 
 class SchurComplement:
@@ -31,13 +31,13 @@ class SchurComplement:
 
     Parameters
     ----------
-    matrix : symmetric, positive definite inside
-    kept, inside : (m,), (k,) unknowns, increasing
+    matrix : symmetric (n, n), positive definite on the inner unknowns
+    kept, inside : (m,), (k,) kept and inner unknowns, increasing
 
     Attributes
     ----------
-    boundary : (b,) places among those kept that meet unknowns inside
-    taken : (b, b) what the elimination takes from K_kk there
+    boundary : (b,) positions among the kept unknowns that are coupled to inner ones
+    taken : (b, b) the block K_ki K_ii^-1 K_ik, subtracted from K_kk there
     """
 
     def __init__(
@@ -59,19 +59,19 @@ class SchurComplement:
             self.taken[:, some] = couple.T @ self._follow(couple[:, some].toarray())
 
     def condense(self, force: Array) -> Array:
-        """Return the right-hand side of S, (m,) or (m, k), for one of all unknowns."""
+        """Return the right-hand side of S, (m,) or (m, k), from that of all unknowns (n, ...)."""
         inner = force[self.inside]
         if not inner.any():
             return np.asarray(force[self.kept])
         return np.asarray(force[self.kept] - self._couple.T @ self._follow(inner))
 
     def expand(self, kept: Array, force: Array) -> Array:
-        """Return all unknowns from those kept (m,) and the right-hand side of all (n,)."""
+        """Return all unknowns (n,) from the kept ones (m,) and the right-hand side (n,)."""
         u = np.zeros(len(force))
         u[self.kept] = kept
         u[self.inside] = self._follow(force[self.inside] - self._couple @ kept)
         return u
 
     def _follow(self, right: Array) -> Array:
-        """Return the unknowns inside for their right-hand side, those kept held at zero."""
+        """Return the inner unknowns for their right-hand side, with the kept unknowns at zero."""
         return right if self._solver is None or not right.size else self._solver.solve(right)

@@ -1,8 +1,9 @@
 """Symmetric sparse systems behind one interface: analyse once, factorise, solve many.
 
-A matrix is given by its upper triangle in CSR form, with the unknowns ``kept`` whose compliances
-will be needed. `analyse` takes MKL PARDISO where it is installed, else SuperLU; the environment
-variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides this choice.
+A matrix is given by its upper triangle in CSR form. ``kept`` are the unknowns for which
+`LinearSolver.compliance` will be called. `analyse` chooses MKL PARDISO if it is installed, else
+SuperLU; the environment variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides
+this choice.
 """
 
 from __future__ import annotations
@@ -40,10 +41,10 @@ class LinearSolver(Protocol):
         """Return the solution for ``b`` (n,) or (n, k)."""
 
     def begin(self, b: NDArray[np.float64]) -> Begun:
-        """Return the solution for ``b`` (n,), as far as its kept unknowns need it."""
+        """Begin the solution for ``b`` (n,): compute its kept unknowns only."""
 
     def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return ``rows A^-1 rows'`` for ``rows`` (k, m) on the m unknowns kept."""
+        """Return ``rows A^-1 rows'`` (k, k) for ``rows`` (k, m) on the m kept unknowns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +53,8 @@ class Begun:
 
     Attributes
     ----------
-    kept : (m,) the kept unknowns, without a change
-    finish : (change (m,) of the right-hand side there) -> solution (n,)
+    kept : (m,) the kept unknowns, for an unchanged right-hand side
+    finish : (change (m,) of the right-hand side on the kept unknowns) -> solution (n,)
     """
 
     kept: NDArray[np.float64]
@@ -61,7 +62,7 @@ class Begun:
 
 
 class SuperLU:
-    """SuperLU of SciPy, which every machine has."""
+    """SuperLU, which comes with SciPy."""
 
     def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
         self._upper = upper.copy()
@@ -146,7 +147,7 @@ class PardisoSolver:
 
 
 def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]) -> Begun:
-    """Return a solution that is finished by a second one."""
+    """Return a solution that a second full solve finishes."""
 
     def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
         changed = b.copy()

@@ -1,13 +1,13 @@
-"""A symmetric system of which only a window changes: the rest is eliminated once.
+"""A symmetric system that changes only in a window; the rest is eliminated once.
 
 With w the unknowns of the window and o the others, every matrix is
 
     [K_oo  K_ow]
     [K_wo  K_ww]        K_oo and K_ow constant
 
-so that ``- K_wo K_oo^-1 K_ow``, a dense block on the boundary of the window, is found once and
-added to each ``K_ww``. A factorisation then costs what the window costs. Right-hand sides pass
-through the factor of ``K_oo`` forward into the window, and solutions backward out of it.
+so ``- K_wo K_oo^-1 K_ow``, a dense block on the boundary of the window, is computed once and
+added to each ``K_ww``. A factorisation then costs as much as that of the window alone. A solve
+eliminates the right-hand side forward into the window, and substitutes backward out of it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Windowed:
     ----------
     upper : upper triangle (n, n) of one such matrix, positive definite outside the window
     window : (n,) whether an unknown is in the window
-    kept : (m,) increasing, unknowns of the window that compliances will be needed for
+    kept : (m,) increasing, unknowns of the window for which compliances will be needed
     """
 
     def __init__(self, upper: sparse.csr_array, window: NDArray[np.bool_], kept: Numbers) -> None:
@@ -82,7 +82,7 @@ class Windowed:
         return begun.finish(np.zeros_like(begun.kept))
 
     def begin(self, b: Vector) -> linear.Begun:
-        """Return the solution for ``b`` (n,), as far as its kept unknowns need it."""
+        """Begin the solution for ``b`` (n,): compute its kept unknowns only."""
         right = b[self._around]
         right[self._on_boundary] = 0.0
         half = self._outer.forward(right)

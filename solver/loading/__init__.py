@@ -1,1 +1,1 @@
-"""A loading history, walked in increments that are halved where they fail."""
+"""A loading history, solved in increments; an increment that fails is halved."""

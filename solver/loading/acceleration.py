@@ -1,10 +1,9 @@
-"""Anderson acceleration of Newton's method where its tangent is not complete.
+"""Anderson acceleration of Newton's method, for iterations with an incomplete tangent.
 
 The tangent lacks the derivatives of contact normals and of the friction bound along a surface, and
 may be blended with the elastic stiffness. Newton's method then converges like a geometric series,
 at times with a ratio of 0.9. Anderson's mixing combines the last iterates so that the remaining
-step is least. Where the missing part is constant, it measures this part, and is Newton's method
-again.
+step is least. If the missing part of the tangent is constant, this restores Newton's method.
 
 D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011)
 1715-1735, algorithm 2.
@@ -26,24 +25,22 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _SLOW = 0.6
-"""Ratio of the size of a step to the size of the one before, above which convergence counts as
-slow."""
+"""Ratio |step_k| / |step_k-1|; above it convergence counts as slow."""
 _PATIENCE = 5
-"""Slow steps in a row before they count as a series: a change of contact status makes a few."""
+"""Number of slow steps in a row that make a series; a change of contact status causes a few."""
 _WINDING = 3.0
-"""Ratio of the size of a step to the size of the one before, above which it does not continue the
-series."""
+"""Ratio |step_k| / |step_k-1|; above it the step does not continue the series."""
 _ALONG = 0.7
-"""Cosine of the angle between two steps, above which they go in one direction."""
+"""Cosine of the angle between two steps; above it they have the same direction."""
 _DEPTH = 5
 
 
 @dataclass(slots=True)
 class Series:
-    """Successive steps with the same contact states that hardly decrease.
+    """Successive steps that hardly decrease, with the same contact status.
 
-    They may alternate, or circle about the solution. Steps that grow in one direction may mean that
-    a body flows, and are not accelerated.
+    They may alternate or circle about the solution. Steps that grow in one direction may mean that
+    a body flows plastically, and are not accelerated.
     """
 
     _key: bytes = b""
@@ -56,7 +53,7 @@ class Series:
     ) -> tuple[Vectors, NDArray[np.float64]] | None:
         """Return accelerated displacements and contact forces after a step.
 
-        Nearly always convergence is fast, and None says that the step itself serves.
+        None if convergence is fast, as it nearly always is: the step itself is then used.
         """
         place = np.concatenate([*u, candidates.forces])
         now = np.concatenate([*step.u, step.forces - candidates.forces])

@@ -1,4 +1,4 @@
-"""Prescribed shear against the shear strength of the material."""
+"""Check prescribed shear against the shear yield stress of the material."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from solver.materials.law import Law
 
 
-def unbearable(system: System) -> LimitLoad | None:
-    """Return the error that a prescribed shear has no equilibrium; None if it may have one.
+def excess_shear(system: System) -> LimitLoad | None:
+    """Return the error if a prescribed shear exceeds the shear yield stress, else None.
 
-    No stress on or inside the yield surface has a shear above the shear yield stress, and the
-    traction equals the stress at the surface: without hardening nothing can balance more.
+    The traction equals the stress at the surface. Without hardening the stress stays inside the
+    yield surface, so no equilibrium exists for a larger shear.
     """
     for body in system.model.bodies:
         travelling = body.travelling
@@ -32,7 +32,7 @@ def unbearable(system: System) -> LimitLoad | None:
 
 
 def too_much_shear(material: Law, shear: float) -> LimitLoad | None:
-    """Return the error that a surface has no equilibrium under this shear; None if it may have."""
+    """Return the error if a shear [MPa] on a surface exceeds the shear yield stress, else None."""
     strength = material.ultimate_shear_stress
     if shear <= strength:
         return None

@@ -14,9 +14,9 @@ class Tolerances:
 
     Attributes
     ----------
-    residual : out-of-balance force over the largest force level met so far
-    contact : violation of the contact conditions as a force, over the same level
-    iterations : most Newton iterations before the increment is given up
+    residual : largest out-of-balance force over the largest force level so far
+    contact : largest violation of the contact conditions, as a force, over the same level
+    iterations : largest number of Newton iterations of an increment
     """
 
     residual: float = 1e-8
@@ -26,11 +26,11 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
-    """How a program is walked.
+    """How a program is solved.
 
     Attributes
     ----------
-    max_cuts : times an increment may be halved before the run ends with an error
+    max_cuts : how often an increment may be halved before the run ends with an error
     tolerances : of an increment
     """
 
@@ -45,8 +45,8 @@ class PathControl(Control):
     Attributes
     ----------
     load_step : increments of loading end at its multiples, in load factor
-    unload_steps : equal increments from full load to zero; the last takes the bodies apart
-    max_cuts : times an increment may be halved before the run ends with an error
+    unload_steps : number of equal increments from full load to zero; the last separates the bodies
+    max_cuts : how often an increment may be halved before the run ends with an error
     tolerances : of an increment
     """
 

@@ -1,11 +1,11 @@
-"""Where the work of the loads goes: stored, dissipated by flow, rubbed away.
+"""Energy balance: work of the loads, stored energy, plastic work, work of friction.
 
 Each term is integrated by the trapezoidal rule over increments. Virtual work then makes
 
     external work = change of stored energy + plastic work + work of friction and against contact
 
-exact where the directions of contact are fixed (small sliding). Where they turn, the difference is
-the error of this integration.
+exactly if contact normals are fixed (small sliding). If they rotate, the difference is the error of
+this integration.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def worked(system: System, before: Converged, now: Converged) -> Energy:
-    """Return the work so far, that of the increment from ``before`` to ``now`` included."""
+    """Return the work since the lap began, up to the end of the increment ``now``."""
     parts = system.parts
     moves = zip(before.state.u, now.state.u, before.forces, now.forces, strict=True)
     work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
@@ -46,8 +46,8 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
 
 
 def _released(before: Converged, now: Converged) -> float:
-    """Return the work of bodies on contact forces that vanish as they are taken apart [N mm]."""
-    if not now.apart:
+    """Return the work on contact forces that vanish because the bodies are separated [N mm]."""
+    if not now.separated:
         return 0.0
     moves = zip(before.state.u, now.state.u, before.contact_forces, strict=True)
     return -sum(float(force @ (u1 - u0)) / 2 for u0, u1, force in moves)
@@ -57,7 +57,7 @@ def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
     """Return the work of stress on the change of eigenstrain and of the elastic constants [N mm].
 
     With the elastic strains e0, e1 and stresses s0, s1 of both ends, energy grows by exactly
-    (s0 + s1) (e1 - e0) / 2 + (s1 e0 - s0 e1) / 2. The second term is zero where the constants stay.
+    (s0 + s1) (e1 - e0) / 2 + (s1 e0 - s0 e1) / 2. The second term is zero for constant stiffness.
     """
     times = before.state.time, now.state.time
     work = 0.0
@@ -76,7 +76,7 @@ def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
 
 
 def _spread(system: System, before: Converged, now: Converged) -> float:
-    """Return the work of normal forces on the change of gaps that are given [N mm]."""
+    """Return the work of normal forces on changes of prescribed gaps [N mm]."""
     work = 0.0
     for k, interface in enumerate(system.interfaces):
         offset = interface.declared.offset
@@ -86,10 +86,10 @@ def _spread(system: System, before: Converged, now: Converged) -> float:
 
 
 def _turned(system: System, before: Converged, now: Converged) -> float:
-    """Return the work on turned rigid bodies less that of their moments [N mm].
+    """Return the work on rotating rigid bodies minus the work of the mean moments [N mm].
 
-    Under small sliding contact forces keep their directions while a body turns: their work is that
-    of the mean forces on the motion of the surface. The mean of the moments misses some of it.
+    Under small sliding contact forces keep their directions while a body rotates. Their work is the
+    mean force times the motion of the surface; mean moment times rotation misses some of it.
     """
     work = 0.0
     for k, interface in enumerate(system.interfaces):

@@ -1,4 +1,4 @@
-"""The stiffness along a step, which tells a plastic mechanism from other failures."""
+"""The stiffness along a step: low in a plastic mechanism, not in other failures."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
     from solver.materials import Law, PlasticState, Response
 
 _FLOWING = 0.02
-"""Share of the elastic stiffness along a late step, below which the structure flows."""
+"""Ratio of the tangent to the elastic stiffness along a late step; below it the structure flows."""
 _EXHAUSTED = 0.99
-"""Share of the largest stress of a law, beyond which little hardening is left."""
+"""Ratio of the flow stress to its limit in a law; above it little hardening is left."""
 _MECHANISM = 1e-2
-"""The same for bodies without load."""
+"""Like `_FLOWING`, for bodies without load."""
 _MOVES = 1e-3
-"""Share of the elastic energy of a step, above which a part takes part in it."""
+"""Ratio of the elastic energy of a part in a step to that of all; above it the part moves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SoftestStep:
-    """The step that met the least resistance.
+    """The step with the least stiffness along it.
 
-    ``stiffness`` is the share of the elastic stiffness left along the step, ``body`` and
-    ``place`` (x, y) [mm] say what it strained most, ``proves`` whether vanishing stiffness proves a
-    limit load: no hardening is left, and the stress is at no corner of the yield surface.
-    ``excludes`` says that the kinematic theorem leaves no equilibrium at this load (`collapses`),
-    from whatever state it is tried.
+    ``stiffness`` is the ratio of the tangent to the elastic stiffness along the step. ``body`` and
+    ``place`` (x, y) [mm] are where it strains most. ``proves`` says whether vanishing stiffness
+    proves a limit load: no hardening is left, and the stress is at no corner of the yield surface.
+    ``excludes`` says that the kinematic theorem excludes any equilibrium at this load
+    (`collapses`), whatever the state before.
     """
 
     stiffness: float = 1.0
@@ -72,7 +72,7 @@ def softer(
     step: Sequence[NDArray[np.float64]],
     responses: Sequence[Response],
 ) -> SoftestStep:
-    """Return the flow of a step (displacements of each part) if it is softer, else ``than``."""
+    """Return the softest step: this one (displacements of each part) or ``than``."""
     forms = _forms(parts, step, responses)
     tangent, elastic = forms.sum(axis=0)
     if not elastic > 0 or tangent / elastic >= than.stiffness:
@@ -88,7 +88,7 @@ def softer(
 
 
 def _exhausted(law: Law, state: PlasticState, point: int) -> bool:
-    """Whether a law whose stress has a bound is next to it at a point."""
+    """Whether the flow stress at a point is close to its limit, of a law that has one."""
     bound = law.ultimate_shear_stress
     strength = law.shear_strength(state.at(np.array([point])))[0] if np.isfinite(bound) else bound
     return bool(strength >= _EXHAUSTED * bound)
@@ -101,16 +101,17 @@ def collapses(
     forces: Sequence[NDArray[np.float64]],
     responses: Sequence[Response],
 ) -> bool:
-    """Whether forces out of balance do more work on a motion than stress can ever take.
+    """Whether the work of out-of-balance forces exceeds the largest plastic dissipation.
 
-    This is the kinematic theorem of limit analysis, which holds at corners of a yield surface too:
-    where more is done than the strongest stress inside takes beyond the present one, there is no
-    equilibrium. Where volume changes, a mean stress that differs by the tensile strength may help.
+    This is the kinematic theorem of limit analysis, which also holds at corners of a yield surface.
+    If the forces do more work on a motion than any stress inside the yield surface can do beyond
+    the present stress, no equilibrium exists. If the motion changes volume, a mean stress that
+    differs by the tensile strength is also admitted.
 
     Parameters
     ----------
-    moved : displacements of each part, with little strain where it does not flow [mm]
-    forces : nodal forces out of balance, those of contact included [N]
+    moved : displacements of each part, with little strain outside the flowing region [mm]
+    forces : out-of-balance nodal forces of each part, with contact forces [N]
     """
     elastic = _forms(parts, moved, responses)[:, 1]
     excess = sum(float(force @ u) for force, u in zip(forces, moved, strict=True))
@@ -136,10 +137,10 @@ def is_mechanism(
     step: Sequence[NDArray[np.float64]],
     responses: Sequence[Response],
 ) -> bool:
-    """Whether a step is a plastic mechanism of a part that moves in it, though no body has a load.
+    """Whether a step is a plastic mechanism in a part, although no body has a load.
 
-    Overlapping bodies push each other apart by a given distance. Plastic flow can do this in
-    many ways, and rounding would choose one of them and its size.
+    Overlapping bodies push each other apart by a given distance. Without stiffness the plastic
+    strain that achieves this is not unique, and rounding would determine it.
     """
     if any(part.external(time).any() for part in parts):
         return False

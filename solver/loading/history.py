@@ -1,4 +1,4 @@
-"""Whether an increment begins with what the one before it has left."""
+"""Check that an increment begins with the state in which the previous one ended."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _APART = 1e-4
-"""Ratio of the gap to the edge, above which a vertex without force is no contact that has just
-closed."""
+"""Ratio of the gap of a vertex without force to the edge length; above it the vertex is open."""
 
 
 def lost(system: System, before: Converged, now: Converged) -> float:
-    """Return how far the state that ``now`` begins with is from what ``before`` has left.
+    """Return how much the state at the beginning of ``now`` differs from the end of ``before``.
 
-    The largest counts of
+    It is the largest of
 
-    - stress at the end of ``before`` that is beyond the yield surface of the internal variables
-      with which ``now`` begins, over the yield stress: strain, hardening and back stress forgotten
-    - gap of a vertex that is open, yet whose friction has a history, over the mean edge, where that
-      is no tolerance
+    - the excess of the stress at the end of ``before`` over the yield surface of the internal
+      variables at the beginning of ``now``, over the yield stress: above zero if plastic strain,
+      hardening or back stress was lost
+    - the gap of an open vertex that is marked as touching, over the mean edge length, if it is
+      above `_APART`
     """
     worst = 0.0
     both = zip(system.parts, before.responses, now.start.plastic, strict=True)

@@ -7,13 +7,14 @@ From the last converged state, at the current displacements:
 2. contact geometry: gap, slip and their derivative rows H at the candidate vertices
 3. compliance of the contact points ``W = H K^-1 H'``
 4. the frictional contact problem on W, exactly; the free rigid motions of parts held by contact
-   alone are extra unknowns with exact balance equations, as in FETI. Where the problem has no
+   alone are extra unknowns with exact balance equations, as in FETI. If the problem has no
    solution, or steps are far too long, the tangent is blended with the elastic stiffness
 5. line search on the plastic residual, contact forces interpolated
-6. converged when the residual, contact forces included, and the contact conditions vanish
+6. converged when the residual with contact forces, and the violation of the contact conditions, are
+   within the tolerances
 
-Without a prediction the first iteration uses the elastic operator: after a reversal of load a
-plastic tangent of the step before would diverge.
+Without a prediction the first iteration uses the elastic operator: after a reversal of load the
+plastic tangent of the previous step would make Newton's method diverge.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from solver.loading.flow import SoftestStep, collapses, is_mechanism, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.slide import Slide, slide
-from solver.loading.step import NewtonStep, apart, largest, newton_step, norm, on_parts, rounding
+from solver.loading.step import NewtonStep, largest, newton_step, norm, on_parts, rounding, unheld
 from solver.loading.timing import timing
 
 if TYPE_CHECKING:
@@ -50,18 +51,18 @@ if TYPE_CHECKING:
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
 _SHORT, _STIFF = 0.1, 3
-"""Share of a step below which it is short; after two short ones the blends begin with this one."""
+"""Line search share below which a step is short, and the first blend tried after two short ones."""
 _PATIENCE = 15
-"""Iterations without a smaller residual before an increment is given up."""
+"""Number of iterations without a smaller residual after which an increment has failed."""
 _DIVERGED = 1e4
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
-"""Force level of bodies that bear nothing / that at which their rounding is out of balance."""
+"""Factor between the force level of bodies without load and the level at which rounding errors
+alone would exceed the tolerance."""
 _MOVING = 0.01
-"""Ratio of the last step to the displacements of the increment, above which the bodies are still
-moving."""
+"""Ratio of the last step to the displacements of the increment; above it bodies still move."""
 _LATE = 1
-"""Iteration from which on a step without stiffness means that the structure flows."""
+"""Number of the first iteration in which a step without stiffness means plastic flow."""
 
 
 class Increment:
@@ -69,12 +70,14 @@ class Increment:
 
     Parameters
     ----------
-    guess : state to iterate from, ``start`` when absent; prescribed motions are those at ``time``
-    contact, friction : False takes the bodies apart, leaves friction out
+    guess : state to iterate from, ``start`` when absent; its prescribed motions are those at
+        ``time``
+    contact : False separates the bodies
+    friction : False leaves friction out
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
-    patient : if no body can flow without hardening, so that an equilibrium exists, use all
-        iterations: with little hardening the residual rises and falls while the energy falls
+    patient : use all iterations if every body hardens, so that an equilibrium exists: with little
+        hardening the residual rises and falls while the energy falls
     """
 
     def __init__(
@@ -126,15 +129,15 @@ class Increment:
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
-            # bodies that overlap or are moved can begin in balance: later residuals are not
-            # compared with that, but with the first violation of contact
+            # overlapping or moved bodies can begin with a residual of zero: compare later residuals
+            # with the first violation of contact instead
             best = max(min(best, error), tolerances.residual)
             begun = begun if iteration else violation
             hopeless = since_best > _PATIENCE and not self.patient
             hopeless |= error > _DIVERGED * max(best, begun)
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
-            # a body that flows far moves far: not all that is out of balance may be rounding
+            # a body that flows moves far: an out-of-balance force may then be more than rounding
             balanced = error < tolerances.residual
             little = 0 < error < _UNBALANCED * tolerances.residual
             balanced |= little and error * scale <= rounding(self.system, u)
@@ -163,7 +166,8 @@ class Increment:
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
-        # to stop at rounding is no flow; what flows without resistance is in balance, but moves
+        # a residual that stops at rounding is no plastic flow; bodies that flow without resistance
+        # are in balance, but move
         flows = moving or best > _UNBALANCED * tolerances.residual
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
@@ -172,9 +176,9 @@ class Increment:
         )
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
-        """Return how a body slides at one of the places, or where the increment began.
+        """Return how a body slides, at the given iterates or at the beginning of the increment.
 
-        A step may have taken the body off its contacts.
+        The beginning counts too, because a step may have lost the contacts of the body.
         """
         places = (*places, self._began) if self._began else places
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
@@ -187,9 +191,9 @@ class Increment:
         responses: Sequence[Response],
         contacts: tuple[ContactState, ...],
     ) -> SoftestStep:
-        """Return a flow with what the motion since the start of the increment proves of it.
+        """Return the softest step, with whether the kinematic theorem excludes equilibrium.
 
-        Nothing where a motion is prescribed: the work of what prescribes it is not known.
+        The theorem is not applied if a motion is prescribed: the work of its force is not known.
         """
         parts = self.system.parts
         moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
@@ -201,14 +205,14 @@ class Increment:
         proven = collapses(parts, self.time, moved, forces, responses)
         return replace(flow, excludes=proven)
 
-    # -- 1, 2: where we are ------------------------------------------------------------------
+    # -- 1, 2: stress, residual, contact geometry ----------------------------------------------
 
     def _respond(self, u: Vectors) -> tuple[Response, ...]:
         each = zip(self.system.parts, u, self.start.plastic, strict=True)
         return tuple(part.respond(ui, plastic, self.time) for part, ui, plastic in each)
 
     def _residuals(self, u: Vectors, responses: Sequence[Response]) -> Vectors:
-        """Return external minus internal forces of each part, contact forces left out."""
+        """Return external minus internal forces of each part, without contact forces [N]."""
         each = zip(self.system.parts, u, responses, strict=True)
         return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
 
@@ -225,9 +229,9 @@ class Increment:
         inner = on_parts(self.system, candidates, candidates.forces)
         external = float(np.hypot.reduce([part.force_level(self.time) for part in parts]))
         level = external + norm(inner)
-        if external == 0:  # only overlapping bodies act on each other: stress gives the level
+        if external == 0:  # only the overlap of bodies causes forces: stress gives the level
             level += norm(residuals)
-        if external == 0 and self.start.force_scale == 0:  # bodies may have been set apart
+        if external == 0 and self.start.force_scale == 0:  # bodies without contact and force
             level += _ROUNDED * rounding(self.system, self.start.u) / self.tolerances.residual
         scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
@@ -237,7 +241,7 @@ class Increment:
         return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
 
     def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
-        """Return the elastic stiffness of the contact points [N/mm]: a scale, kept once found."""
+        """Return the elastic stiffness of the contact points [N/mm], a scale; computed once."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self._stiff:
             W = candidates.compliance([o.elastic for o in self.system.operators])
@@ -253,7 +257,10 @@ class Increment:
         candidates: Candidates,
         blends: Sequence[float],
     ) -> NewtonStep:
-        """Return the step of the least blended tangent that has one (a lone blend is no choice)."""
+        """Return the step with the first of the ``blends`` for which the problem has a solution.
+
+        Raises `IncrementFailed` if none has.
+        """
         for blend in blends:
             try:
                 operators = [
@@ -272,7 +279,7 @@ class Increment:
                 self._blended += 0 < blend and len(blends) > 1
                 return step
         raise IncrementFailed(
-            "no contact forces were found that balance this load" + apart(self.system, candidates)
+            "no contact forces were found that balance this load" + unheld(self.system, candidates)
         )
 
     # -- 5: line search ------------------------------------------------------------------------
@@ -281,8 +288,8 @@ class Increment:
         self, u: Vectors, residuals: Vectors, candidates: Candidates, step: NewtonStep
     ) -> tuple[float, Vectors, tuple[Response, ...]]:
         trial: tuple[Vectors, tuple[Response, ...]]
-        # where vertices change status, contact forces before the step may make its slope negative;
-        # with those after the step the slope is the quadratic form of the tangent
+        # if vertices change status, the slope with the contact forces before the step may be
+        # negative; with those after the step it is the quadratic form of the tangent
         before = candidates.forces
         if step.slope(self.system, residuals, candidates, before) <= 0:
             before = step.forces
@@ -300,7 +307,7 @@ class Increment:
         share = search(slope, along(0.0, residuals))
         return share, *trial
 
-    # -- 6: the end ----------------------------------------------------------------------------
+    # -- 6: the converged state ----------------------------------------------------------------
 
     def _commit(
         self,
@@ -334,7 +341,7 @@ class Increment:
             blended=self._blended,
             beyond_end=beyond_end(self.system, u, candidates),
             timing=self._timing(candidates),
-            apart=not self.contact,
+            separated=not self.contact,
         )
 
     def _timing(self, candidates: Candidates) -> Timing:

@@ -1,4 +1,4 @@
-"""How far to go along a step."""
+"""Line search: the share of a Newton step to take."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ def search(slope: Callable[[float], float], start: float) -> float:
     """Return the share of a step, in (0, 1], at which the energy stops falling.
 
     In an increment of associated plasticity the energy is convex, and its slope along the step
-    rises through zero; a share is accepted when the slope has dropped to a fifth of ``start``
-    in size, or when the energy still falls at the end of the step. This is tighter than usual: in a
+    rises through zero. A share is accepted if the slope there is at most a fifth of ``start`` in
+    magnitude, or if the energy still falls at the end of the step. This is tighter than usual: in a
     perfectly plastic body close to its limit, a loose search makes Newton's method very slow.
 
     Parameters
     ----------
     slope : (share) -> minus the derivative of the energy along the step (Illinois iteration)
-    start : its value at share zero; where it is not positive the whole step is taken
+    start : its value at share zero; if it is not positive, the whole step is taken
     """
     share = 1.0
     now = slope(share)

@@ -1,4 +1,4 @@
-"""How an increment may fail, and the result of a program."""
+"""The failure of an increment, and the result of a program."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Tally:
 
     Newton iterations of each increment, cuts, iterations whose contact problem needed pivoting or
     whose tangent was blended, CPU seconds, plastic work [N mm], least plastic dissipation at a
-    point in an increment [N mm/mm3], most of what an increment has lost of the state before it.
+    point in an increment [N mm/mm3], largest loss of state between two increments (`history.lost`).
     """
 
     iterations: tuple[int, ...] = ()
@@ -62,10 +62,10 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A converged state, those before it in their order, to predict from, and the cost so far.
+    """A converged state, the states before it (for predictions), and the cost so far.
 
-    ``history`` is what was kept of every increment up to it, ``met`` are the numbers of the contact
-    pairs whose surfaces have faced each other.
+    ``history`` has the values that ``watch`` returned for every increment; ``met`` are the numbers
+    of the contact pairs whose surfaces have faced each other.
     """
 
     now: Converged
@@ -86,13 +86,13 @@ class PathEnded(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settled:
-    """How finely a program was walked in the end.
+    """The refinement of increments with which a program was solved.
 
     Attributes
     ----------
     times : number of increments in place of one of the program
-    error : estimated error that is left, in the unit of what was measured; NaN where unknown
-    failed : the same number in the attempt that failed, 0 if none did
+    error : estimated remaining error, in the unit of `StepRefinement.measure`; NaN if unknown
+    failed : number of increments in place of one in the attempt that failed, 0 if none did
     """
 
     times: int = 1
@@ -109,10 +109,10 @@ class Outcome:
     tally : its cost
     last : the last state reached
     points : states at the ends of the stages of the last lap, by name
-    traces : what the walker's ``trace`` returned for each complete lap
-    history : what its ``watch`` returned for each increment, and for the state before the first
-    error : why the program was not walked to its end; None if it was
-    settled : how finely it was walked
+    traces : values that the walker's ``trace`` returned, one for each complete lap
+    history : values that its ``watch`` returned, for the first state and after each increment
+    error : why the program did not reach its end; None if it did
+    settled : the refinement of its increments
     """
 
     tally: Tally

@@ -1,8 +1,8 @@
-"""What a moving load changes, carried along with it: the next increment is like an earlier one.
+"""Predict an increment under a moving load from an earlier one, shifted along with the load.
 
-Under a load that moves steadily an increment changes the bodies as an earlier one did, farther on.
-Nodes meet nodes again when the load has passed a whole element side. The change is therefore taken
-from an increment so many sides back, and moved by these sides: no value is interpolated.
+Under a load that moves steadily an increment changes the bodies as an earlier one did, a distance
+ahead. Shifted by a whole number of element sides, nodes coincide with nodes. The change is
+therefore taken from an increment so many sides back: no value is interpolated.
 """
 
 from __future__ import annotations
@@ -28,14 +28,13 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.int64]
 
 MEMORY = 8
-"""States before the last that are kept: most increments to an element side."""
+"""Number of earlier states that are kept: the most increments per element side."""
 _OFF = 0.1
-"""Ratio of the way of the load to the element side, up to which it may differ from a whole number
-of sides."""
+"""Largest difference of (motion of the load / element side) from a whole number."""
 
 
 class Predictor:
-    """Predicts the states of a system whose loads move, from those before."""
+    """Predicts the states of a system with moving loads from earlier states."""
 
     def __init__(self, system: System) -> None:
         self._system = system
@@ -45,10 +44,10 @@ class Predictor:
         self._known: dict[tuple[int, int], Following] = {}
 
     def predicted(self, past: Sequence[State], now: State, time: float) -> State | None:
-        """Return the state predicted for ``time``, or None where no earlier increment is like it.
+        """Return the state predicted for ``time``, or None if no earlier increment corresponds.
 
-        ``past`` are the states before ``now``, in their order. Prescribed motions are those at
-        ``time``.
+        ``past`` are the states before ``now``, oldest first. The prescribed motions of the
+        predicted state are those at ``time``.
         """
         for before, after in reversed(list(pairwise([*past, now]))):
             way = self._way(before.time, now.time)
@@ -59,7 +58,7 @@ class Predictor:
         return None
 
     def _way(self, before: float, after: float) -> float:
-        """Return the way of the loads between two times [mm]; 0 where they differ."""
+        """Return how far the loads move between two times [mm]; 0 if their motions differ."""
         ways = {part.way(before, after) for part in self._system.parts if part.moves}
         return ways.pop() if len(ways) == 1 else 0.0
 
@@ -89,7 +88,7 @@ class Predictor:
         return replace(now, u=u, contacts=contacts)
 
     def _following(self, number: int, steps: int) -> Following:
-        """Return what carries changes of a part along by so many sides."""
+        """Return the shift of a part's changes by a number of element sides."""
         if (number, steps) not in self._known:
             way = steps * self._sides[number] if steps else 0.0
             self._known[number, steps] = Following(self._system.parts[number], way)
@@ -97,7 +96,10 @@ class Predictor:
 
 
 def _on_vertices(interface: Interface, sources: Numbers) -> Numbers:
-    """Return for each slave vertex the one so many sides back, -1 where there is none."""
+    """Return for each slave vertex the one that lies behind it by the shift, -1 if there is none.
+
+    ``sources`` has this for the unknowns of the slave.
+    """
     surface = interface.slave_surface
     nodes = surface.nodes[surface.vertices]
     vertex = np.full(len(sources) // 2 + 1, -1)

@@ -1,7 +1,7 @@
-"""A loading history as data: laps of stages, and the increments of these.
+"""A loading history as data: laps, their stages, and the increments of the stages.
 
-Loads and motions are amplitudes over time, declared with the bodies. Where the pressures of bodies
-have no amplitude, time is the load factor, and goes back to zero when they are released.
+Loads and motions follow amplitudes over time, declared with the bodies. For loads without amplitude
+time is the load factor, which returns to zero when they are released.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stage:
-    """A part of a loading history, from the end of the stage before to a time.
+    """A part of a loading history, from the end of the previous stage to a time.
 
     Attributes
     ----------
     name : name of the state at its end
     target : time at its end
-    steps : number of equal increments, where ``step`` is 0
+    steps : number of equal increments, if ``step`` is 0
     step : if not 0, increments end at its multiples, and the last one at the target
-    apart : whether the last increment takes the bodies apart
-    turns : whether another motion begins, for which the rates of gap and slip so far mean nothing
+    apart : whether the last increment separates the bodies
+    turns : whether another motion begins: previous rates of gap and slip are then not used
     refined : whether `Program.refined` divides its increments
     """
 
@@ -55,7 +55,7 @@ class Stage:
         """Return the times at which its increments end."""
         if not self.step:
             way, steps = self.target - start, self.steps
-            if self.target == 0.0:  # shares of what there was
+            if self.target == 0.0:  # equal shares of the time at the start
                 return [*(start * (1 - k / steps) for k in range(1, steps)), 0.0]
             return [*(start + way * k / steps for k in range(1, steps)), self.target]
         way = 1 if self.target >= start else -1
@@ -73,13 +73,13 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Lap:
-    """Stages from a time on. At its beginning wheels are set down at their position."""
+    """A group of stages from a time on. At its beginning wheels are set down at their position."""
 
     stages: tuple[Stage, ...]
     start: float = 0.0
 
     def targets(self, first: bool) -> Iterator[Target]:
-        """Yield the ends of its increments; ``first`` tells whether no lap is before it."""
+        """Yield the ends of its increments; ``first`` says whether it is the first lap."""
         now, begins = self.start, None if first else self.start
         for stage in self.stages:
             times = stage.times(now)
@@ -106,10 +106,10 @@ class Lap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """The end of an increment of a program, and what is special about it.
+    """The end of an increment of a program.
 
-    ``begins`` (time) opens a lap after the first one, ``keeps`` (name) is the stage that it ends,
-    ``closes`` says that the lap ends with it.
+    ``begins`` is the time at which a later lap begins with this increment, ``keeps`` the name of
+    the stage that ends with it, ``closes`` says whether the lap ends with it.
     """
 
     time: float
@@ -126,12 +126,12 @@ class Program:
 
     Attributes
     ----------
-    laps : in their order
-    cycle : laps after which the same loading repeats itself; 0 if it does not. When nothing yields
-        in a whole cycle, later laps repeat its states and are not computed
-    retraces : whether it is one lap of two stages whose loads grow with time in the first and go
-        back in the second: elastic bodies then need one increment, and return to their first state
-    place : (time) -> words for it in messages
+    laps : the laps, in their order
+    cycle : number of laps after which the loading repeats; 0 if it does not. If nothing yields in a
+        whole cycle, later laps repeat its states and are not computed
+    retraces : whether it is one lap of two stages whose loads grow in the first and decrease in the
+        second: elastic bodies then need one increment, and return to their first state
+    place : (time) -> text for this time in messages
     """
 
     laps: tuple[Lap, ...]
@@ -183,13 +183,13 @@ def shared(one: Program, other: Program) -> int:
 
 
 def walked(programs: Sequence[Program]) -> int:
-    """Return how many increments it takes to walk programs, those of two in a row shared once."""
+    """Return the number of increments of programs; those that two in a row share count once."""
     before = (shared(one, other) for one, other in pairwise(programs))
     return sum(program.count for program in programs) - sum(before)
 
 
 def load_and_release(load: float, step: float, unload_steps: int) -> Program:
-    """Return the program that raises a load factor to ``load``, removes it and parts the bodies."""
+    """Return the program that raises the load factor to ``load``, then unloads and separates."""
     loaded = Stage(name="loaded", target=load, step=step)
     unloaded = Stage(name="unloaded", target=0.0, steps=unload_steps, apart=True)
     return Program(laps=(Lap((loaded, unloaded)),), retraces=True)

@@ -1,4 +1,4 @@
-"""Increments halved until what they leave no longer changes."""
+"""Halve the increments until the result of the first lap no longer changes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 HALVINGS = 6
-"""Most times that `StepRefinement` halves the increments."""
+"""How often `StepRefinement` halves the increments at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepRefinement:
-    """How small increments must be: halved until the result of the first lap no longer changes.
+    """The criterion by which increments are halved: the change of the first lap's result.
 
-    Backward Euler in the plastic strain is of first order in the increment, so the change by
-    halving estimates the error that is left.
+    Backward Euler in the plastic strain is of first order in the increment, so the change by the
+    last halving estimates the remaining error.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A body that friction no longer holds: it slides as a whole, which no growing load can mend."""
+"""Sliding of a whole body: its load exceeds the friction of all its contacts."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _SPENT = 0.95
-"""Share of friction that is borne, above which a pair is about to slide."""
+"""Ratio of the tangential force of a pair to its friction bound; above it a hint is given."""
 _ALONG = 0.05
-"""Share of normal motion in a motion along the contact: bodies in contact are bent as little."""
+"""Largest ratio of normal motion to all motion of the contact points in a slide: deformed surfaces
+are not quite straight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slide:
-    """The rigid motion of ``body`` along its contacts on which its load does more than friction.
+    """A rigid motion of ``body`` along its contacts, in which the load exceeds friction.
 
-    ``ratio`` is the power of the load over the largest that friction can take.
+    ``ratio`` is the power of the load over the largest power that friction can dissipate.
     """
 
     body: str
@@ -35,23 +36,23 @@ class Slide:
 
     @property
     def excludes(self) -> bool:
-        """Whether no equilibrium exists from another state: not so, with other normal forces."""
+        """Whether equilibrium is excluded from any other state: no, normal forces may differ."""
         return False
 
     @property
     def limit(self) -> bool:
-        """Whether no equilibrium exists: where there is a slide, none does (upper bound)."""
+        """Whether no equilibrium exists: always, by the upper-bound theorem."""
         return True
 
     def __str__(self) -> str:
         return (
             f"body {self.body!r} slides on all its contacts: its load is {self.ratio:.4g} times "
-            "what friction can bear"
+            "what friction can carry"
         )
 
 
 def spent(system: System, state: State) -> str:
-    """Return a hint on the pairs whose friction was almost spent in the last equilibrium."""
+    """Return a hint on pairs that were close to their friction bound in the last equilibrium."""
     found = []
     for k, (interface, contact) in enumerate(zip(system.interfaces, state.contacts, strict=True)):
         pairing = system.pairing(state, k)
@@ -60,7 +61,7 @@ def spent(system: System, state: State) -> str:
         share = abs(float(contact.tangential.sum())) / most if most > 0 else 0.0
         if share > _SPENT:
             names = [system.all_names[k] for k in (interface.slave, interface.master)]
-            found.append(f"{' and '.join(names)} bears {share:.0%} of what it can")
+            found.append(f"{' and '.join(names)} was at {share:.0%} of its bound")
     return f"; just before, friction between {', '.join(found)}" if found else ""
 
 
@@ -69,12 +70,12 @@ def slide(
 ) -> Slide | None:
     """Return how a floating body slides under the normal forces of the candidates, if it does.
 
-    Looked at are motions along all closed contacts, which do not change normal forces at once.
-    Deformed surfaces are not quite straight: normal forces then take power too.
+    Only motions along all closed contacts are considered, which leave normal forces unchanged.
+    Deformed surfaces are not quite straight, so the power of normal forces counts too.
 
     Parameters
     ----------
-    residuals : external minus internal forces of each part, contact forces left out [N]
+    residuals : external minus internal forces of each part, without contact forces [N]
     """
     n = candidates.n
     N = candidates.forces[:n]

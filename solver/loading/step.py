@@ -1,4 +1,4 @@
-"""One Newton step: all parts at once, condensed to the contact points and solved there."""
+"""One Newton step of all parts: condensed to the contact points, and solved there."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class NewtonStep:
-    """Displacements of each part, contact forces and status, and whether pivoting found these."""
+    """Displacements of each part, contact forces, status, and whether pivoting was needed."""
 
     u: Vectors
     forces: NDArray[np.float64]
@@ -55,15 +55,16 @@ def newton_step(
     candidates: Candidates,
     contact: bool,
 ) -> NewtonStep | None:
-    """Return the step under given tangents, or None where no contact forces balance the load.
+    """Return the step for given tangents, or None if no contact forces balance the load.
 
     Parameters
     ----------
-    residuals : external minus internal forces of each part, contact forces left out [N]
-    contact : False leaves floating bodies where they are
+    residuals : external minus internal forces of each part, without contact forces [N]
+    operators : inverse tangent of each part
+    contact : False separates the bodies; bodies held by contact alone then stay where they are
     """
-    # add up all large forces before solving: the rest is small, and rounding of the factor, about
-    # 1e-16 (size of the body / smallest element)^2, acts on this rest alone
+    # sum all large forces before solving: the rest is small, and the rounding of the factor, about
+    # 1e-16 (size of the body / smallest element)^2, is relative to this rest
     held = on_parts(system, candidates, candidates.forces)
     balanced = [r + c for r, c in zip(residuals, held, strict=True)]
     W = candidates.compliance(operators)
@@ -106,20 +107,20 @@ def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
 
 
 def rounding(system: System, u: Vectors) -> float:
-    """Return how large out-of-balance forces can be that are rounding [N]."""
+    """Return the out-of-balance force that rounding can cause in all parts [N]."""
     each = zip(system.parts, u, strict=True)
     return float(np.hypot.reduce([part.rounding(ui) for part, ui in each]))
 
 
-def apart(system: System, candidates: Candidates) -> str:
-    """Return a message on bodies that contact alone holds and that no force holds; else empty."""
+def unheld(system: System, candidates: Candidates) -> str:
+    """Return a hint on bodies that only contact holds, and no contact force does; else empty."""
     floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
     if not floating or candidates.forces.any():
         return ""
     gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
     stands = (
-        f"stands {gap:.3g} mm apart: the load must push it towards the body that is to hold it"
+        f"has a gap of {gap:.3g} mm: the load must push it towards the body that is to hold it"
         if gap > system.touching
-        else "touches: the load must press it on, and push it along by less than friction bears"
+        else "touches: the load must press it on, and push it along by less than friction carries"
     )
     return f"; body {' and '.join(floating)} is held by contact alone and {stands}"

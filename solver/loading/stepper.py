@@ -1,4 +1,4 @@
-"""Goes from one converged state to a time in increments, halving those that fail."""
+"""Go from a converged state to a given time in increments; halve an increment that fails."""
 
 from __future__ import annotations
 
@@ -35,18 +35,16 @@ if TYPE_CHECKING:
 
 
 _NEAR = 8
-"""Ratio of the way to a load without equilibrium to the last part that failed, up to which it is
-that limit load."""
+"""Ratio of (excluded load - load reached) to the last increment that failed; up to it the failure
+is at the limit load."""
 _TURN = 0.1
 """Largest rotation of a rigid body in an increment [rad]."""
 _UNTIMED = 0.02
-"""Ratio of the friction that is not known to the largest friction, above which an increment is
-divided."""
+"""Ratio of the uncertain friction to the largest friction; above it an increment is divided."""
 _PASSAGE = 0.5
-"""Ratio of the way of a contact in an increment to its width, above which the increment is
-divided."""
+"""Ratio of a contact's motion in an increment to its width; above it an increment is divided."""
 _SHORTEST = 2.0**-6
-"""Shortest part into which it is divided."""
+"""Shortest fraction into which an increment is divided for these two reasons."""
 
 
 class Stepper:
@@ -55,11 +53,11 @@ class Stepper:
     Parameters
     ----------
     report : called after every increment
-    watch : (converged increment) -> what is kept of it
+    watch : (converged increment) -> value that is kept of it
 
     Attributes
     ----------
-    place : (time) -> words for it in messages
+    place : (time) -> text for this time in messages
     """
 
     def __init__(
@@ -89,10 +87,10 @@ class Stepper:
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
 
-        Stress that the bodies have before any load is brought to equilibrium first, each body by
-        itself. All this is done before any load acts, so that its failure is not taken for a limit
-        load. Raises `PathEnded` where overlapping bodies find no equilibrium, and `ModelError`
-        where an initial stress finds none.
+        Before that, the initial stress of each body is brought to equilibrium separately. All this
+        is done before any load acts, so that its failure is not mistaken for a limit load. Raises
+        `PathEnded` if overlapping bodies have no equilibrium, and `ModelError` if an initial stress
+        has none.
         """
         state = self.system.set_down(self.balanced(state), time)
         if self.system.overlaps(state):
@@ -112,9 +110,9 @@ class Stepper:
         return self._after(point, pushed, ())
 
     def _pushed_apart(self, state: State, time: float) -> Converged:
-        """Return the increment that undoes an overlap: without friction, for nothing was slid.
+        """Return the increment that removes an overlap, without friction: no slip has a history.
 
-        With friction where the load at the beginning finds no equilibrium without it.
+        Friction is used only if the load at the beginning has no equilibrium without it.
         """
         try:
             return Increment(
@@ -132,12 +130,12 @@ class Stepper:
         except IncrementFailed as failure:
             raise ModelError(
                 "initial_stress", "this field",
-                f"must be one that the material bears in equilibrium: {failure}",
+                f"must have an equilibrium within the strength of the material: {failure}",
             ) from failure  # fmt: skip
         return self.system.at_rest(balanced.state)
 
     def again(self, point: Point, time: float) -> Point:
-        """Return the first point of a further lap: wheels are set down, the rest waits for it."""
+        """Return the first point of a further lap: wheels are set down, other bodies unchanged."""
         state = point.now.state
         if self.system.moves:
             begun = self.begin(state, time, point.tally)
@@ -149,12 +147,12 @@ class Stepper:
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`.
 
-        An increment in which a rigid body turns too far is divided: a friction force that turns
-        with its surface would be missed. One that fails is halved. One that does not follow contact
-        well is halved too, and kept as it is where its halves fail; those after it grow again.
+        An increment in which a rigid body rotates too far is divided, because friction forces
+        rotate with its surface. An increment that fails is halved. One that resolves contact too
+        coarsely is halved too, but kept if its halves fail; later increments grow again.
 
-        The last part may fail so near to a limit load that nothing proves it there: then an earlier
-        one tells it, which failed not far ahead where no equilibrium can be.
+        The shortest increment may fail so close to a limit load that nothing proves it. An earlier,
+        longer one that failed at an excluded load close ahead then proves it.
         """
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
@@ -184,7 +182,7 @@ class Stepper:
                     continue
                 converged = coarse
             else:
-                # the forces of what is too coarse tell how large they become
+                # the forces of the coarse increment show how large they become
                 known = converged.timing.beside(known)
                 if _coarse(known) and size.divided(time - now):
                     coarse = converged
@@ -204,8 +202,8 @@ class Stepper:
     def _increment(self, point: Point, time: float, *, contact: bool, patient: bool) -> Converged:
         """Return the increment to a time or raise `IncrementFailed`.
 
-        Where straight surfaces have moved too far for small sliding in it, it is repeated with
-        surfaces that are paired anew, if that converges.
+        If straight surfaces have moved too far for small sliding in it, it is repeated with finite
+        sliding; the first solution is kept if that does not converge.
         """
         state = point.now.state
         guess = self._predict(point.past, state, time) if contact else None
@@ -232,9 +230,9 @@ class Stepper:
             return converged
 
     def elastic(self, point: Point, target: float) -> Point | None:
-        """Return the point at time ``target`` in one increment, None where something yields.
+        """Return the point at time ``target`` in one increment, or None if a point yields.
 
-        One increment is exact where the history of friction does not matter: no friction, or
+        One increment is exact if the history of friction does not matter: without friction, or with
         surfaces in full contact before loading, where everything is proportional to the load.
         """
         if not self.system.proportional:
@@ -249,7 +247,7 @@ class Stepper:
             ).solve()
         except (Yielded, IncrementFailed):
             return None
-        # the walk in steps finds at which load
+        # walking in increments finds at which load this happens
         if converged.beyond_end or followed(self.system, point.now.state, converged.state):
             return None
         converged = self._worked(point.now, converged)
@@ -259,8 +257,8 @@ class Stepper:
     def _predict(self, past: Sequence[State], now: State, time: float) -> State | None:
         """Return the state that is predicted for a time, or None.
 
-        Under a load that moves along a body the next state is not on the line through the last two:
-        where no earlier increment can be carried along with the load, there is no prediction.
+        Under a load that moves along a body extrapolation would be wrong: an earlier increment is
+        shifted along with the load, or, if none corresponds, there is no prediction.
         """
         if not self.system.moves:
             return extrapolate(past, now, time)
@@ -268,7 +266,7 @@ class Stepper:
             return self._predictor.predicted(past, now, time)
 
     def _worked(self, before: Converged, now: Converged) -> Converged:
-        """Return the increment ``now`` with the work since the lap began, and what it has lost."""
+        """Return the increment ``now`` with the work since the lap began and its loss of state."""
         with one_thread():
             energy, forgotten = worked(self.system, before, now), lost(self.system, before, now)
         timing = before.timing.then(now.timing)
@@ -300,11 +298,11 @@ class Stepper:
 
 
 class _StepSize:
-    """The step of increments to a target: halved where they fail, divided and growing again.
+    """The step of increments to a target: halved on failure, or divided and growing again.
 
     Attributes
     ----------
-    step : that of the next increment, with its sign
+    step : step in time of the next increment, with its sign
     """
 
     def __init__(self, whole: float, cuts: int) -> None:
@@ -314,30 +312,30 @@ class _StepSize:
 
     @property
     def shortest(self) -> bool:
-        """Whether an increment of this size that fails is not halved again."""
+        """Whether an increment of this size cannot be halved again."""
         return abs(self.step) < 2 * self._least * (1 - ROUNDING)
 
     def failed(self, step: float) -> bool:
-        """Halve a step; return whether one may be so short."""
+        """Halve a step after a failure; return whether the half is permitted."""
         self.step, self._grows = step / 2, False
         return abs(self.step) >= self._least * (1 - ROUNDING)
 
     def divided(self, step: float) -> bool:
-        """Halve a step that may grow again, if one may be so short; return whether it may."""
+        """Halve a step that may grow again, if the half is permitted; return whether it is."""
         if abs(step) / 2 < _SHORTEST * abs(self._whole) * (1 - ROUNDING):
             return False
         self.step, self._grows = step / 2, True
-        self._least = min(self._least, abs(self.step))  # what grows and fails comes back to this
+        self._least = min(self._least, abs(self.step))  # a larger step that fails returns to this
         return True
 
     def converged(self, step: float) -> None:
-        """Let the next step be twice this one, where steps may grow."""
+        """Double the next step, if steps may grow."""
         if self._grows:
             self.step = min(2 * step, self._whole, key=abs)
 
 
 def _coarse(timing: Timing) -> bool:
-    """Whether an increment follows contact too coarsely."""
+    """Whether an increment resolves contact too coarsely in time."""
     return timing.unknown > _UNTIMED or timing.passage > _PASSAGE
 
 
@@ -348,9 +346,9 @@ def _facing(state: State) -> frozenset[int]:
 
 
 def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:
-    """Return the state at ``time`` on the line through the last two, or None at a reversal.
+    """Return the state at ``time`` extrapolated from the last two, or None at a reversal.
 
-    None too where bodies have come apart: one that contact alone has held would move on for ever.
+    None too if bodies have lost contact: a body that only contact held would move without limit.
     """
     if not past or now.time == past[-1].time:
         return None

@@ -1,9 +1,9 @@
-"""How well one increment follows contact in time.
+"""How well one increment resolves contact in time.
 
-Friction counts the slip since a vertex touched. Where the rates of its approach are known, the time
-of touch is that at which the gap closes; in the first increment of a contact it is not known, and
-slip counts from the beginning of the increment. And a contact that moves farther along a surface
-than it is wide has passed vertices that never felt it. Smaller increments mend both.
+Friction depends on the slip since a vertex touched. If the rates of gap and slip are known, the
+time of touch is that at which the gap closes. In the first increment of a contact it is not known,
+and slip counts from the beginning of the increment. Also, a contact that moves by more than its
+width has passed over vertices that never carried force. Smaller increments reduce both errors.
 """
 
 from __future__ import annotations
@@ -29,10 +29,9 @@ if TYPE_CHECKING:
 def timing(system: System, start: State, candidates: Candidates, stiffness: Array) -> Timing:
     """Return the timing of an increment from ``start``.
 
-    ``stiffness`` is that of the contact points, elastic [N/mm]: no vertex has more friction than
-    its slip strains out of the bodies around it. The slip that counts is that which it would have
-    without friction: one that sticks from the beginning of the increment, before it touches, has
-    none, and has all of its shear from that.
+    ``stiffness`` (n or 2n,) is that of the contact points, elastic [N/mm]. It bounds the uncertain
+    friction of a vertex: elastic stiffness times the slip without friction. A vertex that sticks
+    from the beginning of the increment has no slip; its tangential force is added instead.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
@@ -57,10 +56,10 @@ def timing(system: System, start: State, candidates: Candidates, stiffness: Arra
 def _passed(
     interface: Interface, before: ContactState, at: NDArray[np.int64], normal: Array, slip: Array
 ) -> float:
-    """Return the force of a contact times its way along a surface / its width [N].
+    """Return the force of a contact times (its motion along a surface / its width) [N].
 
-    Along the slave that is the force that has gone from some vertices to others, which is none
-    where contact grows or shrinks; along the master it is the slip.
+    Along the slave that is the force that moved from some vertices to others; it is zero if contact
+    only grows or shrinks. Along the master the motion is the slip.
     """
     after = np.zeros_like(before.normal)
     after[at] = normal

@@ -1,8 +1,8 @@
-"""Walks programs over one system: lap by lap, stage by stage.
+"""Walk programs on one system, which means to solve them lap by lap, stage by stage.
 
 Programs that begin with the same increments share these: a **branch** starts from the state after
 the last increment that two programs have in common. The result of a program does not depend on the
-others that are walked with it: it is bit for bit that of a run by itself.
+others that are walked with it: it equals, bit for bit, that of the program walked alone.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged
-from solver.loading.bearing import unbearable
+from solver.loading.bearing import excess_shear
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
 from solver.loading.refinement import HALVINGS
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     Points = Mapping[str, Converged]
 
 _NOTHING = 1e-6
-"""Ratio of the plastic work of a lap to the plastic work so far, below which the lap counts as
-elastic."""
+"""Ratio of the plastic work of a lap to the plastic work so far; below it the lap is elastic."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +41,7 @@ class _Walk:
     """A walk so far.
 
     ``points`` are those of the present lap, ``work`` is the plastic work before it [N mm]; ``past``
-    are the points of the laps before, and whether anything yielded in them.
+    has the points of earlier laps, and whether anything yielded in them.
     """
 
     point: Point
@@ -58,9 +57,9 @@ class Walker:
 
     Parameters
     ----------
-    trace : (states at the ends of a lap's stages, by name) -> what is kept of the lap
-    refinement : how increments are halved; when absent, those of the program are used
-    watch : (converged increment) -> what is kept of it in `Outcome.history`
+    trace : (states at the ends of a lap's stages, by name) -> value kept in `Outcome.traces`
+    refinement : criterion by which increments are halved; without it the program's own are used
+    watch : (converged increment) -> value kept in `Outcome.history`
     report : called after every increment
     """
 
@@ -80,10 +79,10 @@ class Walker:
         self._stepper = Stepper(system, control, report, watch)
 
     def walk(self, programs: Sequence[Program]) -> Iterator[Outcome]:
-        """Yield the outcome of each program as soon as it is known.
+        """Yield the outcome of each program, in order, as soon as it is known.
 
-        The cost is least when each program shares as many increments as possible with the one
-        before it, as programs of increasing loads do.
+        The cost is least if each program shares as many increments as possible with the previous
+        one, as programs of increasing loads do.
         """
         last, settled = programs[0], Settled()
         self._stepper.place = last.place
@@ -115,19 +114,19 @@ class Walker:
                 points=walk.points,
                 traces=walk.traces,
                 history=walk.point.history,
-                error=walk.error or self._strangers(walk.point),
+                error=walk.error or self._never_facing(walk.point),
                 settled=settled,
             )
 
-    def _strangers(self, point: Point) -> NotConverged | None:
-        """Return the error that the surfaces of a pair have never faced each other."""
+    def _never_facing(self, point: Point) -> NotConverged | None:
+        """Return the error if the surfaces of a pair have never faced each other, else None."""
         for k, contact in enumerate(self._system.model.contacts):
             if k not in point.met:
                 slave, master = (".".join(side) for side in (contact.slave, contact.master))
                 time = point.now.state.time
                 return NotConverged(
                     f"{slave} and {master} were at no time opposite each other, so that they could "
-                    "not touch; check the boundaries, where the bodies are, and how they move",
+                    "not touch; check the boundaries, the positions of the bodies and their motion",
                     time, time,
                 )  # fmt: skip
         return None
@@ -138,13 +137,13 @@ class Walker:
             point = self._stepper.begin(self._system.initial(), program.laps[0].start, tally)
         except PathEnded as ended:
             return _Walk(point=ended.point, error=ended.error)
-        error = unbearable(self._system)
+        error = excess_shear(self._system)
         return _Walk(point=point, work=point.tally.plastic_work, error=error)
 
     def _directly(self, program: Program, start: _Walk | None) -> _Walk | None:
-        """Return the walk of a program in which nothing yields, in one increment; else None.
+        """Return the walk of a program in one increment if nothing yields, else None.
 
-        Without yielding, unloading restores the state before any load exactly.
+        Without yielding, unloading restores the unloaded state exactly.
         """
         proportional = program.retraces and not self._system.has_amplitude
         if not proportional or start is None or start.error is not None:
@@ -196,9 +195,9 @@ class Walker:
         return replace(walk, past=past, traces=traces)
 
     def _settle(self, program: Program) -> tuple[Settled, _Walk]:
-        """Walk the first lap with ever smaller increments, until its result no longer changes.
+        """Walk the first lap with smaller and smaller increments, until its result is constant.
 
-        Where smaller increments fail, the result of the larger ones is kept.
+        If smaller increments fail, the result of the larger ones is kept.
         """
         assert self._refinement is not None
         tolerance = self._refinement.tolerance
@@ -224,7 +223,7 @@ class Walker:
                 coarse = left
             elif not failed:
                 break
-            # the tally keeps the time that the larger increments have cost
+            # the tally keeps the time that the larger increments took
             tally = Tally(seconds=walk.point.tally.seconds)
         assert taken is not None
         return settled, taken

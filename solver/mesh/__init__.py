@@ -1,4 +1,4 @@
-"""Meshes: graded grids, shapes, the elements that cells may be, and which meshes are refused."""
+"""Meshes: graded grids, shapes, element types, and the check that refuses bad meshes."""
 
 from __future__ import annotations
 

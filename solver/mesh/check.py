@@ -1,8 +1,8 @@
-"""Checks of a mesh: it must be unfolded and whole, else `ModelError` names an element or a node.
+"""Checks of a mesh: elements must not be folded or overlap, and the mesh must be one piece.
 
-Unfolded: the Jacobian of an element keeps one sign, and neighbours lie on opposite sides of the
-edge they share. Whole: one piece, without cracks and hinges. Lengths are compared with edges
-nearby and with the rounding of coordinates, so that unit, grading and origin do not matter.
+The Jacobian of an element keeps one sign, and neighbours lie on opposite sides of their common
+edge. The mesh is connected through edges, without cracks and hinges. Lengths are compared with
+nearby edges and with the rounding of coordinates, so that unit, grading and origin do not matter.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 
     from solver.mesh.elements import ElementType
 
-# Least / greatest Jacobian of a folded element, and sine of the angle between the shortest and the
-# longest side of a flat one. Rectangles and right triangles of any shape pass.
+# Ratio of least to greatest Jacobian below which an element is folded, and sine of the angle
+# between shortest and longest side below which it is flat. Rectangles and right triangles pass.
 _FOLDED = 1e-6
-# Distance / shortest edge at a node, below which nodes count as one. Two nodes for one point are
-# far nearer; a notch narrower than this would close under load, and the solver would not notice.
+# Ratio of the distance of nodes to the shortest edge; below it they count as coincident. Duplicate
+# nodes are far closer. A narrower notch would close under load without contact in the model.
 _CLOSED = 1e-3
 _ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
 
 
 def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
-    """Raise `ModelError` unless the mesh of body ``name`` is unfolded and whole.
+    """Raise `ModelError` if the mesh of body ``name`` is folded, overlaps, or is not one piece.
 
-    Errors name elements and nodes by their numbers in the mesh.
+    Errors give the numbers of elements and nodes in the mesh.
     """
     where = f'of body "{name}"'
     _check_nodes(mesh, where)
@@ -106,8 +106,8 @@ def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> NDArray[np.flo
 def _check_neighbours(mesh: Mesh, where: str, sense: NDArray[np.float64]) -> None:
     """Refuse elements that overlap at an edge.
 
-    An element walked round counterclockwise is on the left of its edges: two neighbours on opposite
-    sides of their edge walk it in opposite directions.
+    Counterclockwise numbering puts an element on the left of its edges: two neighbours on opposite
+    sides of their common edge have opposite directions on it.
     """
     walked = np.where(mesh.t < np.roll(mesh.t, -1, axis=0), sense, -sense)
     count = np.bincount(mesh.t2f.ravel())
@@ -175,7 +175,7 @@ def _hanging(
 
 
 def _check_connected(mesh: Mesh, where: str) -> None:
-    """Refuse a mesh of several parts, and parts that meet at a node only."""
+    """Refuse a mesh of several parts, and parts that share only a node."""
     pairs, n = mesh.f2t[:, mesh.f2t[1] >= 0], mesh.nelements
     joined = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(n, n))
     parts, part = connected_components(joined, directed=False)
@@ -190,7 +190,7 @@ def _check_connected(mesh: Mesh, where: str) -> None:
     edges = np.bincount(mesh.facets[:, mesh.boundary_facets()].ravel())
     for node in np.flatnonzero(edges > 2)[:1]:
         allowed = (
-            f"at {_at(mesh, node)} is a hinge: parts of the body meet at this point alone; they "
-            "must share an edge, or be bodies of their own"
+            f"at {_at(mesh, node)} is a hinge: it alone connects two parts of the body; they "
+            "must share an edge, or be separate bodies"
         )
         _refuse(f"node {node}", where, allowed)

@@ -1,4 +1,4 @@
-"""The elements a body may be made of."""
+"""Element types by name, and how a new one is added."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solver.errors import ModelError
 from solver.parts import load_own_parts
 
 _NODES = {"tri": (3, 6), "quad": (4, 8, 9)}
-"""Nodes of an element: corners, those of the sides, one in the middle."""
+"""Permitted numbers of nodes of an element: at corners, on sides, in the middle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,8 +24,8 @@ class ElementType:
     ----------
     element : scalar scikit-fem element whose unknowns are values at its nodes: 3 or 6 of a
         triangle, 4, 8 or 9 of a quadrilateral
-    order : polynomial degree the default integration is exact for
-    full_order : the same for full integration
+    order : polynomial degree that the default integration integrates exactly
+    full_order : the same of full integration
     mean_dilatation : whether the volumetric strain is averaged over the element (B-bar)
     """
 
@@ -49,7 +49,7 @@ class ElementType:
             raise ModelError("element", name, "must have values at its nodes as unknowns")
         for field in ("order", "full_order"):
             if self.cells == "tri" and getattr(self, field) not in (1, 2, 4):
-                allowed = "must be 1, 2 or 4 on a triangle, whose points then carry a polynomial"
+                allowed = "must be 1, 2 or 4 on a triangle: stress recovery needs its points"
                 raise ModelError(field, getattr(self, field), allowed)
 
     @property
@@ -74,7 +74,7 @@ ELEMENTS: dict[str, ElementType] = {
 
 
 def add_element(name: str, kind: ElementType) -> None:
-    """Add an element under its name; a file of one's own does so (see `solver.parts`).
+    """Add an element under its name, usually in a user's own file (see `solver.parts`).
 
     Raises
     ------
@@ -88,7 +88,7 @@ def add_element(name: str, kind: ElementType) -> None:
 
 
 def known_elements() -> Mapping[str, ElementType]:
-    """Return the elements by name, those of files of one's own too."""
+    """Return the elements by name, including those of the user's own files."""
     load_own_parts()
     return ELEMENTS
 

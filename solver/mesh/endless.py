@@ -1,4 +1,4 @@
-"""The lines of the mesh of a track without ends: a window around the load, and what is far away."""
+"""Grid lines for a track without ends: a uniform window around the load, growing outside of it."""
 
 from __future__ import annotations
 
@@ -15,28 +15,30 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _AHEAD, _BEHIND, _DEEP = 3.0, 5.0, 4.0
-"""Reach of the window from the load / half-width. A window that ends 3 half-widths behind a load
-that pushes errs by 5 MPa in 500 near the surface, as rows at yield still flow there; elements that
-grow behind the load make them flow too much, and err by 30."""
+"""Extent of the window ahead of, behind and below the load, over the half-width. Only 3 half-widths
+behind a load with shear cause an error of 5 MPa in 500 near the surface, because points at yield
+still flow there. Elements that grow behind the load cause 30 MPa: points flow too much."""
 _FAR = 1600.0
-"""Distance of the sides and the bottom / half-width. Half of it moves stress by 1 MPa in 500."""
+"""Distance of the sides and the bottom, over the half-width. Half of it changes stress by 1 MPa in
+500."""
 _FAR_GROWTH = 2.0
-"""Ratio of neighbouring element sides outside the window: 0.1 MPa in 500, a sixth of the time."""
+"""Ratio of neighbouring element sides outside the window. It changes stress by 0.1 MPa in 500 and
+takes a sixth of the time of a fine mesh."""
 MOST_COLUMNS = 3000
-"""Most elements along the window."""
+"""Largest number of elements along the window."""
 
 
 def track_lines(
     half_width: float, element_size: float, growth: float, reach: float = 1.0
 ) -> tuple[Array, Array]:
-    """Return where the lines x = const and y = const of the mesh are [mm].
+    """Return the positions of the grid lines x = const and y = const [mm].
 
     Parameters
     ----------
-    half_width : of the contact [mm]
+    half_width : half-width of the contact [mm]
     element_size : side of the elements in the window [mm]
-    growth : ratio of neighbouring sides in depth
-    reach : how much longer and deeper the window is than usual
+    growth : ratio of neighbouring element sides in depth
+    reach : factor of the usual length and depth of the window
     """
     a, h = half_width, element_size
     ahead, behind = window_elements(a, h, reach)
@@ -48,11 +50,11 @@ def track_lines(
 
 
 def window_elements(a: float, h: float, reach: float = 1.0) -> tuple[int, int]:
-    """Return the elements of the window before and behind the load."""
+    """Return the numbers of elements in the window ahead of and behind the load."""
     ahead, behind = (math.ceil(each * reach * a / h) for each in (_AHEAD, _BEHIND))
     return ahead, behind
 
 
 def window_depth(a: float, reach: float = 1.0) -> float:
-    """Return how deep the window is [mm]."""
+    """Return the depth of the window [mm]."""
     return _DEEP * reach * a

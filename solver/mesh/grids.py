@@ -1,4 +1,4 @@
-"""Tensor grids: bent, joined, with cells taken out and boundaries named.
+"""Tensor grids, and operations on meshes: map, join, remove cells, name boundaries.
 
 A body takes any scikit-fem mesh with named boundaries, also one read with ``skfem.Mesh.load``
 (meshio).
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from skfem import Mesh, MeshQuad2
 
 _SAME = 1e-9
-"""Ratio of the distance to the size of a mesh, below which places are the same."""
+"""Ratio of a distance to the size of a mesh; below it two places are the same."""
 
 
 def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") -> Mesh:
@@ -51,17 +51,17 @@ def within(
     x: tuple[float, float] | None = None,
     y: tuple[float, float] | None = None,
 ) -> Mesh:
-    """Return a mesh with a boundary ``name``: the facets of others that lie in a box.
+    """Return a mesh with a new boundary ``name``: facets of other boundaries that lie in a box.
 
     Parameters
     ----------
     of : the other boundaries
-    x, y : from where to where the middles of its facets are [mm]; None is everywhere
+    x, y : limits of the box for the midpoints of the facets [mm]; None sets no limit
 
     Raises
     ------
     ModelError
-        for ``of``, where the mesh has no such boundary; for ``name``, where the box has no facet
+        for ``of``, if the mesh has no such boundary; for ``name``, if the box has no facet
     """
     known = mesh.boundaries or {}
     for other in of:
@@ -79,26 +79,26 @@ def within(
 
 
 def renamed(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
-    """Return a mesh whose only boundaries are some of its own, by new names: new -> old."""
+    """Return a mesh that keeps only some of its boundaries, with new names: new -> old."""
     known = mesh.boundaries or {}
     return replace(mesh, _boundaries={new: known[old] for new, old in names.items()})
 
 
 def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float]) -> Mesh:
-    """Return a mesh without the cells of a rectangle; the boundary this opens is ``name``.
+    """Return a mesh without the cells in a rectangle; the new boundary is called ``name``.
 
-    Other boundaries keep what is left of them. On the side of a body the rectangle is a notch,
-    inside it is a hole.
+    Other boundaries keep their remaining facets. A rectangle at the side of a body makes a notch,
+    one inside makes a hole.
 
     Parameters
     ----------
-    mesh : of straight cells, whose edges run along the sides of the rectangle
-    x, y : from where to where it goes [mm]; beyond the body is allowed
+    mesh : mesh of straight cells, with edges along the sides of the rectangle
+    x, y : limits of the rectangle [mm]; it may extend beyond the body
 
     Raises
     ------
     ModelError
-        no cell lies inside, none outside, or one lies across a side
+        if no cell lies inside, none outside, or a cell lies across a side
     """
     (low, high), corners = np.array([x, y], dtype=float).T[:, :, None], mesh.p[:, mesh.t]
     slack = _SAME * float(np.ptp(mesh.p, axis=1).max())
@@ -135,7 +135,7 @@ def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.floa
 def merged(mesh: MeshQuad2) -> MeshQuad2:
     """Return the mesh with coincident corners merged; boundary names are kept.
 
-    A grid bent until its ends meet becomes a closed ring: its ends are no boundary any more.
+    A grid bent until its ends coincide becomes a closed ring, whose ends are no longer a boundary.
     """
     from scipy.spatial import cKDTree
     from skfem import MeshQuad, MeshQuad2
@@ -162,7 +162,7 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
 
 
 def joined(blocks: Sequence[MeshQuad2]) -> MeshQuad2:
-    """Return quadratic meshes as one, without boundaries; nodes in one place are merged."""
+    """Return quadratic meshes joined to one, without boundaries; coincident nodes are merged."""
     from skfem import MeshQuad, MeshQuad2
 
     corners = [block.p[:, : block.nvertices] for block in blocks]

@@ -1,4 +1,4 @@
-"""Where the lines of a grid are: node positions along one direction."""
+"""Node positions along one direction of a grid."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _MOST = 1_000_000
-"""Elements that a line may be divided into."""
+"""Largest number of elements along a line."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> Array:
     """Return node positions from 0 to ``length``, growing geometrically from ``smallest``.
 
-    Element sizes are smallest, smallest * ratio, ... up to ``largest``; all are then scaled by
-    the one factor (below 1) that makes them fill ``length`` exactly, so the first one is never
-    larger than requested.
+    Element sizes are smallest, smallest * ratio, ... up to ``largest``. All are then scaled by one
+    factor, at most 1, so that they fill ``length`` exactly; the first one is never larger than
+    requested.
     """
     if not 0 < smallest <= length:
         raise ModelError("smallest", smallest, f"must be in (0, {length:g}] [mm]")
@@ -53,9 +53,9 @@ def continued(
     *,
     both: bool = False,
 ) -> Array:
-    """Return lines that go on for ``length`` beyond the last, growing as `graded` does [mm].
+    """Return grid lines extended by ``length`` beyond the last, graded as by `graded` [mm].
 
-    With ``both`` they go on before the first too.
+    With ``both`` they are extended before the first line too.
     """
     beyond = graded(length, smallest, ratio, largest)[1:]
     before = lines[0] - beyond[::-1] if both else lines[:0]
@@ -63,33 +63,34 @@ def continued(
 
 
 def cells(length: float, smallest: float, ratio: float, largest: float) -> Array:
-    """Return the middles of what `graded` divides ``length`` into, which no boundary meets."""
+    """Return the midpoints of the elements of `graded`: positions on no element boundary [mm]."""
     nodes = graded(length, smallest, ratio, largest)
     return (nodes[1:] + nodes[:-1]) / 2
 
 
 def closer(start: float, stop: float, num: int, near: float, size: float) -> Array:
-    """Return points from ``start`` to ``stop``, ``size`` apart at ``near``, farther away from it.
+    """Return points from ``start`` to ``stop`` with spacing ``size`` at ``near``, wider elsewhere.
 
-    The distances are those of a hyperbolic sine: equal close to ``near``, then in a constant
-    ratio. Points that are ``size`` apart or closer when spread evenly are spread evenly.
+    Positions follow a hyperbolic sine: the spacing is equal close to ``near``, then grows in a
+    constant ratio. If equal spacing is at most ``size``, the points have equal spacing.
 
     Parameters
     ----------
-    near : between start and stop [mm]
-    size : distance of points at ``near`` [mm]
+    num : number of points
+    near : position between start and stop [mm]
+    size : spacing of points at ``near`` [mm]
 
     Raises
     ------
     ModelError
-        for ``size``, where neighbouring distances would differ by more than a factor of two
+        for ``size``, if neighbouring spacings would differ by more than a factor of two
     """
     if (stop - start) / (num - 1) <= size:
         return np.linspace(start, stop, num)
     sides = np.array([start - near, stop - near])
 
     def needed(growth: float) -> float:
-        """Return the number of steps of a growth (logarithm of the ratio) that fill the length."""
+        """Return the number of spacings that fill the length; growth is the log of their ratio."""
         return float(np.ptp(np.arcsinh(sides * growth / size))) / growth
 
     low, high = 0.0, math.log(2)
@@ -109,15 +110,15 @@ def closer(start: float, stop: float, num: int, near: float, size: float) -> Arr
 def refined(
     points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
 ) -> Array:
-    """Return node positions through ``points``, elements growing away from each by ``ratio``.
+    """Return node positions through ``points``; elements grow away from each point by ``ratio``.
 
-    Between two points the elements grow from both, and meet where they are equally large.
+    Between two points elements grow from both, up to the position where both are equally large.
 
     Parameters
     ----------
     points : (n,) increasing positions, each a node [mm]
-    sizes : (n,) largest element beside each of them; inf leaves it to the others [mm]
-    ratio : of neighbouring element sides, above 1
+    sizes : (n,) largest element beside each point; inf sets no limit [mm]
+    ratio : ratio of neighbouring element sides, above 1
     largest : (n - 1,) largest element between neighbours [mm]
     """
     if not ratio > 1:
@@ -136,9 +137,9 @@ def refined(
 
 
 def _meeting(length: float, first: float, last: float, ratio: float) -> float:
-    """Return how far from the first end elements that grow from both ends are equally large.
+    """Return the distance from the first end at which elements from both ends are equally large.
 
-    Where a side grows by the ratio, it grows by ``ratio - 1`` for each unit of length.
+    A side that grows by ``ratio`` from element to element grows by ``ratio - 1`` per length.
     """
     if math.isinf(last):
         return length if math.isfinite(first) else 0.0

@@ -1,8 +1,7 @@
-"""Shapes meshed: rectangle, half-plane, pad, ring, fillet, disc and ball.
+"""Meshes of shapes: rectangle, half-plane, pad, ring, fillet, disc and ball.
 
-Each has its boundaries named. ``size`` is the largest side of an element; where something is
-`Near`, elements are as small as that says, and grow away from there by ``growth``, the ratio of
-neighbouring sides. Lengths are in mm.
+All have named boundaries. ``size`` is the largest element side. A `Near` sets a smaller side around
+a point; from there elements grow by ``growth``, the ratio of neighbouring sides. Lengths are in mm.
 """
 
 from __future__ import annotations
@@ -27,20 +26,18 @@ if TYPE_CHECKING:
     Pair = tuple[float, float]
 
 _MOST_ELEMENTS = 200_000
-"""Elements a shape may have."""
+"""Largest number of elements of a shape."""
 _SAME = 1e-9
-_CORE, _BULGE = 0.45, 0.15  # of a disc: half side of its middle square / radius, how round it is
+_CORE, _BULGE = 0.45, 0.15  # of a disc's middle square: half side / radius, and roundness
 _EXTENT = 6.0
-"""Side of the grid that is bent into the ball / radius: it leaves out a cap on the far side."""
-_FINE = 3.0  # most of a ball that is fine / radius
+"""Ratio of the side of the grid that is mapped onto the ball to the radius. The map leaves out a
+cap on the far side."""
+_FINE = 3.0  # largest ratio of the fine extent of a ball to its radius
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Near:
-    """Where a shape is meshed finely: elements have the side ``size`` within ``radius`` of ``at``.
-
-    All are in mm.
-    """
+    """A finely meshed region: elements have the side ``size`` within ``radius`` of ``at`` [mm]."""
 
     at: Pair
     size: float
@@ -84,7 +81,7 @@ def half_plane(
     symmetric: bool = False,
     cells: str = "quad",
 ) -> Mesh:
-    """Return a rectangle below y = 0, as deep as it reaches to either side; or its half x >= 0.
+    """Return a rectangle below y = 0, as deep as half its width; or its half x >= 0.
 
     Its boundaries are left, right, bottom and top.
     """
@@ -111,7 +108,7 @@ def pad(
     if not half < R:
         raise ModelError("radius", R, f"must be greater than {half:g}, half the width")
     if not R - math.sqrt(R**2 - half**2) < height:
-        raise ModelError("height", height, "must be greater than the arc is high")
+        raise ModelError("height", height, "must be greater than the height of the arc")
 
     def bent(X: Array) -> Array:
         arc = X[0] ** 2 / (R + np.sqrt(R**2 - X[0] ** 2))
@@ -130,7 +127,7 @@ def ring(
     growth: float = 1.3,
     near: Sequence[Near] = (),
 ) -> Mesh:
-    """Return what lies between two radii and between two angles [degrees].
+    """Return the sector between two radii and between two angles [degrees].
 
     Its boundaries are inner, outer, and, unless it is closed, start and end.
     """
@@ -146,7 +143,7 @@ def ring(
         if not r:
             raise ModelError("near", each.at, "must not be the centre of the ring")
         angle = start + (math.atan2(y, x) - start) % (2 * np.pi)
-        side = each.size / (r + each.radius)  # as large where the fine part is widest
+        side = each.size / (r + each.radius)  # the side is reached where the fine part is widest
         across.append((r, each.size, each.radius))
         turns = (angle, angle - 2 * np.pi, angle + 2 * np.pi)  # of a closed ring, both ends
         along += [(turn, side, each.radius / r) for turn in turns]
@@ -271,17 +268,17 @@ def ball(
     above: bool = True,
     symmetric: bool = False,
 ) -> Mesh:
-    """Return a disc that touches y = ``at[1]`` at ``at``, ever finer towards there.
+    """Return a disc that touches the line y = ``at[1]`` at ``at``, with finer elements there.
 
-    It lies above or below, as a section through a ball or a cylinder; where symmetric it is the
-    half x >= ``at[0]``, and ``left`` is its axis. A cap is left out on its far side, from 1.5 radii
-    away on the axis to 1.8 at the surface: its boundaries are ``cap`` and ``right``, and ``left``
-    of a whole one. That which touches is ``surface``.
+    It lies above or below the line, as a section through a ball or a cylinder. If ``symmetric`` it
+    is the half x >= ``at[0]``, and ``left`` is its axis. A cap is left out on its far side, from
+    1.5 radii away on the axis to 1.8 at the surface: its boundaries are ``cap`` and ``right``, and
+    for a whole disc ``left``. The boundary that touches the line is ``surface``.
 
     Parameters
     ----------
     size : side of the elements at ``at`` [mm]
-    fine : distance within which they have it [mm]
+    fine : distance from ``at`` up to which elements have this side [mm]
     growth : ratio of neighbouring sides beyond
     """
     _positive(radius=radius, size=size)
@@ -298,21 +295,21 @@ def ball(
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
-    """Return the lines from 0 on of the grid that is bent into a ball [mm]."""
+    """Return the positive grid lines of the grid that is mapped onto a ball [mm]."""
     return fine_lines(_EXTENT * radius, fine, size, growth)
 
 
 def fine_lines(extent: float, fine: float, size: float, growth: float) -> Array:
-    """Return lines from 0 to ``extent``: of one ``size`` as far as ``fine``, then growing [mm]."""
+    """Return lines from 0 to ``extent``: elements of ``size`` up to ``fine``, then growing [mm]."""
     even = np.linspace(0.0, fine, max(1, round(fine / size)) + 1)
     return continued(even, extent - fine, size, growth, extent / 4)
 
 
 def _onto_disc(x: Array, radius: float) -> Array:
-    """Return points (2, n), those of either half-plane mapped on a disc in it that touches y = 0.
+    """Map points (2, n) of a half-plane onto a disc in the same half-plane that touches y = 0.
 
-    The Moebius map ``w = z / (1 - i z / 2 R)`` leaves what is near the origin where it is, and
-    takes the line y = 0 to the circle. It keeps angles, so that squares stay squares.
+    The Moebius map ``w = z / (1 - i z / 2 R)`` hardly moves points near the origin, and maps the
+    line y = 0 to the circle. It keeps angles, so that squares stay nearly square.
     """
     side = np.where(x[1].mean() < 0, -1.0, 1.0)
     z = x[0] + 1j * side * x[1]
@@ -321,7 +318,7 @@ def _onto_disc(x: Array, radius: float) -> Array:
 
 
 def cap_area(radius: float) -> float:
-    """Return the area around the axis of the surface where the cap is left out [mm2]."""
+    """Return the surface area, around the axis, at which the cap of a ball is cut off [mm2]."""
     extent = _EXTENT * radius
     way, weight = np.polynomial.legendre.leggauss(60)
     along, weight = extent * (way + 1) / 2, extent * weight / 2
@@ -334,7 +331,7 @@ def cap_area(radius: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Spread:
-    """How elements spread along a direction: the largest side, and the ratio of neighbours."""
+    """Grading along one direction: the largest side, and the ratio of neighbouring sides."""
 
     size: float
     growth: float
@@ -351,9 +348,9 @@ class _Spread:
         near: Sequence[tuple[float, float, float]],
         through: Sequence[float] = (),
     ) -> Array:
-        """Return node positions over a span, fine near some positions: (position, side, radius).
+        """Return node positions over a span; ``near`` has (position, side, radius) of fine parts.
 
-        Of those it goes ``through``, each is a node.
+        Each position in ``through`` becomes a node.
         """
         start, end = span
         if not -math.inf < start < end < math.inf:
@@ -365,7 +362,7 @@ class _Spread:
         for at, side, radius in near:
             low, high = max(at - radius, start), min(at + radius, end)
             if low > high:
-                continue  # outside of this span: the elements nearest to it stay as they are
+                continue  # outside of this span: it has no effect
             for mark in (low, high):
                 marks[mark] = min(marks.get(mark, np.inf), side)
             fine.append((low, high, side))
@@ -380,7 +377,7 @@ class _Spread:
 
 
 def few(count: int) -> None:
-    """Raise `ModelError` for a mesh of too many elements."""
+    """Raise `ModelError` if a mesh has too many elements."""
     if count > _MOST_ELEMENTS:
         raise ModelError("size", f"{count} elements", f"at most {_MOST_ELEMENTS} elements")
 

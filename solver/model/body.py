@@ -1,4 +1,4 @@
-"""Body = mesh + element + kinematics + material + supports + loads, as the user declares it."""
+"""A deformable body as the user declares it: mesh, element, material, supports, loads."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ class Body:
     ----------
     name : unique in its model
     mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
-    material : its law, a `Material` or a law of your own (`solver.materials.Law`)
+    material : material law, a `Material` or a law of your own (`solver.materials.Law`)
     kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
     element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6``, ``tri3`` or one of your own
     full_integration : integrate by the element's ``full_order``: ``quad8`` with 3x3 points, not 2x2
-    thickness : of plane bodies [mm]
-    supports : boundary name -> the displacement components held, ``x``, ``y`` or ``xy``
+    thickness : thickness of plane bodies [mm]
+    supports : boundary name -> supported displacement components, ``x``, ``y`` or ``xy``
     pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]
     amplitude : load factor of the pressures over time; when absent, time is the load factor
     loads : further loads, each with an amplitude of its own (`solver.model.loads`)
-    condense : reduce the body to its contact surfaces where its material is elastic
+    condense : reduce the body to its contact surfaces if its material is elastic
     axle : makes an elastic body a wheel; its supports then hold it to the hub
     travelling : a pressure that moves along a boundary
     periodic : two straight boundaries, the second a copy of the first, shifted by one period along
-        x; the body repeats itself beyond them
+        x; the body is repeated beyond them
     """
 
     name: str
@@ -64,7 +64,7 @@ class Body:
     periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
-        # scikit-fem takes a third of a second to import: only who makes a body waits for it
+        # scikit-fem takes a third of a second to import, and is needed only when a body is made
         from solver.mesh.check import check_mesh
         from solver.mesh.elements import element_type
 
@@ -115,7 +115,7 @@ class Body:
 
     @property
     def box(self) -> np.ndarray:
-        """Sides (2,) of the box around the body [mm]."""
+        """Sides (2,) of the bounding box [mm]."""
         return np.ptp(self.mesh.p, axis=1)
 
     @cached_property
@@ -141,8 +141,8 @@ class Body:
     def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:
         """Return the facet numbers of a named boundary.
 
-        With ``outer`` they must lie on the outside of the body: pressure and contact act there
-        alone, while supports may hold facets inside. ``field`` is the input that an error names.
+        With ``outer`` they must lie on the outside of the body, as pressure and contact require;
+        supports may hold facets inside. ``field`` is the input that an error names.
         """
         known = self.mesh.boundaries or {}
         if boundary not in known or len(known[boundary]) == 0:

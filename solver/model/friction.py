@@ -1,9 +1,9 @@
-"""Laws of friction: the largest contact shear over the contact pressure.
+"""Friction laws: the largest contact shear as a function of the contact pressure.
 
-A law says it as lines ``slope * pressure + stress``, of which the least counts: a bound that is
-concave and piecewise linear, zero without pressure, and never falls. This is all that the contact
-problem, which is solved exactly, needs to know of friction. `Coulomb` is the law of the package; a
-law of one's own is a class in a file of one's own.
+A law gives lines ``slope * pressure + stress``; the least of them is the bound. This bound must be
+zero without pressure, concave, and must not decrease; it is piecewise linear. The contact problem,
+which is solved exactly, needs nothing else of friction. `Coulomb` is the law of the package; your
+own law is a class in a file of your own.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     Value = float | NDArray[np.float64]
 
 LEAST_FRICTION = 1e-10
-"""A coefficient of friction up to this value counts as zero. The forces it allows are below the
-tolerance of normal forces in the contact problem: a hundredth of the out-of-balance force and a
-thousandth of the contact violation that an increment may leave."""
+"""A coefficient of friction up to this value counts as zero. Its forces are below the tolerance of
+normal forces in the contact problem: a hundredth of the out-of-balance force, and a thousandth of
+the contact violation, that an increment permits."""
 _CONCAVE = 1e-12
-"""Rounding of slopes, relative to the steepest."""
+"""Tolerance of slopes for rounding, relative to the steepest."""
 
 
 class BoundLines(NamedTuple):
@@ -40,8 +40,8 @@ class BoundLines(NamedTuple):
 
     Attributes
     ----------
-    slope : of the lines [1]
-    level : of the lines without load: [MPa] where the load is a pressure, [N] where it is a force
+    slope : slopes of the lines [1]
+    level : values of the lines without load: [MPa] if the load is a pressure, [N] if a force
     """
 
     slope: Array
@@ -54,7 +54,7 @@ class BoundLines(NamedTuple):
 
     @classmethod
     def joined(cls, each: Sequence[BoundLines]) -> BoundLines:
-        """Return the lines of all places, one after the other."""
+        """Return the lines of several sets of places as one, in order."""
         ends = np.cumsum([0, *(lines.slope.shape[1] for lines in each)])
         most = max((len(lines.slope) for lines in each), default=1)
         whole = cls(np.zeros((most, ends[-1])), np.full((most, ends[-1]), np.inf))
@@ -65,15 +65,15 @@ class BoundLines(NamedTuple):
 
     @property
     def rough(self) -> NDArray[np.bool_]:
-        """Which places (n,) can bear shear."""
+        """Whether places (n,) can carry shear."""
         return np.asarray(self.least(np.ones(self.slope.shape[1])) > 0)
 
     def least(self, load: Array) -> Array:
-        """Return the bound (n,) under loads (n,)."""
+        """Return the bound (n,) for loads (n,)."""
         return np.asarray((self.slope * np.maximum(load, 0) + self.level).min(axis=0))
 
     def piece(self, load: Array) -> NDArray[np.int64]:
-        """Return which line (n,) is the least under loads (n,)."""
+        """Return the number (n,) of the line that is the least for loads (n,)."""
         return np.asarray((self.slope * load + self.level).argmin(axis=0))
 
     def at(self, places: NDArray[np.int64]) -> BoundLines:
@@ -81,7 +81,7 @@ class BoundLines(NamedTuple):
         return BoundLines(self.slope[:, places], self.level[:, places])
 
     def over(self, area: Array) -> BoundLines:
-        """Return the lines of force over force, from those of shear over pressure."""
+        """Return lines of force over force from lines of shear over pressure, for areas (n,)."""
         finite = np.isfinite(self.level)
         level = np.multiply(self.level, area, out=self.level.copy(), where=finite)
         return BoundLines(self.slope, level)
@@ -89,7 +89,7 @@ class BoundLines(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContactPlaces:
-    """What a law may ask of the n vertices of a slave; computed only where the law uses it.
+    """Values at the n vertices of a slave that a friction law may use; computed on first use.
 
     Attributes
     ----------
@@ -103,53 +103,53 @@ class ContactPlaces:
 
     @property
     def strength(self) -> Array:
-        """Initial shear yield stress (n,) of the weaker body, in heat that of the hot one [MPa].
+        """Initial shear yield stress (n,) of the weaker body at its temperature [MPa].
 
-        It is that at the end of the increment; inf between elastic bodies.
+        The temperature is that at the end of the increment; inf between elastic bodies.
         """
         return self.find_strength()
 
     @property
     def plastic_strain(self) -> Array:
-        """Accumulated plastic strain (n,) of the slave's surface as the increment begins."""
+        """Accumulated plastic strain (n,) of the slave's surface at the start of the increment."""
         return self.find_plastic_strain()
 
     @property
     def slip(self) -> Array:
-        """Sum of all slip (n,), forth and back, until the increment begins [mm]."""
+        """Accumulated length of slip (n,) in both directions at the start of the increment [mm]."""
         return self.find_slip()
 
 
 class FrictionLaw(ABC):
-    """A law of friction; one of one's own is a frozen dataclass that inherits from it."""
+    """A friction law; your own is a frozen dataclass that inherits from it."""
 
     __slots__ = ()
 
     @abstractmethod
     def bound(self, at: ContactPlaces) -> Sequence[tuple[Value, Value]]:
-        """Return the lines (slope, stress in MPa) whose least is the largest shear.
+        """Return the lines (slope [1], stress [MPa]); the least of them is the largest shear.
 
-        Each is a number, or an array (n,) of one for each vertex. What a law asks of the state is
-        that at the beginning of the increment: within it the lines do not change.
+        Slope and stress are numbers or arrays (n,) over the vertices. ``at`` has the state at the
+        beginning of the increment: within an increment the lines are constant.
         """
 
     @property
     def rough(self) -> bool:
-        """Whether it bears any shear; otherwise the tangential unknowns are left out."""
+        """Whether it permits any shear; otherwise the tangential unknowns are left out."""
         return True
 
     @property
     def proportional(self) -> bool:
-        """Whether its bound is proportional to pressure, always and everywhere the same."""
+        """Whether its bound is proportional to pressure, with the same factor everywhere."""
         return False
 
     def check_bodies(self, *, elastic: bool) -> None:
-        """Raise `ModelError` where it does not fit a pair of bodies, both ``elastic`` or not."""
+        """Raise `ModelError` if it does not suit the bodies; ``elastic`` says that both are."""
         del elastic
 
 
 FRICTION: Parts[FrictionLaw] = Parts("friction_law")
-"""Laws by the words that studies and scene files name them by."""
+"""Friction laws by the words that name them in studies and scene files."""
 
 
 @FRICTION.word("coulomb")
@@ -157,8 +157,8 @@ FRICTION: Parts[FrictionLaw] = Parts("friction_law")
 class Coulomb(FrictionLaw):
     """Coulomb's law with cohesion and a limit of shear; see `solver.ContactPair`.
 
-    Where the pressure is below the cohesion it stands in its place: a jump at no pressure would
-    leave many problems without a solution.
+    Cohesion is limited to the pressure, because a jump of the bound at zero pressure would leave
+    many problems without a solution.
     """
 
     friction: Friction = described(0.0, "Coulomb friction coefficient")
@@ -192,7 +192,7 @@ class Coulomb(FrictionLaw):
         return not (self._limited or self.cohesion)
 
     def check_bodies(self, *, elastic: bool) -> None:
-        """See `FrictionLaw`: a limit refers to a yield stress."""
+        """See `FrictionLaw`: a shear limit refers to a yield stress."""
         if elastic and self._limited:
             raise ModelError(
                 "shear_limit", self.shear_limit,
@@ -216,12 +216,12 @@ def effective_friction(friction: float) -> float:
 
 
 def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
-    """Return the lines of shear over pressure that a law gives, checked.
+    """Return the lines of shear over pressure of a law, after a check.
 
     Raises
     ------
     ModelError
-        naming the law, where its lines are no bound
+        naming the law, if its lines are no permitted bound
     """
     if not law.rough:
         return BoundLines.none(at.n)
@@ -245,14 +245,14 @@ def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
 
 
 def through(pressure: Sequence[float], shear: Sequence[float]) -> list[tuple[Value, Value]]:
-    """Return the lines of a bound through points [MPa]: those between neighbours.
+    """Return the lines of a piecewise linear bound through points (pressure, shear) [MPa].
 
-    The first point is (0, 0); beyond the last one the bound goes on along the last line.
+    The first point is (0, 0); beyond the last one the bound continues along the last line.
 
     Raises
     ------
     ModelError
-        if the points do not make a concave bound that never falls
+        if the points do not make a concave bound that does not decrease
     """
     p, s = np.asarray(pressure, dtype=float), np.asarray(shear, dtype=float)
     whole = p.shape == s.shape and p.ndim == 1 and len(p) > 1 and p[0] == s[0] == 0.0

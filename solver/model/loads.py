@@ -1,10 +1,10 @@
-"""Loads of a body, each with its own course over time.
+"""Loads of a body, each with its own amplitude over time.
 
-A kind of load is a class of `Load`, which gives what it needs to give: a force on a boundary, a
-force per volume, a strain without stress, a stress present before loading, a prescribed
-displacement, or a loss of stiffness and strength. The bodies are loaded with whatever the loads
-give; nothing else knows the kinds. Every load is given at load factor one. Its factor at a time is
-that of its amplitude; without an amplitude time is the load factor.
+A kind of load is a subclass of `Load` that overrides some of its methods: a force on a boundary, a
+force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, or a
+loss of stiffness and strength. The solver uses only these methods; no other code knows the kinds.
+Values are those at load factor 1. The load factor at a time is that of the amplitude; without an
+amplitude it is the time itself.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ _ALWAYS = Amplitude.constant(1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Load:
-    """What all loads have, and what a kind of load may give: it overrides what it gives.
+    """Base class of loads. A kind of load overrides the methods for what it applies.
 
-    Positions x are (2, n) [mm]. What a kind does not give is None.
+    Positions x are (2, n) [mm]. Methods that a kind does not override return None.
 
     Attributes
     ----------
     amplitude : load factor over time; when absent, time is the load factor
-    varies : whether a kind changes with time, and has an amplitude
-    outside : whether the boundaries of a kind must lie on the outside of the body
+    varies : whether loads of this kind change with time, and have an amplitude
+    outside : whether the boundaries of this kind must lie on the outside of the body
     """
 
     amplitude: Amplitude | None = None
@@ -79,7 +79,7 @@ class Load:
         return None
 
     def eigenstrain(self, x: Array) -> Array | None:
-        """Return the strain without stress, xx, yy, zz, xy (4, n), at positions x."""
+        """Return the eigenstrain, which causes no stress, xx, yy, zz, xy (4, n), at positions x."""
         del x
         return None
 
@@ -100,7 +100,7 @@ class Load:
 
 
 LOADS: Parts[Load] = Parts("kind", alike=False)
-"""Kinds of load by the word that scene files have for them."""
+"""Kinds of load by the words that name them in scene files."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -154,7 +154,7 @@ class Traction(BoundaryLoad):
 @LOADS.word("displacement")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Displacement(BoundaryLoad):
-    """A prescribed displacement of a boundary: ``x`` and ``y`` [mm], None where it is free."""
+    """A prescribed displacement of a boundary: ``x`` and ``y`` [mm]; None leaves it free."""
 
     x: float | None = None
     y: float | None = None
@@ -167,7 +167,7 @@ class Displacement(BoundaryLoad):
         return {axis: value for axis, value in given if value is not None}
 
     def check(self) -> None:
-        """Raise `ModelError` where no component is given, or one is not finite."""
+        """Raise `ModelError` if no component is given, or one is not finite."""
         if not self.components:
             raise ModelError(f"displacement.{self.boundary}", None, "must give x, y or both [mm]")
         for axis, value in self.components.items():
@@ -177,14 +177,14 @@ class Displacement(BoundaryLoad):
 @LOADS.word("temperature")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Temperature(Load):
-    """A rise of temperature, which lets the body expand, and may soften it.
+    """A temperature rise: thermal expansion, and optionally loss of stiffness and strength.
 
     Attributes
     ----------
     rise : a number, or a function (positions (2, n) [mm]) -> (n,) [K]
     expansion : coefficient of linear thermal expansion [1/K]
-    modulus_drop, yield_drop : shares of Young's modulus and of the yield stress that are lost for
-        each kelvin [1/K]. Every slope of the tension curve falls with Young's modulus
+    modulus_drop, yield_drop : relative loss of Young's modulus and of the yield stress per kelvin
+        [1/K]. Every slope of the tension curve decreases with Young's modulus
     """
 
     rise: float | Field
@@ -223,12 +223,12 @@ class Temperature(Load):
 class InitialStress(Load):
     """Stress present before any load, for instance from manufacture.
 
-    It is there from the beginning, and is brought to equilibrium before any load acts: what is not
-    in balance bends the body. Give no amplitude.
+    It is brought to equilibrium before any load acts; a field that is not in balance deforms the
+    body and changes. It has no amplitude.
 
     Attributes
     ----------
-    xx, yy, zz, xy : components of an even stress [MPa]
+    xx, yy, zz, xy : components of a uniform stress [MPa]
     stress : in place of them, a function (positions (2, n) [mm]) -> xx, yy, zz, xy (4, n) [MPa]
     """
 
@@ -242,11 +242,11 @@ class InitialStress(Load):
 
     @classmethod
     def on_grid(cls, x: Array, y: Array, stress: Array) -> InitialStress:
-        """Return the stress that was measured or computed on a grid, linear between its points.
+        """Return a stress given on a grid, for instance measured; it is interpolated linearly.
 
         Parameters
         ----------
-        x, y : (n_x,), (n_y,) positions, in order [mm]; the grid must hold the body
+        x, y : (n_x,), (n_y,) increasing positions [mm]; the grid must cover the body
         stress : (4, n_y, n_x) components xx, yy, zz, xy [MPa]
         """
         from scipy.interpolate import RegularGridInterpolator
@@ -266,12 +266,12 @@ class InitialStress(Load):
                 return np.asarray(along(at[::-1].T).T)
             except ValueError:
                 held = f"x {x[0]:g} to {x[-1]:g}, y {y[0]:g} to {y[-1]:g} mm"
-                raise ModelError(name, held, "the grid must hold the whole body") from None
+                raise ModelError(name, held, "the grid must cover the whole body") from None
 
         return cls(stress=between)
 
     def check(self) -> None:
-        """Raise `ModelError` where the stress is neither even nor a function of position."""
+        """Raise `ModelError` if the stress is neither uniform nor a function of position."""
         even = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
         for name, value in even.items():
             _finite(f"initial_stress.{name}", value, "MPa")
@@ -295,7 +295,7 @@ def _finite(field: str, value: object, unit: str) -> None:
 
 
 def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:
-    """Return an array of this shape that a load gives, or raise `ModelError`."""
+    """Return the value of a load's method as an array of this shape, or raise `ModelError`."""
     found = np.asarray(value, dtype=float)
     try:
         found = np.broadcast_to(found, shape)

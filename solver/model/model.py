@@ -1,4 +1,4 @@
-"""Model = bodies + contact pairs, checked as a whole."""
+"""A model: bodies and contact pairs, checked together."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ class ContactPair:
 
     Attributes
     ----------
-    slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear belong to the
-        vertices of the slave: around each of them the slave must not enter the master on average.
-        Choose as slave the surface that ends at a corner, else the one that is finer or yields.
-        They are exchanged where the slave cannot bear the forces (`solver.contact.slave`)
+    slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear are defined at the
+        vertices of the slave: the mean gap around each vertex must not be negative. Choose as slave
+        the surface that ends at a corner, else the finer one or the one that yields. They are
+        exchanged if the slave is unsuitable (`solver.contact.slave`)
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns. Or a law of friction (`FrictionLaw`)
-    cohesion : shear that contact carries beyond friction [MPa]: the shear is at most ``friction *
-        pressure + cohesion``; where the pressure is below the cohesion it stands in its place
-    shear_limit : largest contact shear / initial shear yield stress of the weaker body, at any
-        pressure; inf (default) sets no limit. Where heat lowers the yield stress (`Temperature`),
-        it is that of the surfaces at their temperature at the end of the increment. Where friction
-        could carry more than the material, the surface layer flows instead of slipping, and its
+    cohesion : shear that contact carries in addition to friction [MPa]: the shear is at most
+        ``friction * pressure + min(cohesion, pressure)``
+    shear_limit : ratio of the largest contact shear to the initial shear yield stress of the weaker
+        body, at any pressure; inf (default) sets no limit. If heat lowers the yield stress
+        (`Temperature`), that of the surfaces at the end of the increment counts. If friction
+        permits more shear than the material, the surface layer flows instead of slipping, and its
         strain grows as the mesh is refined
-    sliding : which point of the master a point of the slave meets, and along which normal.
-        ``small``: always the one it faces before loading, as if nothing moved; consistent with
-        small strains, and exactly linear between changes of status. ``finite``: the one it faces
-        as the bodies move and deform, found anew in every iteration. ``auto`` (default): ``finite``
-        where either surface is curved or bent before loading, else ``small`` until the surfaces
-        have moved too far for it (`solver.contact.drift`). Small sliding is wrong where surfaces
-        move along each other by more than an element, which the audit calls outside small-strain
-        theory, or curved ones by more than a hundredth of the contact's length, of which it warns
-    gap : by how much the surfaces stand farther apart than they are meshed [mm]
-    interference : by how much they overlap at load factor one, more than they are meshed [mm]: a
-        load, which pushes the bodies apart under friction
+    sliding : which point of the master belongs to a point of the slave, and along which normal.
+        ``small``: always the point it faces before loading; consistent with small strains, and
+        exactly linear between changes of status. ``finite``: the point it faces in the current
+        positions, paired again in every iteration. ``auto`` (default): ``finite`` if either surface
+        is curved or bent before loading, else ``small`` until the surfaces have moved too far for
+        it (`solver.contact.drift`). Small sliding is wrong if surfaces move along each other by
+        more than an element, which the audit calls outside small-strain theory, or curved ones by
+        more than a hundredth of the contact's length, of which it warns
+    gap : gap added to the distance of the surfaces as meshed [mm]
+    interference : overlap at load factor 1, in addition to that of the mesh [mm]: a load, which
+        pushes the bodies apart with friction
     amplitude : load factor of the interference; when absent, time is the load factor
     """
 
@@ -84,7 +84,7 @@ class ContactPair:
         return Coulomb(friction=self.friction, cohesion=self.cohesion, shear_limit=self.shear_limit)
 
     def offset(self, time: float) -> float:
-        """Return what is added at a time to the distance of the surfaces as meshed [mm]."""
+        """Return the gap added at a time to the distance of the surfaces as meshed [mm]."""
         factor = time if self.amplitude is None else self.amplitude.at(time)
         return self.gap - factor * self.interference
 
@@ -98,7 +98,7 @@ class Model:
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
     contacts : pairs of boundaries that may touch, of bodies of one thickness
-    singular : points beside which large strain does not put a result outside small-strain theory
+    singular : points around which large strain is not judged: it depends on the mesh
     """
 
     bodies: tuple[Body, ...]
@@ -135,7 +135,7 @@ class Model:
         for i, (slave, master) in enumerate(pairs):
             thickness = {name: self.body(name).thickness for name, _ in (slave, master)}
             if plane and len(set(thickness.values())) > 1:
-                allowed = "must join bodies of one thickness [mm]: both feel the same pressure"
+                allowed = "must join bodies of one thickness [mm]: the same pressure acts on both"
                 raise ModelError(f"contacts[{i}]", thickness, allowed)
             if self._overlap(slave, master):
                 allowed = f"shares facets with slave {slave}: must be another surface"
@@ -155,7 +155,7 @@ class Model:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Numbers of the materials that look like mistakes, such as a modulus in GPa."""
+        """Warnings about material parameters that look like mistakes, such as a modulus in GPa."""
         return doubts({body.name: body.material for body in self.bodies})
 
     def body(self, name: str, field: str = "body") -> Body | RigidBody:

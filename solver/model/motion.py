@@ -1,4 +1,4 @@
-"""Loads that move along a body: the axle of a wheel, or a travelling pressure."""
+"""Moving loads: the axle of a wheel, and a travelling pressure."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class Axle:
     Attributes
     ----------
     centre : (x, y) of the hub where the body is meshed [mm]
-    radius : of the rim [mm]; moments act as force at this radius
+    radius : radius of the rim [mm]; a moment counts as a force at this radius
     force : vertical force on the axle, positive when pressing down [N]
     moment : moment on the axle, positive counter-clockwise [N mm]
     position : position of the axle along x from where it was meshed [mm]
-    rotation : rotation of the hub, when it is prescribed instead of the moment [rad]
-    turned : rotation before the start, which brings the fine part of the rim to the track [rad]
+    rotation : prescribed rotation of the hub, in place of the moment [rad]
+    turned : rotation before the start, so that the fine part of the rim reaches the track [rad]
     """
 
     centre: tuple[float, float]
@@ -44,11 +44,11 @@ class TravellingPressure:
 
     Attributes
     ----------
-    boundary : name of the boundary it acts on
+    boundary : name of the boundary on which it acts
     half_width, peak : a [mm] and p0 [MPa]
     amplitude : factor of the pressure
     position : position of its centre along x [mm]
-    shear_ratio : shear along +x / pressure
+    shear_ratio : ratio of the shear along +x to the pressure
     """
 
     boundary: str
@@ -67,7 +67,7 @@ class TravellingPressure:
     ) -> tuple[NDArray[np.float64], float]:
         """Return the pressure at positions x [MPa] and the ratio of shear to it.
 
-        On a periodic body the pressure repeats itself after each ``period`` [mm].
+        On a periodic body the pressure is repeated after each ``period`` [mm].
         """
         amplitude, centre, ratio = self.now(time)
         away = x - centre
@@ -79,7 +79,7 @@ class TravellingPressure:
     def pushing(
         self, time: float, period: float = 0.0
     ) -> Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
-        """Return what it pushes with at a time, as `solver.model.loads.Load.push` does."""
+        """Return its traction at a time, as a function like `solver.model.loads.Load.push`."""
 
         def push(x: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
             pressure, ratio = self.at(time, x[0], period)

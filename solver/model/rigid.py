@@ -1,4 +1,4 @@
-"""Rigid bodies: surfaces that move as a whole, such as an indenter or a plate."""
+"""Rigid bodies, given by their surfaces, such as an indenter or a plate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _RIGID = Rigid()
 _TURN = 0.1
-"""Largest turn of an edge of an arc [rad]: its curvature is then right to 0.1 %."""
+"""Largest angle of one edge of an arc [rad]: its curvature then has an error of 0.1 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,21 +31,21 @@ class Moved(Load):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pushed(Load):
-    """A motion left free under a force [N] or a moment [N mm], given at load factor one."""
+    """A free motion with a force [N] or a moment [N mm] on it, given at load factor one."""
 
     value: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RigidSurface:
-    """A surface of a rigid body: a chain of points, the body on the left of one who walks along it.
+    """A surface of a rigid body: a chain of points with the body on its left.
 
     Attributes
     ----------
     points : (2, n) positions [mm]
     quadratic : whether every second point is the middle of a curved edge
     goes_on : whether the body continues smoothly beyond the start and the end; contact must not
-        reach such an end. On the axis of axisymmetric bodies it never does
+        reach such an end. It is ignored on the axis of axisymmetric bodies
     """
 
     points: NDArray[np.float64]
@@ -53,7 +53,7 @@ class RigidSurface:
     goes_on: tuple[bool, bool] = (False, False)
 
     def check(self, name: str) -> None:
-        """Raise `ModelError` where the points make no chain of edges."""
+        """Raise `ModelError` if the points do not make a chain of edges."""
         points = np.asarray(self.points, dtype=float)
         if points.ndim != 2 or points.shape[0] != 2 or points.shape[1] < 2 + self.quadratic:
             raise ModelError(f"surfaces.{name}", points.shape, "must be points (2, n), two or more")
@@ -63,7 +63,7 @@ class RigidSurface:
         if not np.isfinite(points).all():
             raise ModelError(f"surfaces.{name}", "nan or inf", "must be finite [mm]")
         if not np.linalg.norm(np.diff(points), axis=0).all():
-            raise ModelError(f"surfaces.{name}", "a point twice", "must be points apart [mm]")
+            raise ModelError(f"surfaces.{name}", "a point twice", "must be distinct points [mm]")
 
 
 def line(start: tuple[float, float], end: tuple[float, float], edges: int = 1) -> RigidSurface:
@@ -80,8 +80,8 @@ def arc(
 ) -> RigidSurface:
     """Return an arc of a circle from one angle to another [rad], a part of a larger surface.
 
-    Counter-clockwise the body is inside the circle. There are more than ``edges`` where these would
-    turn so far that they are no circle.
+    If the angles increase, the body is inside the circle. More than ``edges`` edges are used if
+    each would span more than `_TURN`.
     """
     least = int(np.ceil(abs(angles[1] - angles[0]) / _TURN))
     angle = np.linspace(*angles, 2 * max(edges, least) + 1)
@@ -96,11 +96,11 @@ class RigidBody:
     Attributes
     ----------
     name : unique in its model
-    surfaces : its contact surfaces by name
-    centre : the point (x, y) that displacements and moments refer to [mm]
-    x, y, rotation : its three motions, each prescribed (`Moved`; held where it is by default) or
-        free under a force or moment (`Pushed`); rotation is positive counter-clockwise
-    thickness : of plane bodies [mm]
+    surfaces : contact surfaces by name
+    centre : the point (x, y) to which displacements and moments refer [mm]
+    x, y, rotation : the three motions, each prescribed (`Moved`; zero by default) or free with a
+        force or moment on it (`Pushed`); rotation is positive counter-clockwise
+    thickness : thickness of plane bodies [mm]
     """
 
     name: str
@@ -134,7 +134,7 @@ class RigidBody:
 
     @property
     def material(self) -> Law:
-        """The law of what does not deform."""
+        """The law of a rigid material, which does not deform."""
         return _RIGID
 
     law = material
@@ -151,5 +151,5 @@ class RigidBody:
 
     @property
     def box(self) -> NDArray[np.float64]:
-        """Infinite: how far a rigid body reaches behind its surface is not known."""
+        """Sides (2,) of the bounding box: infinite, as only the surface of the body is known."""
         return np.full(2, np.inf)

@@ -1,4 +1,4 @@
-"""Points at which strain has no bound, such as a sharp corner in contact."""
+"""Singular points, at which strain is unbounded, such as a sharp corner in contact."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 class SingularPoint:
     """A point at which strain grows without bound as the mesh is refined.
 
-    What lies within its radius, in whichever body, is not the solution of the problem but that of
-    a mesh; small-strain theory is judged by what lies outside.
+    Strain within its radius, in any body, depends on the mesh. The audit judges small-strain theory
+    by the strain outside of it.
 
     Attributes
     ----------
     at : position (x, y) before loading [mm]
-    radius : how far it reaches [mm]: as far as nothing is read there, and at least over the
-        elements that meet in it, 1.5 of their sides
+    radius : radius within which no result is used [mm]; at least 1.5 sides of the elements that
+        share the point
     """
 
     at: tuple[float, float]

@@ -1,7 +1,7 @@
 """The elastic half-plane reduced to the nodes of its window, exactly.
 
-Outside the window plastic strain is that of layers. The stiffness that is left is sparse, apart
-from a dense block on the boundary of the window, and has a third of the unknowns.
+Outside the window plastic strain depends on depth alone. The condensed stiffness is sparse except
+for a dense block on the boundary of the window, and has a third of the unknowns.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 class CondensedTrack:
-    """The inverse of an elastic stiffness, for forces on some nodes and, slower, for all.
+    """The inverse of an elastic stiffness, for forces on the kept nodes and, slower, on all nodes.
 
     Parameters
     ----------
     part : the body
-    nodes : those kept; no support holds them
+    nodes : nodes that are kept; no support holds them
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class CondensedTrack:
         self._window.factorise(upper.data)
 
     def place(self, unknowns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return where unknowns of the body are among those kept."""
+        """Return the positions of unknowns of the body among the kept ones."""
         return np.searchsorted(self.kept, unknowns)
 
     def condense(self, force: Array) -> Array:
-        """Return the forces (m,) or (m, k) on what is kept, equivalent to all (n,) or (n, k)."""
+        """Return condensed forces (m, ...), equivalent to forces on all nodes (n, ...) [N]."""
         return self._outside.condense(force)
 
     def solve(self, force: Array) -> Array:
@@ -60,5 +60,5 @@ class CondensedTrack:
         return self._window.solve(force)
 
     def expand(self, kept: Array, force: Array) -> Array:
-        """Return all displacements (n,) from those kept (m,) and the forces on all nodes (n,)."""
+        """Return all displacements (n,) from the kept ones (m,) and the forces (n,)."""
         return self._outside.expand(kept, force)

@@ -49,7 +49,7 @@ def of_layers(track: Track, law: Law, layers: Layers) -> TrackFields:
 
 
 def under_load(track: Track, found: Pass) -> TrackFields:
-    """Return the fields while the load of a pass is there, which goes along +x."""
+    """Return the fields under the load of a pass, which moves along +x."""
     rows, before, after = track.rows, of_layers(track, found.law, found.before), found.after
     grown = after.plastic_strain - found.before.plastic_strain
     u = track.operator.expand(found.loading.u, rows.force_behind(grown))
@@ -72,7 +72,7 @@ def _passed(
     flow: PlasticState,
     after: Layers,
 ) -> PlasticState:
-    """Return internal variables with what rows have in the window, and have behind it."""
+    """Return internal variables of all points: before, in and behind the window."""
     n = rows.shape[1]
     packed = before.packed
     packed[:, every[:, :n]] = flow.packed
@@ -81,7 +81,7 @@ def _passed(
 
 
 def _sunk(track: Track, layers: Layers) -> Array:
-    """Return the displacements (n,) that layers give nodes, against those below all of them."""
+    """Return the nodal displacements (n,) of a layered state, relative to depth [mm]."""
     strain = layers.strain(track.elasticity)
     edges = np.append(0.0, np.cumsum(layers.thickness))
     u = np.zeros_like(track.part.X)

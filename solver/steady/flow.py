@@ -1,4 +1,4 @@
-"""What material gathers on its way along the rows of a window, and its derivative."""
+"""Plastic strain of material that flows along the rows of a window, and its derivative."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 INFLOW = 0.1
-"""Ratio of the plastic strain gathered where the window begins to that of the pass, up to which it
-is large enough. Rows that an earlier pass left at yield flow as soon as the load comes near,
-however large the window is; 5 % then change stress by 1 % of the yield stress."""
+"""Largest ratio of the plastic strain added in the first column of the window to that of the pass.
+Points that an earlier pass left at yield flow as soon as the load approaches, however large the
+window is; a ratio of 5 % changes stress by 1 % of the yield stress."""
 LEAST = 0.05
-"""Ratio of the plastic strain to the yield strain, up to which a pass gathers nothing to speak of.
-Its tenth is too much for the deepest row."""
+"""Ratio of the plastic strain of a pass to the yield strain; below it `INFLOW` refers to this
+level. The deepest row may have `INFLOW` times this level."""
 _COMPILED, _STEPPED = 16, 4
-"""Increments between two points of a row: the error is of first order in their length. Four cost a
-third of sixteen, and move stress by 1 MPa in 500 where points are 1/16 of the half-width apart."""
+"""Number of increments between two points of a row: the error is of first order in their length.
+Four cost a third of sixteen, and change stress by 1 MPa in 500 at a spacing of points of 1/16 of
+the half-width."""
 
 
 class Flow(Protocol):
-    """Material on its way along rows.
+    """The internal variables of material that flows along rows.
 
     Attributes
     ----------
     states : internal variables (..., n_rows, n_columns) at the columns
-    ago : the same at the beginning of the last increment before each column
-    after : (..., n_rows) left behind the load
+    ago : internal variables at the beginning of the last increment before each column
+    after : internal variables (..., n_rows) behind the load
     """
 
     states: PlasticState
@@ -51,25 +52,25 @@ class Flow(Protocol):
         """See above."""
 
     def along(self, added: Array) -> tuple[Array, Array]:
-        """Return the changes of plastic strain (n_rows, n_columns, 4), and left (n_rows, 4).
+        """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4).
 
         ``added`` is the change of strain (n_rows, n_columns, 4) at the columns.
         """
 
 
 def usual_parts(law: Law) -> int:
-    """Return the increments between two points of a row."""
+    """Return the usual number of increments between two points of a row."""
     return _COMPILED if isinstance(law, Material) else _STEPPED
 
 
 def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
-    """Return how material flows along rows; the law of linear hardening is compiled.
+    """Return the flow of material along rows; `Material` uses compiled code.
 
     Parameters
     ----------
-    strain : (n_rows, n_columns + 1, 4) Mandel, downstream; the first is that before the pass
+    strain : (n_rows, n_columns + 1, 4) Mandel, downstream; the first column is before the pass
     start : internal variables (..., n_rows) before the pass
-    parts : equal parts in which strain grows from one column to the next
+    parts : number of equal increments of strain from one column to the next
     """
     if isinstance(law, Material):
         return CompiledFlow(law, strain, start, parts)
@@ -77,7 +78,7 @@ def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
 
 
 class RowFlow:
-    """What material gathers on its way along the rows for given strains, and its derivative."""
+    """Plastic strain along all rows of a window for given strains, and its derivative."""
 
     def __init__(self, rows: FlowRows, law: Law, before: Layers, added: Array, parts: int) -> None:
         self._rows, self._law, self._before, self._added = rows, law, before, added
@@ -92,7 +93,7 @@ class RowFlow:
         )
 
     def surface(self) -> tuple[PlasticState, Layers]:
-        """Return the internal variables (..., n, n_columns) at the surface, and what is left there.
+        """Return the internal variables (..., n, n_columns) at the surface, and the layer behind.
 
         Its strain is that of the uppermost rows, extrapolated. Plastic strain changes too abruptly
         in depth for that; it follows from the strain, as on any row.
@@ -102,27 +103,27 @@ class RowFlow:
         return flow.states, replace(top, state=flow.after)
 
     def _of(self, before: Layers, added: Array) -> Flow:
-        """Return how rows flow."""
+        """Return the flow along rows with these states before and these added strains."""
         at_rest = before.strain(self._law.elasticity)[:, None]
         strain = np.concatenate([at_rest, at_rest + added], axis=1)
         return flow_of(self._law, strain, before.state, self._parts)
 
     @property
-    def gathered(self) -> float:
-        """The most accumulated plastic strain that any point gathers."""
+    def most_added(self) -> float:
+        """Largest accumulated plastic strain that the pass adds at a point."""
         return float((self.states.accumulated - self._before.accumulated[:, None]).max())
 
     @property
     def beyond(self) -> str:
-        """Where the window is too small: rows yield at its end already; empty if nowhere.
+        """Where the window is too small, because points yield at its edge; empty if nowhere.
 
-        Rows that an earlier pass left on the yield surface flow a little there.
+        Points that an earlier pass left on the yield surface may flow a little there.
         """
         before = self._before.accumulated
         ahead = (self.states.accumulated[:, 0] - before).max()
         below = self.after.accumulated[-1] - before[-1]
         nothing = LEAST * self._yield_strain
-        if ahead > INFLOW * max(nothing, self.gathered):
+        if ahead > INFLOW * max(nothing, self.most_added):
             return "ahead"
         return "below" if below > INFLOW * nothing else ""
 

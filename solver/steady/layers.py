@@ -31,10 +31,10 @@ class Layers:
 
     Attributes
     ----------
-    depth : (n,) of the rows of integration points, increasing [mm]
-    thickness : (n,) that each row stands for [mm]
-    state : internal variables of the law, of n points
-    surface : the same at depth zero, of no thickness; None for that layer itself
+    depth : (n,) depths of the rows of integration points, increasing [mm]
+    thickness : (n,) thickness of the layer of each row [mm]
+    state : internal variables of the law at the n depths
+    surface : the layer at depth zero, without thickness; None in that layer itself
     """
 
     depth: Array
@@ -60,7 +60,7 @@ class Layers:
 
     @property
     def whole(self) -> Layers:
-        """The layer at depth zero and those below, as one."""
+        """All layers together, the layer at depth zero first."""
         both = self.top, self
         depth, thickness = (
             np.concatenate([getattr(each, name) for each in both])
@@ -85,16 +85,16 @@ class Layers:
         return stress
 
     def displacement(self, elasticity: Elasticity) -> Array:
-        """Return the displacement (2,) of the surface against the depth [mm]."""
+        """Return the displacement (2,) of the surface relative to depth [mm]."""
         return np.array([self.advance, self.strain(elasticity)[:, 1] @ self.thickness])
 
     @property
     def advance(self) -> float:
-        """Displacement of the surface along x against the depth [mm]."""
+        """Displacement of the surface along x relative to depth [mm]."""
         return float(np.sqrt(2.0) * self.plastic_strain[:, 3] @ self.thickness)
 
     @property
     def mirrored(self) -> Layers:
-        """The same, seen along -x."""
+        """The same layers, seen along -x."""
         surface = self.surface.mirrored if self.surface else None
         return replace(self, state=self.state.mirrored, surface=surface)

@@ -1,4 +1,4 @@
-"""What passes over a track, as displacements that may depend on the shape of its surface."""
+"""Loads of a steady pass: forces and displacements that may depend on the surface's shape."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AppliedLoad:
-    """A load on a track whose m unknowns its operator keeps.
+    """A load on a track with n unknowns, of which the condensed stiffness keeps m.
 
     Attributes
     ----------
     force : (n,) nodal forces, on all nodes of the track [N]
-    u : (m,) displacements with it [mm]
-    along : their change (m,) for a change of those without it (m,)
+    u : (m,) displacements with the load [mm]
+    along : (change (m,) of the displacements without the load) -> change (m,) of ``u``
     """
 
     force: Array
@@ -31,29 +31,29 @@ class AppliedLoad:
 
 
 class PassingLoad(Protocol):
-    """Something that passes over a track along +x."""
+    """A load that passes over a track along +x."""
 
     def on(self, u: Array) -> AppliedLoad:
-        """Return the load on a track that has these displacements (m,) without it."""
+        """Return the applied load, given the displacements (m,) of the track without it."""
 
     def scaled(self, share: float) -> PassingLoad:
-        """Return the same load with a share of its forces."""
+        """Return the same load with its forces times ``share``."""
 
     def driven(self, share: float) -> PassingLoad:
-        """Return the same load, driven or braked by a share of its moment."""
+        """Return the same load with its driving or braking moment times ``share``."""
 
     @property
     def moment(self) -> float:
-        """Given moment that drives or, if positive, brakes it / radius [N]; 0 where none is."""
+        """Prescribed moment over radius [N], positive when braking; 0 if none is prescribed."""
 
     @property
     def slipping(self) -> PassingLoad:
-        """The same load, driven or braked by what full slip bears, if a moment does it."""
+        """The same load with the moment at which all of its contact slips, if it has a moment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Nodal forces (n,) [N] that depend on nothing, and the displacements (m,) they make [mm]."""
+    """Constant nodal forces (n,) [N], and the displacements (m,) that they cause [mm]."""
 
     force: Array
     u: Array
@@ -67,7 +67,7 @@ class Given:
         return Given(share * self.force, share * self.u)
 
     def driven(self, share: float) -> Given:
-        """See `PassingLoad`; its shear is no moment."""
+        """See `PassingLoad`; a given shear is not changed."""
         return self
 
     @property

@@ -1,15 +1,15 @@
-"""One steady pass: the strain that a load leaves and makes as it goes by, found by Newton's method.
+"""One steady pass: strains under and behind a moving load, by Newton's method.
 
-In the frame of the load nothing changes in time. With e the strains of what the pass adds to the
-displacements, at the points of the window, and ep(e) the plastic strain that material has gathered
-on its way along the rows, equilibrium is the fixed point
+In the frame of the load nothing changes in time. Let e be the strains that the pass adds, at the
+points of the window, and ep(e) the plastic strain of material that has flowed along the rows with
+these strains. Equilibrium is the fixed point
 
     e = Phi(e) = S load(u),   u = K^-1 f(ep(e) - ep before)
 
-with the elastic stiffness K, the same for every pass, and the nodal forces f that stand for plastic
-strain. A load adds the displacements that it makes; it may depend on those without it. Newton's
-equation (I - Phi') d = Phi(e) - e is solved by GMRES, Phi' by the derivative of the flow along the
-rows.
+with the elastic stiffness K, the same for every pass, and the nodal forces f equivalent to plastic
+strain. ``load(u)`` are the displacements with the load, given those without it, and S gives their
+strains. Newton's equation (I - Phi') d = Phi(e) - e is solved by GMRES; Phi' comes from the
+derivative of the flow along the rows.
 
 K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 """
@@ -39,26 +39,26 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 TOLERANCE = 1e-4
-"""Deviatoric strain of the residual, times 2 G, over the yield stress, at which a pass is found."""
+"""Largest deviatoric strain of the residual, times 2 G / yield stress, of a converged pass."""
 
 _FORCING = 0.1
-"""Relative error with which Newton's equation is solved."""
+"""Relative residual to which GMRES solves Newton's equation."""
 _KRYLOV, _MOST_KRYLOV = 60, 240
-"""Most solves for one step of Newton's: at first, and where that is too few."""
+"""Largest number of GMRES iterations for a step of Newton's method: at first, and if too few."""
 _STALLED = 0.98
-"""Ratio of residuals above which a step that was not solved to the end leads nowhere."""
+"""Ratio of a residual to the one before; above it a step that GMRES did not solve has stalled."""
 _FAR_FROM = 0.01
-"""Residual, over the first one, above which a pass is far from being found."""
+"""Ratio of the residual to the first one; above it a pass is far from convergence."""
 _STEPS = 60
 _SHORTEST = 1 / 32
-"""Least part of a Newton step."""
+"""Smallest share of a Newton step in the line search."""
 _AWAY = 3.0
-"""Growth of the residual that a whole step may cause."""
+"""Largest growth of the residual that a whole step may cause."""
 _FLOWS, _RUNS = 0.1, 1.0
-"""Plastic strain of a pass. A solve that stalls counts as a limit load above the first, any solve
-above the second. A material that hardens has no limit: there Newton's method has diverged."""
+"""A stalled solve counts as a limit load above the first plastic strain, any solve above the
+second. A material that hardens has no limit load: Newton's method has then diverged."""
 _PATIENCE, _PROGRESS = 14, 0.7
-"""After so many steps the residual must be smaller than this part of what it was."""
+"""Over this number of steps the residual must drop to this ratio, or the pass is given up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +67,17 @@ class Pass:
 
     Attributes
     ----------
-    law : of the material
-    parts : increments between two points of a row
-    before, after : state by depth, as the load sees it, which goes along +x
+    law : law of the material
+    parts : number of increments between two points of a row
+    before, after : state by depth, in the frame in which the load moves along +x
     strain : (n_rows, n_columns, 4) Mandel strain that the pass adds, at the points of the window
-    states : internal variables (..., n_rows, n_columns) there
-    ago : the same at the beginning of the last increment before each point
+    states : internal variables (..., n_rows, n_columns) at these points
+    ago : internal variables at the beginning of the last increment before each point
     surface : internal variables (..., n, n_columns) at the surface above the n uppermost rows
-    loading : the load on it
+    loading : the load on the track
     left_over : largest deviatoric strain of the residual
-    steps, solves : of Newton's method, of the stiffness
-    direction : 1 if the load goes along +x, -1 if it goes back
+    steps, solves : number of Newton steps, and of solves with the stiffness
+    direction : 1 if the load moves along +x, -1 if along -x
     """
 
     law: Law
@@ -105,13 +105,13 @@ class Pass:
         return self.states.accumulated
 
     @property
-    def gathered(self) -> float:
-        """The most accumulated plastic strain that any point gathers."""
+    def most_added(self) -> float:
+        """Largest accumulated plastic strain that the pass adds at a point."""
         return float((self.accumulated - self.before.accumulated[:, None]).max())
 
     @property
     def left(self) -> Layers:
-        """The state that the pass leaves, as one sees it who stands beside the track."""
+        """The state behind the pass, in the coordinates of the track: mirrored for direction -1."""
         return self.after if self.direction == 1 else self.after.mirrored
 
 
@@ -130,21 +130,21 @@ def passing(
     Parameters
     ----------
     track : the half-plane
-    material : its law
-    load : that passes
-    before : state by depth
-    guess : strains that a pass like this one adds
-    parts : increments between two points of a row, `usual_parts` if None
-    tolerance : on the strain of the residual
+    material : law of the half-plane
+    load : load that passes along +x
+    before : state by depth before the pass
+    guess : strains (n_rows, n_columns, 4) to start from, for instance of a similar pass
+    parts : number of increments between two points of a row, `usual_parts` if None
+    tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
 
     Raises
     ------
     LimitLoad
         if plastic strain grows without bound in a material that does not harden
     WindowTooSmall
-        if rows yield where the window begins, or the deepest one yields
+        if points yield in the first column of the window, or in its deepest row
     NotConverged
-        if no steady pass was found
+        if Newton's method does not converge
     """
     rows, solve = track.rows, track.operator.solve
     parts = parts or usual_parts(material)
@@ -199,11 +199,11 @@ def passing(
             (scale * here.residual).ravel(), rtol=_FORCING, restart=krylov, maxiter=1,
         )  # fmt: skip
         there = _along(at, here, found.reshape(shape) / scale)
-        gathered = there.flow.gathered
+        most_added = there.flow.most_added
         stalled = krylov == _MOST_KRYLOV and missed and there.size > _STALLED * here.size
         unsolved = here.size > _FAR_FROM * start
-        if gathered > _RUNS or (stalled and unsolved and gathered > _FLOWS):
-            raise _lost(material, gathered)
+        if most_added > _RUNS or (stalled and unsolved and most_added > _FLOWS):
+            raise _diverged(material, most_added)
         if missed:
             krylov = min(2 * krylov, _MOST_KRYLOV)
         here = there
@@ -216,7 +216,7 @@ def passing(
 
 @dataclass(frozen=True, slots=True)
 class _At:
-    """Where Newton's method is: strains, what they make, the residual and its norm."""
+    """An iterate of Newton's method: strains, flow and load with them, residual and its norm."""
 
     added: Array
     flow: RowFlow
@@ -226,17 +226,17 @@ class _At:
 
 
 def _along(at: Callable[[Array], _At], here: _At, change: Array) -> _At:
-    """Return where a step leads: the whole of it, or a part that makes the residual smaller.
+    """Return the iterate after a step, or after the largest share of it that lowers the residual.
 
-    The residual has kinks where points begin to yield. Where every part makes it larger, the whole
-    step is taken, which leaves the kink, unless it leads far away.
+    The residual has kinks where points begin to yield. If no share lowers it, the whole step is
+    taken to leave the kink, unless the residual grows by more than `_AWAY`.
     """
     tried = []
     length = 1.0
     while length >= _SHORTEST:
         try:
             there = at(here.added + length * change)
-        except NotConverged as error:  # no contact with such a shape
+        except NotConverged as error:  # no contact was found for this shape of the surface
             failure = error
         else:
             if there.size < (1 - 1e-4 * length) * here.size:
@@ -248,12 +248,12 @@ def _along(at: Callable[[Array], _At], here: _At, change: Array) -> _At:
     return tried[0] if tried[0].size < _AWAY * here.size else min(tried, key=lambda a: a.size)
 
 
-def _lost(material: Law, gathered: float) -> NotConverged:
-    """Return that Newton's method was led to this plastic strain, and found no pass there."""
+def _diverged(material: Law, most_added: float) -> NotConverged:
+    """Return the error for a pass whose plastic strain became too large in Newton's method."""
     if not material.hardens:
         return LimitLoad("plastic strain grows without bound in a steady pass")
     return NotConverged(
-        f"no steady pass was found up to a plastic strain of {gathered:.0%}, "
+        f"no steady pass was found up to a plastic strain of {most_added:.0%}, "
         "far beyond small strains; the material hardens, this is not its limit"
     )
 

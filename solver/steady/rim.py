@@ -1,4 +1,4 @@
-"""The rim of an elastic wheel, condensed once for all loads that it carries."""
+"""The rim of an elastic wheel, condensed once for all its loads."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class Rim:
 
     Parameters
     ----------
-    body : of the wheel, with its axle; its lowest point is above x = 0, and elements along the
-        rim are as long as those of the track
-    boundary : name of that part of the rim
+    body : the wheel, with its axle; its lowest point is at x = 0, and elements along the rim are as
+        long as those of the track
+    boundary : name of the part of the rim that may touch the track
 
     Attributes
     ----------
-    wheel : condensed to the rim
+    wheel : the wheel condensed to this part of the rim
     surface : the rim as a chain of edges
     """
 
@@ -43,18 +43,18 @@ class Rim:
         self.surface = self.wheel.surface(chain)
 
     def rolled(self, length: float) -> Array:
-        """Return the displacements (n,) by which a stiff wheel turns as it rolls over a length.
+        """Return the displacements (n,) of a rigid wheel that rolls over a length [mm].
 
-        Material goes along the arc. On its tangent it would leave a rim that touches at x by
-        ``length^2 / (2 R)``, and seem to slip by x / R of that: 2 % of the slip that brakes by
-        30 %, with elements of a quarter of the half-width.
+        Material moves along the arc. Along the tangent it would leave the rim by
+        ``length^2 / (2 R)``, and have an apparent slip of x / R of that at a contact at x: with
+        elements of a quarter of the half-width, 2 % of the slip at 30 % braking.
         """
         frame = self.wheel.frame
         arm = self.surface.X - frame.centre[:, None]
         return np.asarray((arm - turning(length / frame.radius) @ arm).T.ravel())
 
     def passing(self, d: Array) -> Array:
-        """Return the motion (n,) of material per arc, along a rim with displacements (n,)."""
+        """Return the derivative (n,) of positions by the arc, on a rim with displacements (n,)."""
         return self.wheel.passing(self.surface, d.reshape(-1, 2).T).T.ravel()
 
     @cached_property
@@ -67,8 +67,8 @@ class Rim:
 def flowed(surface: Surface, way: int) -> Array:
     """Return the matrix from a nodal field to its change over one element, from upstream.
 
-    ``way`` is +1 for a chain of edges that goes downstream. Where the chain begins upstream there
-    is no change.
+    ``way`` is +1 for a chain of edges that goes downstream. At the upstream end of the chain the
+    change is zero.
     """
     chain = np.append(surface.edges[:, [0, 2]].ravel(), surface.edges[-1, 1])
     chain = chain if way > 0 else chain[::-1]

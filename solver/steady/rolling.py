@@ -1,4 +1,4 @@
-"""Pass after pass of the same load over a track without ends."""
+"""Repeated passes of a load over a track without ends."""
 
 from __future__ import annotations
 
@@ -30,14 +30,15 @@ if TYPE_CHECKING:
 
 EXACT_AFTER = 4
 REPEATED = 1e-5
-"""After so many passes the tolerance is this one: small changes of many passes add up."""
+"""Tolerance after `EXACT_AFTER` passes: small errors of many passes add up."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What a load adds when it passes again: ``strain`` as last time, changed as it changed last.
+    """The strain that the next pass is expected to add, extrapolated from the last passes.
 
-    ``change`` (None after one pass) fades as it did: the ratio to the change before is ``kept``.
+    ``strain`` is that of the last pass, ``change`` its change from the pass before (None after one
+    pass), and ``kept`` the ratio of that change to the change before.
     """
 
     strain: Array
@@ -50,7 +51,7 @@ class Expected:
         return self.strain if self.change is None else self.strain + self.kept * self.change
 
     def after(self, strain: Array) -> Expected:
-        """Return what is expected after a pass that added this strain."""
+        """Return the expectation after a pass that added this strain."""
         change = strain - self.strain
         if self.change is None:
             return Expected(strain, change)
@@ -72,12 +73,12 @@ def rolling(
 
     Parameters
     ----------
-    track : with the elastic constants of the material
-    material : of the track
-    load : as it goes along +x; one for all passes, or one for each
-    directions : for each pass, 1 along +x, -1 back
-    guess : strains (n_rows, n_columns, 4) that the first pass adds, as a coarser mesh has them
-    parts : increments between two points of a row, as many as usual if None
+    track : the half-plane, with the elastic constants of the material
+    material : law of the track
+    load : load as it moves along +x; one for all passes, or one for each
+    directions : for each pass, 1 along +x, -1 along -x
+    guess : strains (n_rows, n_columns, 4) that the first pass adds, for instance of a coarser mesh
+    parts : number of increments between two points of a row, `usual_parts` if None
 
     Raises
     ------
@@ -86,7 +87,7 @@ def rolling(
     LimitLoad
         if plastic strain grows without bound
     NotConverged
-        if a pass is not found
+        if a pass does not converge
     """
     if material.elasticity != track.elasticity:
         raise ModelError(

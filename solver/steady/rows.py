@@ -1,8 +1,8 @@
-"""Rows of integration points along which material flows through a mesh that stands still.
+"""Rows of integration points along which material flows through a fixed mesh.
 
-The load goes along +x, material along -x. Around the load the mesh is uniform along x and yields;
-columns of points are numbered downstream. Behind that window the plastic strain is that of the
-last column, closed to the residual state, down to the left end of the mesh.
+The load moves along +x, so material flows along -x. In a window around the load the mesh is uniform
+along x and may yield; columns of points are numbered downstream. Behind the window, up to the left
+end of the mesh, plastic strain is that of the last column after unloading to the residual state.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LEVEL = 1e-6
-"""Ratio of the difference of depth to the depth of the rows, up to which points lie on one row."""
+"""Ratio of a difference of depth to the depth of the rows; up to it points lie on one row."""
 
 
 class FlowRows:
-    """The points of the window, and the strain that plastic strain there makes.
+    """The points of the window, their strains, and the forces equivalent to plastic strain.
 
     Parameters
     ----------
     part : the half-plane, made of quadrilaterals in rows; its top is y = 0
-    operator : the inverse of its elastic stiffness, which keeps m unknowns: all of the window
-    ahead, behind : the window reaches from x = -behind to x = ahead [mm]
-    deep : and down to this depth [mm]
+    operator : the inverse of its elastic stiffness, which keeps the m unknowns of the window
+    ahead, behind : the window extends from x = -behind to x = ahead [mm]
+    deep : depth of the window [mm]
     interleaved : make two rows of each, of every other column
 
     Attributes
     ----------
-    points : (n_rows, n_columns) their numbers
+    points : (n_rows, n_columns) numbers of the points in the window
     ahead, behind : (n_rows, n) numbers of the points before and behind the window, on these rows
     shape : n_rows, n_columns
-    depth : (n_rows,) increasing [mm]
-    uppermost : number of the rows that lie nearest to the surface
+    depth : (n_rows,) depths of the rows, increasing [mm]
+    uppermost : number of rows at the smallest depth
     weights : (n_rows, n_columns) volume of the points [mm3]
     """
 
@@ -88,7 +88,7 @@ class FlowRows:
         )
         each = self._force_of(downstream, self._strain_at(downstream))
         self._behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
-        # it acts on the boundary of the window alone
+        # condensed, this force acts only on the boundary of the window
         self._force_behind = sparse.csr_array(operator.condense(self._behind.toarray()))
 
     def virgin(self, law: Law) -> Layers:
@@ -99,7 +99,7 @@ class FlowRows:
 
     @property
     def every(self) -> NDArray[np.int64]:
-        """The points of each row all along the body (n_rows, n), in and beyond the window."""
+        """The points of each row along the whole body (n_rows, n), in and outside the window."""
         return np.hstack([self.points, self.ahead, self.behind])
 
     @cached_property
@@ -109,13 +109,13 @@ class FlowRows:
 
     @cached_property
     def above(self) -> NDArray[np.int64]:
-        """Where the points of the uppermost rows (n_uppermost, n) are among `highest`."""
+        """Positions of the points of the uppermost rows (n_uppermost, n) in `highest`."""
         return np.searchsorted(self.highest, self.every[: self.uppermost])
 
     def onto_surface(self, values: Array) -> Array:
-        """Return values (n, ...) at the surface, linear in depth, from those of rows (2 n, ...).
+        """Return values (n, ...) at the surface, extrapolated linearly from rows (2 n, ...).
 
-        ``n`` is the number of the uppermost rows.
+        ``n`` is the number of uppermost rows.
         """
         k = self.uppermost
         near, far = self.depth[0], self.depth[k]
@@ -128,7 +128,7 @@ class FlowRows:
         return float(np.ptp(corners))
 
     def _force_of(self, points: NDArray[np.int64], strain: sparse.csr_array) -> sparse.csr_array:
-        """Return the matrix from plastic strains at points to the forces that stand for them."""
+        """Return the matrix from plastic strains at points to equivalent nodal forces."""
         stiff = 2 * self.part.body.law.elasticity.shear_modulus
         weights = stiff * np.repeat(self.part.volumes[points].ravel(), 4)
         return sparse.csr_array(strain.T @ sparse.diags_array(weights))
@@ -150,7 +150,7 @@ class FlowRows:
         return np.asarray((self._strain @ u).reshape(*self.shape, 4))
 
     def interpolated(self, strain: Array, rows: FlowRows) -> Array:
-        """Return strains (n_rows, n_columns, 4) here from those at the points of other rows."""
+        """Return strains (n_rows, n_columns, 4) here, interpolated from those of other rows."""
         x, depth = (rows.part.points.reshape(2, -1)[k, rows.points] for k in (0, 1))
         here = self.part.points.reshape(2, -1)[:, self.points]
         along = RegularGridInterpolator(
@@ -159,17 +159,17 @@ class FlowRows:
         return np.asarray(along((here[1], here[0])))
 
     def force(self, flow: Array, behind: Array) -> Array:
-        """Return the nodal forces (m,) that stand for plastic strain, as those kept feel them.
+        """Return the condensed nodal forces (m,) equivalent to plastic strain [N].
 
         Parameters
         ----------
-        flow : (n_rows, n_columns, 4) in the window
-        behind : (n_rows, 4) all the way behind it
+        flow : (n_rows, n_columns, 4) plastic strain in the window
+        behind : (n_rows, 4) plastic strain everywhere behind it
         """
         return np.asarray(self._force @ flow.ravel() + self._force_behind @ behind.ravel())
 
     def force_behind(self, behind: Array) -> Array:
-        """Return the forces on all nodes (n,) that stand for plastic strain behind the window."""
+        """Return the forces on all nodes (n,) equivalent to plastic strain behind the window."""
         return np.asarray(self._behind @ behind.ravel())
 
 

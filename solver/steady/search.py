@@ -1,14 +1,14 @@
-"""A steady pass from whatever guess there is: directly, or by way of passes easier to find.
+"""Find a steady pass directly, or by continuation from passes that are easier to find.
 
-Where much flows at once, Newton's method may diverge though there is a pass. Then, in turn:
+If Newton's method fails although a pass may exist, try in turn:
 
-1. without contact forces to begin with: the same load with smaller moments first
-2. on a track that was not rolled: the same load on a material that hardens, as hardening fades to
-   its own; then a heavier load, and back
+1. if the first contact problem has no solution: the same load with smaller moments first
+2. on a track that was not rolled: the same load with more hardening, which is then reduced to that
+   of the material; then a heavier load, and back
 3. on a track that was rolled: lighter loads first
 
-Where friction asks for more shear than a material bears that does not harden, the contact flattens
-until it does; more than 30 % of plastic strain in a pass counts as the limit load.
+If friction exceeds the shear strength of a material without hardening, the contact flattens until
+it does not; more than 30 % of plastic strain in a pass counts as the limit load.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _HARDEST, _SOFTEST = 0.024, 1e-4
-"""Slopes of the uniaxial curve / Young's modulus, from which hardening fades away, and to which."""
+"""First and last hardening ratio, slope of the uniaxial curve over Young's modulus."""
 _STIFFEST = 0.3
-"""The largest one from which it fades to that of a material, where a pass of `_HARDEST` is not
-found at once. Without hardening such a load is beyond the limit, or too near to it."""
+"""Largest first hardening ratio, tried if no pass is found with `_HARDEST`, and only for a material
+that hardens. Without hardening such a load is above the limit, or too close to it."""
 _SHARE, _SLOWEST = 1 / 3, 0.8
-"""Ratio of one slope to the one before: at first, and where a pass is hard to find."""
+"""Ratio of one hardening ratio to the previous one: at first, and at most after failures."""
 _LARGE = 0.3
-"""Plastic strain that a pass gathers, above which a load is at its limit if the material does not
-harden: smaller elements make it more."""
+"""Plastic strain added in a pass; above it the load counts as the limit load of a material without
+hardening. It grows as elements become smaller."""
 _LIGHTER, _HEAVIER = (0.8, 0.9, 0.95), (1.1, 1.06, 1.03)
-"""Of a load, by which one approaches it."""
+"""Factors of the load in the passes that lead to it."""
 _PARTS, _TOLERANCE = 8, 2e-3
-"""How exactly these passes are found."""
+"""Increments between two points of a row, and tolerance, of passes with reduced hardening."""
 
 
 def search(
@@ -62,13 +62,15 @@ def search(
     parts: int | None = None,
     tolerance: float = TOLERANCE,
 ) -> Pass:
-    """Return the steady pass that `passing` finds, from the guess or from another one.
+    """Return the steady pass that `passing` finds, from this guess or by continuation.
+
+    Parameters are those of `passing`.
 
     Raises
     ------
     LimitLoad, WindowTooSmall, NotConverged
-        as `passing` does; a material that does not harden is at its limit where it adds more than
-        30 % of plastic strain
+        as `passing` does; `LimitLoad` also if a pass adds more than 30 % of plastic strain in a
+        material without hardening
     """
 
     def exactly(load: PassingLoad, guess: Array | None = None) -> Pass:
@@ -84,11 +86,11 @@ def search(
         own = material.hardening_ratio
     largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
-    if isinstance(found, NoContact):  # an elastic track makes another contact than it will have
+    if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
         found = _approached(exactly, load.driven, _LIGHTER, None, found)
     if isinstance(found, NoContact):
-        _not_spinning(exactly, load)
-    # on a track that was rolled, hardening would know of the strain that was gathered without it
+        _check_spinning(exactly, load)
+    # on a rolled track more hardening would act on strain that accumulated with less hardening
     if own < _HARDEST and not before.accumulated.any():
         if isinstance(found, NotConverged):
             found = _tried(_fading, partial(eased, load), partial(exactly, load), own, largest)
@@ -97,19 +99,19 @@ def search(
             begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
             found = _approached(exactly, load.scaled, _HEAVIER[1:], begun, found)
     else:
-        if guess is not None and isinstance(found, NotConverged):  # the guess may be a bad one
+        if guess is not None and isinstance(found, NotConverged):  # the guess may be unsuitable
             found = _tried(exactly, load)
         if isinstance(found, NotConverged):
             found = _approached(exactly, load.scaled, _LIGHTER, None, found)
     if isinstance(found, NotConverged):
         raise found
-    if found.gathered > largest:
-        raise _too_much(own)
+    if found.most_added > largest:
+        raise _excessive(own)
     return found
 
 
 def _linear(law: Law, ratio: float) -> Material:
-    """Return a material that yields where the law does first, and hardens by this ratio."""
+    """Return a material with the first yield stress of the law and this hardening ratio."""
     return Material(
         youngs_modulus=law.elasticity.youngs_modulus,
         poisson_ratio=law.elasticity.poisson_ratio,
@@ -119,33 +121,31 @@ def _linear(law: Law, ratio: float) -> Material:
     )
 
 
-def _too_much(ratio: float) -> LimitLoad:
-    """Return the limit of a load under which even a material of this hardening gathers too much."""
+def _excessive(ratio: float) -> LimitLoad:
+    """Return the error for a pass that adds too much plastic strain even with this hardening."""
     even = f", even if the material hardens by {ratio:.2g} of Young's modulus" if ratio else ""
     much = f"a steady pass adds more than {_LARGE:.0%} of plastic strain{even}"
     return LimitLoad(f"{much}: this counts as the limit")
 
 
-def _not_spinning(exactly: Callable[[PassingLoad], Pass], load: PassingLoad) -> None:
-    """Raise `Spins` where a wheel is turned by more than full slip bears.
+def _check_spinning(exactly: Callable[[PassingLoad], Pass], load: PassingLoad) -> None:
+    """Raise `Spins` if the moment on a wheel exceeds that of full slip.
 
-    That may be less than friction times load. Shear on a slope carries a part of the load, and
-    pressure shortens the rim, along which shear does its work.
+    Full slip may carry less than friction times load: shear on a slope carries a part of the load,
+    and pressure shortens the rim along which shear works.
     """
     most = _tried(exactly, load.slipping) if load.moment else None
     if most is None or isinstance(most, NotConverged):
         return
     assert isinstance(most.loading, RollingContact)
-    borne = most.loading.moment / load.moment
-    if borne < 1.0:
-        much = (
-            f"the wheel spins: where all of its contact slips, it bears {borne:.2%} of the moment"
-        )
-        raise Spins(much, borne, 1.0)
+    carried = most.loading.moment / load.moment
+    if carried < 1.0:
+        much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
+        raise Spins(much, carried, 1.0)
 
 
 def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
-    """Return a pass, or why it was not found; raise where only a larger window can help."""
+    """Return a pass, or the reason why it was not found; raise `WindowTooSmall`."""
     try:
         return solve(*given)
     except WindowTooSmall:
@@ -160,10 +160,17 @@ def _fading(
     own: float,
     largest: float,
 ) -> Pass:
-    """Return the pass to which those of fading hardening lead, in smaller steps where they must.
+    """Return the pass found by reducing the hardening ratio, in smaller steps if one fails.
 
-    None of them may gather more than ``largest``. Where the first one is not found, and the
-    material hardens, more hardening fades, with which less flows.
+    No pass may add more plastic strain than ``largest``. If the first pass is not found and the
+    material hardens, the reduction begins with a larger hardening ratio.
+
+    Parameters
+    ----------
+    eased : (hardening ratio, guess) -> pass
+    exactly : (guess) -> pass of the material
+    own : hardening ratio of the material, 0 if it does not harden
+    largest : largest plastic strain that a pass may add
     """
     ratio, share = _HARDEST, _SHARE
     stiffest = _STIFFEST if own else _HARDEST
@@ -183,8 +190,8 @@ def _fading(
             ratio, share = ratio / share, share**0.5
         elif last:
             return next_one
-        elif next_one.gathered > largest:
-            raise _too_much(ratio)
+        elif next_one.most_added > largest:
+            raise _excessive(ratio)
         else:
             found, share = next_one, max(share**2, _SHARE)
         ratio *= share
@@ -197,10 +204,9 @@ def _approached(
     begun: Pass | NotConverged | None,
     failure: NotConverged,
 ) -> Pass | NotConverged:
-    """Return the pass to which other shares of its load lead, or ``failure`` if one is not found.
+    """Return the pass found by changing the load through ``shares`` to 1, or ``failure``.
 
-    ``eased`` gives the load of a share; ``begun`` is the pass from which they begin, None for a
-    track at rest.
+    ``eased`` gives the load for a share; ``begun`` is the pass to start from, None for no guess.
     """
     found = begun
     for share in (*shares, 1.0):

@@ -1,12 +1,12 @@
-"""Material of any law flowing along rows of points, all rows together from column to column.
+"""Flow of a material with any law along rows of points: all rows together, column by column.
 
-The law is asked for every increment (`Law.respond`); nothing of it is known here but that its yield
-surface is convex: rows that are inside at both ends of a straight path of strain are inside all
-along it, and are not stepped.
+Every increment calls `Law.respond`. The only assumption on the law is a convex yield surface: a row
+that is inside at both ends of a straight strain path is inside all along it, and needs no
+increments.
 
-The derivative is carried from column to column too. That of a column is taken over one increment,
-by differences of the law by each of its internal variables and by strain. It leads Newton's method,
-and is not exact: what flows within a column flows in several increments.
+The derivative is propagated from column to column too. Within a column it is that of one increment,
+by differences with respect to each internal variable and to strain. It is not exact, since a column
+has several increments, but is good enough for Newton's method.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _STEP = 1e-6
-"""Step of the differences, over the largest value of a variable, or over the yield strain."""
+"""Ratio of the difference step to the largest value of a variable, or to the yield strain."""
 _AT_REST, _ALMOST = 1e-11, 1e-8
-"""Stress across planes y = const / yield stress that is nothing: as wanted, and where rounding lets
-a law come no nearer."""
+"""Ratio of the stress on planes y = const to the yield stress that counts as zero: as desired, and
+as accepted if rounding in a law prevents more."""
 _CLOSING = 60
-"""Most steps of Newton's method to rest."""
+"""Largest number of steps of Newton's method for the state behind the load."""
 _FREE = np.array([1, 3])
 """Components yy and xy, whose strain follows from stress at rest."""
 
 
 class _Left(NamedTuple):
-    """What rows are left with: internal variables, and strain (4, n_rows)."""
+    """The state of rows behind the load: internal variables, and strain (4, n_rows)."""
 
     state: PlasticState
     strain: Array
 
 
 class SteppedFlow:
-    """Material on its way along rows; see `solver.steady.flow.Flow`."""
+    """Flow of a material with any law along rows; see `solver.steady.flow.Flow`."""
 
     def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
         self._law, self._start = law, start
@@ -122,7 +122,7 @@ class SteppedFlow:
         base = after(given)
         out = np.zeros((before.shape[1], n, n + 4))
         for k, step in enumerate(self._scale):
-            if step:  # what was never there does not change
+            if step:  # a variable that is zero everywhere does not change
                 moved = given.copy()
                 moved[k] += step
                 out[:, :, k] = ((after(moved) - base) / step).T
@@ -130,7 +130,7 @@ class SteppedFlow:
 
     @cached_property
     def _columns(self) -> list[Array]:
-        """Derivatives of the rows that flow in each column, by what they had and by its strain."""
+        """Derivatives of the flowing rows in each column by previous variables and by strain."""
         upstream = np.concatenate([self._start.packed[..., None], self._packed[..., :-1]], axis=2)
         before = [upstream[:, at, column] for column, at in enumerate(self._flowing)]
         strain = [self._strain[:, at, column + 1] for column, at in enumerate(self._flowing)]
@@ -139,7 +139,7 @@ class SteppedFlow:
 
     @cached_property
     def _closing(self) -> Array:
-        """Derivative (n_rows, 4, n) of the plastic strain that is left, by the last column's."""
+        """Derivative (n_rows, 4, n) of the plastic strain behind by the last column's variables."""
         slopes = self._slopes(self._packed[..., -1], self._left.strain)[:, :4]
         n = slopes.shape[2] - 4
         C = self._law.stiffness(4)
@@ -149,19 +149,19 @@ class SteppedFlow:
 
 
 def _at_rest(law: Law, state: PlasticState) -> _Left:
-    """Let rows come to rest behind the load, where no stress acts on planes y = const.
+    """Return the state of rows behind the load, where no stress acts on planes y = const.
 
-    The strains along x and z go back to zero, in one increment. A row that would be at rest outside
-    the yield surface flows on its way there.
+    The strains along x and z return to zero in one increment. If the unloaded stress of a row is
+    outside the yield surface, the row flows.
 
-    1. strain of rest without flow
+    1. strain at rest, if nothing flows
     2. Newton's method for the strains yy and xy, with the tangent of the law; a step that does not
-       lessen the stress is halved
+       reduce the stress is halved
 
     Raises
     ------
     NotConverged
-        where no such strain is found
+        if no such strain is found
     """
     nu = law.elasticity.poisson_ratio
     flowed = state.plastic_strain
@@ -186,13 +186,13 @@ def _at_rest(law: Law, state: PlasticState) -> _Left:
         turned = _solved(tangent, stress.T[..., None])[..., 0].T
         step[_FREE] = np.where(better, turned, step[_FREE])
     if not (least < _ALMOST * law.yield_stress).all():
-        raise NotConverged("what a steady pass leaves does not come to rest")
+        raise NotConverged("no residual state was found behind a steady pass")
     return _Left(law.respond(found, state).state, found)
 
 
 def _solved(matrices: Array, right: Array) -> Array:
-    """Return the solutions (n, 2, m) of systems (n, 2, 2), or raise where one has none."""
+    """Return the solutions (n, 2, m) of systems (n, 2, 2), or raise `NotConverged`."""
     try:
         return np.asarray(np.linalg.solve(matrices, right))
     except np.linalg.LinAlgError:
-        raise NotConverged("what a steady pass leaves has no stiffness across") from None
+        raise NotConverged("the residual state behind a steady pass has no stiffness") from None

@@ -1,8 +1,8 @@
-"""Material flowing along rows of points: the radial return from point to point, compiled.
+"""Flow of a material along rows of points: the radial return from point to point, compiled.
 
-Every row starts with the state before the pass and meets the strains of its points one after the
-other. The derivative is carried along in the same way. The law is the one of `radial_return`, von
-Mises with linear isotropic and kinematic hardening, on deviators: plastic strain is one.
+Every row starts with the state before the pass and takes the strains of its points one after the
+other. The derivative is propagated in the same way. The law is that of `radial_return`, von Mises
+with linear isotropic and kinematic hardening, written in deviators.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class CompiledFlow:
-    """Material of linear hardening on its way along rows; see `solver.steady.flow.Flow`."""
+    """Flow of a material with linear hardening along rows; see `solver.steady.flow.Flow`."""
 
     def __init__(self, law: Material, strain: Array, start: PlasticState, parts: int) -> None:
         rule, elasticity = law.hardening_rule, law.elasticity
@@ -64,9 +64,9 @@ class CompiledFlow:
 
 @njit(cache=True)
 def _return(strain, plastic, accumulated, law, step):  # type: ignore[no-untyped-def]
-    """Bring `plastic` (4,) to the end of an increment to `strain`; return the accumulated strain.
+    """Update `plastic` (4,) by an increment to `strain`; return the accumulated strain.
 
-    `step` (6,) receives the direction of flow, the multiplier and the size of the trial.
+    `step` (6,) receives the flow direction, the multiplier and the norm of the trial stress.
     """
     double_shear, kappa, Hi, modulus, Re = law
     mean = (strain[0] + strain[1] + strain[2]) / 3.0
@@ -91,7 +91,7 @@ def _return(strain, plastic, accumulated, law, step):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _return_along(strain, plastic, accumulated, law, step):  # type: ignore[no-untyped-def]
-    """Bring the derivatives `plastic` (4,) and `accumulated` through the same increment."""
+    """Update the derivatives `plastic` (4,) and `accumulated` by the same increment."""
     gamma = step[4]
     if gamma == 0.0:
         return accumulated
@@ -115,10 +115,10 @@ def flow(strain, plastic, accumulated, law, parts):  # type: ignore[no-untyped-d
 
     Parameters
     ----------
-    strain : (n_rows, n_columns + 1, 4) Mandel, downstream; the first is that before the pass
+    strain : (n_rows, n_columns + 1, 4) Mandel, downstream; the first column is before the pass
     plastic, accumulated : (n_rows, 4) and (n_rows,), before the pass
     law : 2 G, 2 G + 2/3 Hk, Hi, 2 G + 2/3 H, Re [MPa]
-    parts : equal parts in which strain grows from one column to the next
+    parts : number of equal increments of strain from one column to the next
 
     Returns
     -------
@@ -147,11 +147,11 @@ def flow(strain, plastic, accumulated, law, parts):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def flow_along(strain, law, steps):  # type: ignore[no-untyped-def]
-    """Return the derivatives of what `flow` gives along a change of strain.
+    """Return the changes of the results of `flow` for a change of strain.
 
     Parameters
     ----------
-    strain : (n_rows, n_columns, 4) change of strain at the columns; upstream there is none
+    strain : (n_rows, n_columns, 4) change of strain at the columns; upstream it is zero
     steps : from `flow`
 
     Returns
@@ -181,10 +181,10 @@ def flow_along(strain, law, steps):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
-    """Let rows come to rest behind the load, where no stress acts on planes y = const.
+    """Return the state of rows behind the load, where no stress acts on planes y = const.
 
-    The strains along x and z go back to zero. A row that would be at rest outside the yield
-    surface flows on its way there.
+    The strains along x and z return to zero. If the unloaded stress of a row is outside the yield
+    surface, the row flows.
 
     Parameters
     ----------
@@ -235,9 +235,9 @@ def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def close_along(plastic, accumulated, law, steps, inverses):  # type: ignore[no-untyped-def]
-    """Return the derivative of the plastic strain (n_rows, 4) that `close` gives.
+    """Return the change of the plastic strain (n_rows, 4) of `close`.
 
-    `plastic` (n_rows, 4) and `accumulated` (n_rows,) change at the last column.
+    `plastic` (n_rows, 4) and `accumulated` (n_rows,) are the changes at the last column.
     """
     double_shear = law[0]
     out = np.empty_like(plastic)

@@ -1,4 +1,4 @@
-"""What acts on a track while an elastic wheel stands on it."""
+"""The contact of an elastic wheel with a track: forces, pressure, shear, gap, slip."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RollingContact(AppliedLoad):
-    """A wheel on a track.
+    """The contact of a wheel with a track.
 
     Attributes
     ----------
     x : (n,) positions of the vertices of the track [mm]
-    normal, tangential : (n,) contact forces on the track, tangential ones along the surface
-        against the way of the load [N]
-    area : (n,) of the hats of the vertices [mm2]
-    gap : (n,) between track and rim, NaN where none faces the other [mm]
-    status : (n,) of the contact points
-    bound : (n,) of the tangential forces [N]
+    normal, tangential : (n,) contact forces on the track; tangential forces are positive against
+        the motion of the load [N]
+    area : (n,) areas of the vertices' hats [mm2]
+    gap : (n,) gap between track and rim, NaN if they do not face each other [mm]
+    status : (n,) status of the contact points, as in `solver.contact.problem`
+    bound : (n,) friction bound of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
-    height : displacement of the axle [mm]
-    moment : on the axle / radius, positive when braking [N]
+    height : displacement of the axle along y [mm]
+    moment : moment on the axle over radius, positive when braking [N]
     """
 
     x: Array
@@ -46,17 +46,17 @@ class RollingContact(AppliedLoad):
 
     @property
     def pressure(self) -> Array:
-        """Contact pressure at the vertices (n,), zero where none faces the rim [MPa]."""
+        """Contact pressure at the vertices (n,) [MPa], zero at those that do not face the rim."""
         return self._over_area(self.normal)
 
     @property
     def most_shear(self) -> Array:
-        """Shear that friction allows at the vertices (n,) [MPa]."""
+        """Largest shear that friction permits at the vertices (n,) [MPa]."""
         return self._over_area(np.nan_to_num(self.bound))
 
     @property
     def shear(self) -> Array:
-        """Shear on the track at the vertices (n,), against the way of the load [MPa]."""
+        """Shear on the track at the vertices (n,), positive against the load's motion [MPa]."""
         return self._over_area(self.tangential)
 
     def _over_area(self, force: Array) -> Array:

@@ -31,24 +31,24 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _CONTACT = 2.0
-"""Half the length of the surface that may come into contact / half-width."""
+"""Ratio of half the length of the surface that may come into contact to the half-width."""
 
 
 class Track:
     """An elastic half-plane y < 0 with rows of points around a load at x = 0.
 
-    It knows neither the load nor how it yields: passes of any load with the same half-width share
-    it, whatever the friction and the hardening.
+    It does not depend on the load or on the yield stress: passes of any load with the same
+    half-width share it, for any friction and hardening.
 
     Parameters
     ----------
-    half_width : a of the contact [mm]
+    half_width : half-width a of the contact [mm]
     element_size : side of the elements in the window [mm]
-    growth : ratio of neighbouring sides in depth
-    elasticity : of the half-plane
-    reach : how much longer and deeper the window is than usual
+    growth : ratio of neighbouring element sides in depth
+    elasticity : elastic constants of the half-plane
+    reach : factor of the usual length and depth of the window
     interleaved : make two rows of each, of every other column: their points are one element
-        apart, as increments of one element would have it
+        apart, as in increments by which the load advances one element
 
     Raises
     ------
@@ -88,7 +88,7 @@ class Track:
 
     @cached_property
     def mirror(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The points, and the nodes, whose places those of `mirrored` have."""
+        """Numbers of the points, and of the nodes, at the mirrored places."""
         own, seen = self.part, self.mirrored
         both = ((own.points.reshape(2, -1), seen.points.reshape(2, -1)), (own.X, seen.X))
         points, nodes = (
@@ -103,7 +103,7 @@ class Track:
 
     @cached_property
     def operator(self) -> CondensedTrack:
-        """The inverse of the elastic stiffness, which keeps the m unknowns of the window."""
+        """The inverse of the elastic stiffness, condensed to the m unknowns of the window."""
         x, y = self.part.X
         ahead, behind, deep = self._window
         edge = 1e-6 * deep
@@ -112,7 +112,7 @@ class Track:
 
     @cached_property
     def at_surface(self) -> NDArray[np.int64]:
-        """Where the unknowns of the surface are among those of the window."""
+        """Positions of the surface's unknowns among those of the window."""
         return self.operator.place(self.surface.dofs)
 
     @cached_property
@@ -135,8 +135,9 @@ class Track:
         Parameters
         ----------
         peak : p0 [MPa]
-        shear_ratio : shear along +x, the way of the load, / pressure; positive when braking
-        half_width : of the pressure [mm]; that of the track by default
+        shear_ratio : ratio of the shear along +x, the motion of the load, to the pressure; positive
+            when braking
+        half_width : half-width of the pressure [mm]; that of the track by default
         """
         pressure = standing_pressure(half_width or self.half_width, peak, shear_ratio)
         force = travelling_forces(self.part, pressure, 0.0)
@@ -144,12 +145,12 @@ class Track:
 
 
 def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> TravellingPressure:
-    """Return a Hertz pressure at x = 0, which is there at time 0 and gone at time 1.
+    """Return a Hertz pressure at x = 0, with factor 1 at time 0 and factor 0 at time 1.
 
     Parameters
     ----------
     half_width, peak : a [mm] and p0 [MPa]
-    shear_ratio : shear along +x / pressure
+    shear_ratio : ratio of the shear along +x to the pressure
     """
     return TravellingPressure(
         boundary="top",
@@ -180,5 +181,5 @@ def track_of(
     elasticity: Elasticity,
     reach: float = 1.0,
 ) -> Track:
-    """Return the track of these measures, made once in a process: see `Track`."""
+    """Return the track with these dimensions, made once in a process: see `Track`."""
     return Track(half_width, element_size, growth, elasticity, reach=reach)

@@ -43,20 +43,20 @@ if TYPE_CHECKING:
 
 _ROUNDS = 40
 _NEAR = 0.01
-"""Ratio of the expected change of a contact force to the load, up to which a contact is looked for
-from there."""
+"""Ratio of the expected change of a contact force to the load; up to it the expected contact is the
+initial guess."""
 _COVERED = 0.999
-"""Share of the hat of a vertex that must face the rim for the vertex to be a contact point."""
+"""Share of a vertex's hat that must face the rim; below it the vertex is no contact point."""
 _SETTLED = 1e-7
-"""Change of the contact forces / load, at which the geometry of the contact is found."""
+"""Ratio of the change of contact forces to the load; below it the contact geometry converged."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """A contact, around which the next one is looked for.
+class _Linearisation:
+    """An approximate contact, about which the next contact problem is linearised.
 
-    ``on_track`` and ``on_wheel`` are nodal forces on the surfaces, ``tilt`` is what the tangential
-    forces add to the vertical force on the wheel.
+    ``on_track`` and ``on_wheel`` are nodal forces on the surfaces, ``tilt`` is the vertical
+    component of the tangential forces on the wheel.
     """
 
     on_track: Array
@@ -70,9 +70,9 @@ class _Known:
 class _Geometry:
     """Gaps and slips of the contact points ``at``, linear in displacements.
 
-    ``gap`` (n,) without any displacement; ``creeping`` (n,) motion of the rim's material along the
-    contact, per arc; ``rows`` and ``moves``, for track and wheel: derivatives
-    (2n, n_unknowns) of gaps and tangential displacements, and of gaps and slips.
+    ``gap`` (n,) is that without displacements; ``creeping`` (n,) is the tangential motion of the
+    rim's material per arc. For track and wheel, ``rows`` are the derivatives (2n, n_unknowns) of
+    gaps and tangential displacements, ``moves`` those of gaps and slips.
     """
 
     at: NDArray[np.int64]
@@ -88,12 +88,12 @@ class RollingWheel:
 
     Parameters
     ----------
-    track : that it rolls on
-    rim : with which it may touch
-    friction : law of friction, which knows no state here
+    track : the track on which it rolls
+    rim : the part of the wheel that may touch the track
+    friction : friction law; it must not depend on slip or plastic strain here
     strength : initial shear yield stress of the track [MPa]
     force : vertical force on the axle [N]
-    drive : moment on the axle / radius, positive when braking [N]; None where `creepage` is given
+    drive : moment on the axle over radius, positive when braking [N]; None if `creepage` is given
     creepage : 1 + R d(rotation) / d(advance)
     """
 
@@ -119,7 +119,7 @@ class RollingWheel:
         self._rolled = rim.rolled(self._length)
         self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
         self._found: tuple[Array, _Geometry, ContactProblem, ContactSolution] | None = None
-        self._known = _Known(
+        self._known = _Linearisation(
             on_track=np.zeros(len(surface.dofs)),
             on_wheel=np.zeros(len(rim.surface.dofs)),
             height=0.0,
@@ -163,7 +163,7 @@ class RollingWheel:
         """
         track = self._track
         surface, at, response = track.surface, track.at_surface, track.response
-        geometry, problem, found = self._touch(u[at])
+        geometry, problem, found = self._solve(u[at])
 
         def along(change: Array) -> Array:
             forces, _ = change_of(problem, found, geometry.moves[0] @ change[at])
@@ -192,8 +192,11 @@ class RollingWheel:
             moment=-float(geometry.creeping @ found.forces[len(geometry.at) :]),
         )
 
-    def _touch(self, shape: Array) -> tuple[_Geometry, ContactProblem, ContactSolution]:
-        """Return the contact on a surface of this shape (2 n_nodes,), and the problem it solves."""
+    def _solve(self, shape: Array) -> tuple[_Geometry, ContactProblem, ContactSolution]:
+        """Solve the contact with a surface of this shape (2 n_nodes,) [mm].
+
+        Returns the geometry, the contact problem and its solution.
+        """
         known = self._expected(shape)
         for _ in range(_ROUNDS):
             geometry = self._geometry(shape, known)
@@ -209,8 +212,8 @@ class RollingWheel:
                 return geometry, problem, found
         raise NotConverged("the geometry of the contact was not found in a steady pass")
 
-    def _expected(self, shape: Array) -> _Known:
-        """Return the contact on a surface of this shape, as the last one found tells it."""
+    def _expected(self, shape: Array) -> _Linearisation:
+        """Return the contact expected for this shape, by linearisation of the last one found."""
         if self._found is None:
             return self._known
         before, geometry, problem, found = self._found
@@ -221,8 +224,8 @@ class RollingWheel:
             geometry, replace(found, forces=found.forces + forces, rigid=found.rigid + rigid)
         )
 
-    def _geometry(self, shape: Array, known: _Known) -> _Geometry:
-        """Return how gaps and slips depend on displacements, around the contact as known."""
+    def _geometry(self, shape: Array, known: _Linearisation) -> _Geometry:
+        """Return how gaps and slips depend on displacements, linearised at a known contact."""
         u = self._compliance[0] @ known.on_track + shape
         bent = self._compliance[1] @ known.on_wheel
         d = bent + known.height * self._up
@@ -241,13 +244,13 @@ class RollingWheel:
             moves=[np.vstack(both) for both in zip(normal, slips, strict=True)],
         )
 
-    def _following(self, geometry: _Geometry, found: ContactSolution) -> _Known:
-        """Return the contact as a solution of its problem has it."""
+    def _following(self, geometry: _Geometry, found: ContactSolution) -> _Linearisation:
+        """Return the contact of a solution of the contact problem."""
         n = len(geometry.at)
         track, wheel = geometry.rows
         status = np.full(len(self._track.surface.vertices), OPEN)
         status[geometry.at] = found.status
-        return _Known(
+        return _Linearisation(
             on_track=track.T @ found.forces,
             on_wheel=wheel.T @ found.forces,
             height=float(found.rigid[0]),
@@ -255,8 +258,8 @@ class RollingWheel:
             status=status,
         )
 
-    def _problem(self, geometry: _Geometry, shape: Array, known: _Known) -> ContactProblem:
-        """Return the frictional problem; ``shape`` is the surface's without the wheel."""
+    def _problem(self, geometry: _Geometry, shape: Array, known: _Linearisation) -> ContactProblem:
+        """Return the frictional problem; ``shape`` is that of the surface without the wheel."""
         n = len(geometry.at)
         track, wheel = geometry.rows
         normal, tangent = wheel[:n], wheel[n:]
@@ -282,7 +285,7 @@ class RollingWheel:
         )
 
     def _bound(self, n: int) -> BoundLines:
-        """Return the lines of shear over pressure at n points."""
+        """Return the friction bound at n points: lines of shear over pressure [MPa]."""
 
         def nothing() -> Array:
             allowed = "must not depend on slip or plastic strain on a track without ends"

@@ -1,1 +1,1 @@
-"""What a study is: its parameters, its sweep, the runs it asks for, their names."""
+"""The definition of a study: its parameters, its sweep, its runs, their ids."""

@@ -1,4 +1,4 @@
-"""What a study asks for: cases (one run each) and loading paths (one task each)."""
+"""The runs of a study: cases (one run each) and loading paths (one task each)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ USUAL_AXES = ("load_ratio", "friction", "hardening")
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run: what to compute, under which name, and where it lies in the sweep.
+    """One run: its parameters, its id, and its position in the sweep.
 
     Attributes
     ----------
     id : content id of the run, the same in every study
-    scene : the scene it is a run of
-    values : all parameters by name, as JSON holds them
+    scene : the scene of the run
+    values : all parameters by name, as JSON values
     index : position on each axis of the study
     """
 
@@ -38,13 +38,11 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class LoadingPath:
-    """Cases that the solver computes by walking one loading path.
-
-    They differ in the scene's branch parameter only. One task computes them together.
+    """Cases that differ only in the scene's branch parameter; one task computes them together.
 
     Attributes
     ----------
-    id : content id of what the cases share
+    id : content id of the parameters that the cases share
     parameters : the scene's parameter object of the first case
     cases : in increasing order of the branch parameter
     """

@@ -1,4 +1,4 @@
-"""A sweep gone through: nothing is kept but what each axis sets, however many runs there are."""
+"""Iterate over the runs of a sweep; memory holds only the values of each axis, not the runs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from studies.errors import StudyError
 
 
 class _Setting(NamedTuple):
-    """What one position of an axis sets, in the order of the names of the axis.
+    """The values that one position of an axis sets, in the order of the names of the axis.
 
-    ``values`` are as JSON holds them, ``typed`` as the parameter object does, and ``entries`` as
-    they are written in what ids are made of.
+    ``values`` are JSON values, ``typed`` those of the parameter object, and ``entries`` the texts
+    from which ids are made.
     """
 
     values: tuple[Any, ...]
@@ -29,7 +29,7 @@ class _Setting(NamedTuple):
 
 
 class _SweepAxis(NamedTuple):
-    """An axis: the parameters it sets, their places in the names of runs and of paths."""
+    """An axis: the parameters it sets, and their places in the content of run and path ids."""
 
     names: tuple[str, ...]
     run: Places
@@ -37,7 +37,7 @@ class _SweepAxis(NamedTuple):
     settings: list[_Setting]
 
     def together(self, branch: str) -> list[tuple[int, ...]]:
-        """Return the positions that share a loading path: they differ in `branch` alone."""
+        """Return groups of positions that share a loading path: they differ only in `branch`."""
         groups: dict[tuple[str, ...], list[int]] = {}
         for position, setting in enumerate(self.settings):
             named = zip(self.names, setting.entries, strict=True)
@@ -47,17 +47,17 @@ class _SweepAxis(NamedTuple):
 
 
 class Expansion:
-    """The runs of a sweep, built one after the other when they are requested.
+    """The runs of a sweep, built one by one when they are requested.
 
     Parameters
     ----------
     scene : the scene that is swept
-    fixed : parameters that are not swept, as JSON holds them; the rest are the scene's defaults
+    fixed : parameters that are not swept, as JSON values; the rest are the scene's defaults
     axes : as `checked_axes` returns them
 
     Attributes
     ----------
-    source : what the scene is put together of, see `written`; it is read once
+    source : the sources of the scene, see `written`; read once
     size : number of runs
     path_count : number of loading paths
     """
@@ -78,12 +78,12 @@ class Expansion:
         self.path_count = math.prod(map(len, self._together))
 
     def check(self) -> None:
-        """Build the parameter object of every run, which is how the scene checks it.
+        """Build the parameter object of every run: it checks itself.
 
         Raises
         ------
         StudyError
-            when the scene refuses a combination of parameters, or one that is swept changes nothing
+            if the scene refuses a combination of parameters, or a swept parameter has no effect
         """
         idle = {name for name, axis in self._axes.items() if not isinstance(axis, dict)}
         idle = {name for name in idle if len(self._axes[name]) > 1}
@@ -152,10 +152,10 @@ class Expansion:
         return _SweepAxis(names, self._run.places(names), self._path.places(names), positions)
 
     def _located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
-        """Return what the scene refused, named as the study file names it.
+        """Return the error of the scene, with the field name of the study file.
 
-        The error of a value out of its own range names that range, with its unit. Otherwise it
-        names the values of the sweep that come together there: another combination may do.
+        For a value outside its own range the error gives that range, with its unit. Otherwise it
+        names the combination of swept values: another combination may be allowed.
         """
         field, at, where = f"parameters.{error.field}", [], []
         for (name, axis), i in zip(self._axes.items(), index, strict=True):
@@ -178,5 +178,5 @@ class Expansion:
 
 
 def _settings(name: str, axis: Any) -> list[dict[str, Any]]:
-    """Return what each position of an axis sets, by parameter."""
+    """Return the values that each position of an axis sets, by parameter."""
     return list(axis.values()) if isinstance(axis, dict) else [{name: value} for value in axis]

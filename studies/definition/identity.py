@@ -1,9 +1,9 @@
-"""Names made from content: the same parameters and the same solver give the same id.
+"""Content ids: the same parameters and the same solver give the same id.
 
 A change of the solver that may change a number, a name or a unit changes every id, so that no old
-run is taken for a new one, and so does a change of files with parts of one's own; a change of a
-scene of the user's own changes the ids of its runs. A
-change of comments and docstrings alone changes none (`studies.definition.meaning`).
+run is mistaken for a new one. So does a change of the user's own files with parts. A change of the
+user's own scene changes the ids of its runs. A change of comments and docstrings alone changes no
+id (`studies.definition.meaning`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ID_PATTERN = re.compile(r"[0-9a-f]{32}")
 
 
 def canonical(value: Any) -> str:
-    """Return JSON that is equal for equal content (key order, ``-0.0`` and spacing apart)."""
+    """Return JSON that is equal for equal content; key order, spacing and ``-0.0`` do not count."""
     return json.dumps(
         _normalised(value),
         sort_keys=True,
@@ -40,19 +40,19 @@ def canonical(value: Any) -> str:
 
 
 def content_id(*parts: Any) -> str:
-    """Return 32 hexadecimal digits that depend on `parts` and on what the solver computes."""
+    """Return 32 hexadecimal digits that depend on `parts` and on the solver's sources."""
     return _digest(canonical([*parts, solver_hash()]).encode())
 
 
 class Namer:
-    """Names tables that share most of their entries; what they share is written once.
+    """Makes ids of tables that share most of their entries; common text is made once.
 
     The id of a table is ``content_id(kind, name, table, source)``.
 
     Parameters
     ----------
-    kind, name, source : the parts of content around the table
-    table : the entries that hold where no others are given
+    kind, name, source : the content besides the table
+    table : the entries of all tables, which `id_of` may replace
     """
 
     def __init__(self, kind: str, name: str, table: Mapping[str, Any], source: Any) -> None:
@@ -68,7 +68,7 @@ class Namer:
         return f"{canonical(key)}:{canonical(value)}"
 
     def places(self, keys: Iterable[str]) -> Places:
-        """Return where entries with these keys stand, for those that the table has."""
+        """Return the places of entries with these keys, for the keys that the table has."""
         return [(k, self._places[key]) for k, key in enumerate(keys) if key in self._places]
 
     def id_of(self, changes: Iterable[tuple[Places, Sequence[str]]]) -> str:
@@ -96,20 +96,20 @@ FORM = (
     "storage/dataset.py",
     "storage/provenance.py",
 )
-"""Modules of this package that lay records out: names, units, dimensions, attributes."""
+"""Modules of this package that decide the layout of files: names, units, dimensions, attributes."""
 
 
 NO_NUMBERS = frozenset({"effort"})
-"""Functions of a scene that no number of a run comes from."""
+"""Functions of a scene that do not affect the results of a run."""
 
 
 @cache
 def solver_hash() -> str:
-    """Return the digest of all that decides what a run's file holds.
+    """Return the digest of all sources that decide the content of a run's file.
 
-    These are the sources of the solver, and the modules that lay its records out as data sets,
-    each with its place: to move a file changes the digest. Files with parts of one's own count
-    where there are any (`solver.parts`), wherever they are.
+    These are the sources of the solver, and the modules that decide the layout of files, each with
+    its path: moving a file changes the digest. The user's own files with parts count too
+    (`solver.parts`), wherever they are.
     """
     from studies.definition.meaning import meaning  # `residua --help` makes no id
 
@@ -122,13 +122,12 @@ def solver_hash() -> str:
 
 
 def written(scene: Scene) -> list[list[str]]:
-    """Return what a scene is put together of, for `content_id`.
+    """Return the sources of a scene, for `content_id`.
 
-    These are the names of its parameters and of its functions that make numbers, each with the
-    digest of the module that it is written in, where this is none of the solver's. Of a script
-    counts what workers see of it: not what stands under ``if __name__ == "__main__":``. What the
-    module imports does not count, and code without a file, such as a cell of a notebook, has no
-    digest.
+    These are the names of its parameters and of its functions that compute results, each with the
+    digest of its module, if the module is not the solver's. Code under ``if __name__ ==
+    "__main__":`` does not count, since workers do not run it. Imported modules do not count, and
+    code without a file, such as a cell of a notebook, has no digest.
     """
     functions = _functions(scene)
     digests = {name: _module_digest(name) for name in {each.__module__ for each in functions}}
@@ -144,14 +143,14 @@ def _read(scene: Scene) -> list[list[str]]:
 
 
 def sources(scene: Scene) -> list[Path]:
-    """Return the files of solver, studies and scene: with their words, all that makes results."""
+    """Return the source files of solver, studies and scene, from which all results are made."""
     roots = (Path(solver.__file__).parent, Path(__file__).parents[1])
     own = filter(None, (_own_file(each.__module__) for each in _functions(scene)))
     return sorted({*own, *(path for root in roots for path in root.rglob("*.py"))})
 
 
 def _functions(scene: Scene) -> list[Any]:
-    """Return the parameters of a scene and its functions that make numbers."""
+    """Return the parameters of a scene and its functions that compute results."""
     given: list[Any] = [type(scene)]
     for item in fields(scene):
         if item.name in NO_NUMBERS:
@@ -163,7 +162,7 @@ def _functions(scene: Scene) -> list[Any]:
 
 
 def _own_file(module: str) -> Path | None:
-    """Return the file of a module that is none of the solver's, if it has one."""
+    """Return the file of a module that is not the solver's, if it has one."""
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None or Path(file).is_relative_to(Path(solver.__file__).parent):
         return None
@@ -178,7 +177,7 @@ def _file_digest(file: Path) -> str:
 
 
 def _module_digest(name: str) -> str:
-    """Return the digest of a module's source but for its words; nothing for one of the solver."""
+    """Return the digest of a module's source without comments; empty for one of the solver's."""
     file = _own_file(name)
     if file is None:
         return ""
@@ -190,7 +189,7 @@ def _module_digest(name: str) -> str:
 
 
 def only_as_script(statement: ast.stmt) -> bool:
-    """Tell whether a statement of a module asks whether it is the script that was started."""
+    """Whether a statement is ``if __name__ == "__main__":``."""
     names = ast.walk(statement.test) if isinstance(statement, ast.If) else ()
     return any(isinstance(each, ast.Name) and each.id == "__name__" for each in names)
 

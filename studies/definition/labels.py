@@ -1,4 +1,4 @@
-"""What a study says of itself, what it keeps and allows, beside the problem and the sweep."""
+"""The entries ``note``, ``tags``, ``keep`` and ``allow`` of a study, and their check."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def checked_labels(content: dict[str, Any]) -> dict[str, Any]:
     Raises
     ------
     StudyError
-        for one that is no such text or list
+        if one of them has the wrong type or content
     """
     found = {
         "note": _note(content.get("note", "")),

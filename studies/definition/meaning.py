@@ -1,7 +1,7 @@
 """Source text reduced to its syntax tree: comments, layout and docstrings are left out.
 
-All else counts: numbers, names, operators, their order, annotations, imports, and any text, since
-that may be a name, a unit or a choice.
+Everything else counts: numbers, names, operators, their order, annotations, imports, and all texts,
+because a text may be a name, a unit or a choice.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from functools import cache
 from typing import Any
 
 _NO_MEANING = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
-"""Fields of Python's grammar that repeat what its place tells, or that only comments fill."""
+"""Fields of Python's grammar that follow from the position of a node, or come from comments."""
 
 
 def meaning(source: bytes | str) -> str:
     """Return a text that is equal for two modules that differ in comments and docstrings only.
 
-    It writes down the nodes of Python's grammar and their fields. An empty field is left out:
-    newer versions of Python add such fields, and the text stays the same.
+    The text lists the nodes of Python's grammar and their fields. An empty field is left out, so
+    that the text stays the same when a newer version of Python adds fields.
     """
     collecting = gc.isenabled()
-    gc.disable()  # a tree is many small objects and no garbage: to look for some doubles the time
+    gc.disable()  # a tree has many small objects and no garbage: collecting would double the time
     try:
         written: list[str] = []
         _write(ast.parse(source), written)

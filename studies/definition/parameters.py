@@ -1,8 +1,7 @@
 """The parameters of a scene: read from JSON or TOML, described in words, built.
 
-Whether a value is allowed is decided in one place: the scene's parameter object checks itself
-when it is built. Here a value is only brought into the parameter's type, and the declared range
-is put into words.
+The scene's parameter object alone decides whether a value is allowed: it checks itself when it is
+built. This module only converts a value to the parameter's type, and describes the declared range.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ class Parameter:
 
     Attributes
     ----------
-    name, unit, default, description : as declared; the default as JSON holds it, None where
-        the scene's parameter object chooses the value by others
+    name, unit, default, description : as declared; the default is a JSON value, or None if the
+        scene's parameter object derives it from other parameters
     schema : JSON Schema of what is allowed
     """
 
@@ -52,13 +51,13 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """What the parameter accepts, in words."""
+        """The allowed values, as text."""
         choices = [_describe(option) for option in self.schema.get("anyOf", [self.schema])]
         unit = "" if self.unit in {"", "1"} else f" [{self.unit}]"
         return " or ".join(choices) + unit
 
     def normalise(self, value: Any, field: str) -> Any:
-        """Return `value` as JSON would hold it in this parameter's type.
+        """Return `value` as a JSON value of this parameter's type.
 
         Raises
         ------
@@ -76,11 +75,11 @@ class Parameter:
         return self._type.dump_python(typed, mode="json")
 
     def typed(self, value: Any) -> Any:
-        """Return a normalised value, None where left out, as the parameter object takes it."""
+        """Return a normalised value in the type of the parameter object; None if left out."""
         return None if value is None else self._type.validate_python(value)
 
     def in_range(self, value: Any) -> bool:
-        """Tell whether `value` lies in the declared range, whatever the other parameters are."""
+        """Whether `value` is in the declared range, without regard to other parameters."""
         try:
             self._range.validate_python(value)
         except ValidationError:
@@ -88,13 +87,13 @@ class Parameter:
         return True
 
     def refusal(self, field: str, value: Any) -> StudyError:
-        """Return the error that tells what `field` may be, for a value that it may not be."""
+        """Return the error for a value that is not allowed: it says what is."""
         return StudyError(field, value, f"must be {self.allowed}")
 
 
 @lru_cache(maxsize=128)
 def parameters_of(scene: Scene) -> dict[str, Parameter]:
-    """Return the parameters of a scene, by name, in the order in which it declares them."""
+    """Return the parameters of a scene by name, in the order of declaration."""
     hints = get_type_hints(scene.parameters, include_extras=True)
     found = {}
     for field in dataclasses.fields(scene.parameters):
@@ -126,14 +125,14 @@ def build(scene: Scene, values: Mapping[str, Any]) -> Any:
 
 
 def completed(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return normalised values; those left out (None) are what the parameter object chooses."""
+    """Return normalised values, with values of the parameter object for those left out (None)."""
     left_out = [name for name, value in values.items() if value is None]
     chosen = build(scene, values) if left_out else None
     return dict(values) | {name: getattr(chosen, name) for name in left_out}
 
 
 def defaults(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all defaults; where the parameter object chooses, what it chooses beside `values`."""
+    """Return all defaults; derived ones are those of the parameter object with `values`."""
     declared = {name: parameter.default for name, parameter in parameters_of(scene).items()}
     left_out = {name: None for name, default in declared.items() if default is None}
     known = {name: value for name, value in values.items() if name in declared}
@@ -155,12 +154,12 @@ def scene_schema(scene: Scene | str) -> dict[str, Any]:
 
 
 def _plain(kind: TypeAdapter[Any], default: Any) -> Any:
-    """Return a default as JSON holds it; None where the parameter object chooses the value."""
+    """Return a default as a JSON value; None if the parameter object derives it."""
     return None if default is None else kind.dump_python(default, mode="json")
 
 
 def _bare(hint: Any) -> Any:
-    """Return a type without its range: a number of any size, a text of any wording."""
+    """Return a type without its range or choices."""
     if get_origin(hint) is Annotated:
         return _bare(get_args(hint)[0])
     if get_origin(hint) is Literal:
@@ -197,9 +196,9 @@ def _describe(schema: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any, usual: Any) -> Any:
-    """Return a value that was written as text, read back in the kind of the usual value.
+    """Return a value that was stored as text, converted to the type of the usual value.
 
-    An axis of truth values, for instance, is stored as text. Text that is neither a number nor a
+    For instance, an axis of truth values is stored as text. Text that is neither a number nor a
     truth value stays text.
     """
     if isinstance(usual, str) or not isinstance(value, str):

@@ -12,13 +12,13 @@ _KEYS = ("start", "stop", "num")
 _SPACINGS = ("linear", "log")
 _MOST = 100_000
 _DIGITS = 12
-"""Digits that values are rounded to: 0.3, not 0.30000000000000004."""
+"""Number of digits to which values are rounded: 0.3, not 0.30000000000000004."""
 
 
 def spaced(name: str, content: Mapping[str, Any]) -> list[float]:
     """Return the values of a range ``{start, stop, num}``, of equal steps or of equal ratios.
 
-    Whole numbers are int, so that they serve for parameters that count.
+    Whole numbers are int, so that they suit integer parameters.
 
     Raises
     ------
@@ -54,5 +54,5 @@ def _number(field: str, value: Any, spacing: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise StudyError(field, value, f"must be a finite number {least}".strip())
     if spacing == "log" and not value > 0:
-        raise StudyError(field, value, "must be > 0 where spacing = log")
+        raise StudyError(field, value, "must be > 0 for spacing = log")
     return float(value)

@@ -49,10 +49,10 @@ class Study(BaseModel):
     parameters : fixed parameters; the rest are the scene's defaults
     sweep : axes: lists of values by parameter, and linked axes, which have names of their own
         and set several parameters by label; see `checked_axes` for their order
-    note, tags : words of the user's own, shown with the study; studies can be found by a tag
+    note, tags : the user's own text and labels, shown with the study; a tag finds studies
     keep : ``fields`` keeps the fields at all nodes in the file of each run
-    allow : ``large_strain`` takes runs outside small-strain theory as ok, as `taken` does; what
-        the scene allows is among it
+    allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
+        includes what the scene allows
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -79,13 +79,13 @@ class Study(BaseModel):
     ) -> Self:
         """Check and normalise the content of a study file (or of its JSON equivalent).
 
-        All combinations of the sweep are gone through once; none is kept.
+        All combinations of the sweep are checked once; none is kept in memory.
 
         Parameters
         ----------
         content : name, scene, parameters and sweep
-        scene : a scene of one's own, in place of the name of one
-        scenes : where scenes are found that are neither built in nor installed
+        scene : the user's own scene, in place of the name of a scene
+        scenes : finds scenes that are neither built in nor installed
         """
         if scene is not None:
             own = scene
@@ -94,10 +94,10 @@ class Study(BaseModel):
 
     @classmethod
     def known(cls, content: Mapping[str, Any], scenes: Find = nothing) -> Self:
-        """Return the study without going through its combinations; the rest is checked.
+        """Return the study without checking its combinations; the rest is checked.
 
-        This is for content that `from_dict` has accepted before, and for looking at the size of a
-        study before `checked` goes through it.
+        Use it for content that `from_dict` has accepted before, and to get the size of a study
+        before `checked`.
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
@@ -112,12 +112,12 @@ class Study(BaseModel):
             raise StudyError(field, first["input"], first["msg"]) from None
 
     def checked(self) -> Self:
-        """Return the study after a pass through its combinations, each of which the scene takes.
+        """Return the study after a check of all its combinations.
 
         Raises
         ------
         StudyError
-            for the first one that the scene refuses
+            for the first combination that the scene refuses
         """
         self.expansion.check()
         return self
@@ -147,7 +147,7 @@ class Study(BaseModel):
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
-        """Keep the scene that was found."""
+        """Store the scene that was found."""
         self._problem = context["found"] if context else scene_named(self.scene)
 
     @property
@@ -164,10 +164,9 @@ class Study(BaseModel):
     def id(self) -> str:
         """Content id of the study.
 
-        The name counts, because it is the title of what the study writes: a copy under
-        another name is another data set. That costs nothing, since the two share every run. So do
-        note, tags, what is kept and what is allowed, where there are any.
-        The order of values counts, and so does that of labels.
+        The name counts, because it is the title of the data set: a copy with another name is
+        another data set, although the two share every run. ``note``, ``tags``, ``keep`` and
+        ``allow`` count if they are given. The order of values and labels counts.
         """
         axes = {
             name: list(axis.items()) if isinstance(axis, dict) else axis
@@ -193,7 +192,7 @@ class Study(BaseModel):
 
     @property
     def linked(self) -> dict[str, tuple[str, list[Any]]]:
-        """Parameters that linked axes set: the axis, and the values over its labels."""
+        """Parameter set by a linked axis -> the axis, and the values over its labels."""
         return linked_values(self.sweep)
 
     @property
@@ -202,11 +201,11 @@ class Study(BaseModel):
         return self.expansion.size
 
     def run_ids(self) -> Iterator[str]:
-        """Yield the ids of the runs, in the order of `cases`, and build nothing else."""
+        """Yield the ids of the runs, in the order of `cases`, without building the cases."""
         return self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
-        """Yield the runs of the study, the last axis running fastest; nothing is kept."""
+        """Yield the runs of the study, the last axis fastest; none is kept in memory."""
         return self.expansion.cases()
 
     def place(self, case: Case) -> dict[str, Any]:
@@ -215,7 +214,7 @@ class Study(BaseModel):
         return {name: values[position] for (name, values), position in pairs}
 
     def taken(self, status: str) -> str:
-        """Return the outcome of a run as this study takes it: ok where it allows large strain."""
+        """Return the status of a run in this study: ok if the study allows large strain."""
         return taken(status, self.allow)
 
     def paths(self) -> Iterator[LoadingPath]:

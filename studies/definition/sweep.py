@@ -1,8 +1,8 @@
 """The sweep of a study: axes of one parameter, and linked axes, which move several together.
 
-An axis that is a list, or a range, holds the values of the parameter it is named after. A linked
-axis is a table with a name of its own: it holds labels, and the parameters that each label sets.
-For each combination of labels, what the labels set is fixed, and the lists are swept.
+An axis that is a list, or a range, has the name of a parameter and holds its values. A linked axis
+is a table with another name: it holds labels, and the parameters that each label sets. For each
+combination of labels, the parameters of the labels are fixed, and the lists are swept.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     """Return the axes of a sweep, normalised.
 
     Linked axes come first, by name; then the others, in the order in which the scene declares its
-    parameters. The values and labels of an axis stay in the order given. What a label leaves out
-    and another one sets has the scene's default.
+    parameters. The values and labels of an axis stay in the given order. A parameter that one label
+    sets and another leaves out has the scene's default there.
 
     Raises
     ------
     StudyError
-        for anything wrong but combinations of parameters, which building a case checks
+        for any mistake except in combinations of parameters, which are checked case by case
     """
     if not isinstance(content, Mapping):
         raise StudyError("sweep", content, "must be a table of axes")
@@ -75,14 +75,14 @@ def checked_table(field: str, content: Any, known: Mapping[str, Parameter]) -> d
 
 
 def checked_text(field: str, text: Any) -> str:
-    """Return the name of a study or a label, if it is plain enough for files and command lines."""
+    """Return the name of a study or a label, if files and command lines can have it."""
     if isinstance(text, str) and _TEXT.fullmatch(text):
         return text
     raise StudyError(field, text, "must be 1 to 80 of A-Z a-z 0-9 . _ -, not beginning with a dot")
 
 
 def owners(axes: Axes) -> dict[str, str]:
-    """Return, for each parameter that is swept, the axis that sets it."""
+    """Return the axis of each swept parameter."""
     return dict(_settings(axes))
 
 
@@ -157,7 +157,7 @@ def _linked_axis(
 
 
 def _check_name(name: Any, content: Any) -> None:
-    """Refuse the name of a linked axis that is not free to become a dimension of the data set."""
+    """Refuse the name of a linked axis that cannot be a dimension of the data set."""
     from studies.definition.vocabulary import LABEL_ATTRIBUTES
 
     if name in QUANTITIES or name in LABEL_ATTRIBUTES:

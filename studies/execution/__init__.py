@@ -1,1 +1,1 @@
-"""How a study is carried out: what is missing, computed in parallel."""
+"""The execution of a study: its missing runs are computed in parallel."""

@@ -1,8 +1,8 @@
 """The certificate that a scheduler, its workers and its clients share.
 
-Whoever holds the key may run code on the workers, so all who belong together hold the same one: a
-certificate of its own for each would keep nobody out. dask does the same for the clusters it
-starts (`distributed.security.Security.temporary`), for a year; these last ten.
+Anybody who has the key may run code on the workers. Scheduler, workers and clients share one
+certificate, because separate ones would not increase security. dask does the same for the clusters
+it starts (`distributed.security.Security.temporary`), for one year; these are valid for ten.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _LIFE = timedelta(days=3650)
 
 
 def write_certificates(directory: Path) -> Sequence[Path]:
-    """Write ``ca.pem``, ``cert.pem`` and ``key.pem``, unless they are there; return what is new.
+    """Write ``ca.pem``, ``cert.pem`` and ``key.pem``, unless all exist; return the new files.
 
-    The certificate vouches for itself, so ``ca.pem`` is a copy of ``cert.pem``. Only the owner may
-    read the key.
+    The certificate is self-signed, so ``ca.pem`` is a copy of ``cert.pem``. Only the owner may read
+    the key.
     """
     directory.mkdir(parents=True, exist_ok=True)
     paths = [directory / name for name in ("ca.pem", "cert.pem", "key.pem")]

@@ -1,4 +1,4 @@
-"""Where the workers are: a cluster of our own, or a scheduler that others have started."""
+"""The workers: a cluster started here, or an existing scheduler."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ _CONNECT = 10.0
 """Seconds within which a scheduler must answer."""
 
 _ABSENT = 30.0
-"""Seconds without a sign of a worker of our own until it is replaced."""
+"""Seconds without a sign of life of a worker started here until it is replaced."""
 
 CONFIGURATION: Mapping[str, Any] = {
-    # A task whose worker died is tried once more; a second death is the task's own doing.
+    # A task whose worker died is tried once more; after a second death the task is blamed.
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
-    # Arrays of some megabytes come and go in every iteration: dask's threshold of 64 kB would hand
-    # each back to the system, and a quarter of the time would go into clearing pages.
+    # Arrays of some megabytes are allocated and freed in every iteration: with dask's threshold of
+    # 64 kB each would return to the system, and clearing pages would take a quarter of the time.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
-    # Every study has a topic of events of its own, and dask keeps the messages under each.
+    # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
-    # Ctrl-C reaches every process of the terminal; the caller alone decides what it means.
+    # Ctrl-C reaches every process of the terminal; only the calling process shall react to it.
     "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
 }
-"""How the scheduler and the workers of our own behave."""
+"""Settings of the scheduler and the workers started here."""
 
 _CLOSED: Mapping[str, Any] = {
-    # dask asks for no password on its pages, and they tell what is computed.
+    # dask's pages show what is computed, without a password.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
 }
@@ -48,19 +48,19 @@ _CLOSED: Mapping[str, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """What it takes to reach a scheduler.
+    """The address of a scheduler, and the certificates to reach it.
 
     Attributes
     ----------
-    address : of the scheduler, such as ``"tls://10.0.0.5:8786"``
-    ca, cert, key : certificate of the authority that scheduler and workers trust, our own
-        certificate, and its private key; each a PEM text or the name of a file. The key may
-        be left out when the file of the certificate holds it
+    address : address of the scheduler, such as ``"tls://10.0.0.5:8786"``
+    ca, cert, key : certificate of the authority that scheduler and workers trust, certificate of
+        this client, and its private key; each a PEM text or the name of a file. The key may be left
+        out if the file of the certificate contains it
 
     Raises
     ------
     StudyError
-        when the address asks for certificates and there are none
+        if the address needs certificates and there are none
     """
 
     address: str
@@ -76,7 +76,7 @@ class Access:
             )
             raise StudyError("scheduler", self.address, allowed)
         if not self.address.startswith("tls://") and (self.ca or self.cert or self.key):
-            allowed = "must begin with tls:// where certificates are named"
+            allowed = "must begin with tls:// if certificates are given"
             raise StudyError("scheduler", self.address, allowed)
 
     def to_dict(self) -> dict[str, str | None]:
@@ -85,7 +85,7 @@ class Access:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, str | None]) -> Self:
-        """Return what `to_dict` has written."""
+        """Return the access for a content of `to_dict`."""
         return cls(**content)  # type: ignore[arg-type]
 
 
@@ -93,23 +93,23 @@ class Access:
 def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
     """Start worker processes of one thread each on this machine; they end with the context.
 
-    Scheduler and workers listen on the loopback device only. They talk to nobody who lacks the
-    credentials, which are made anew each time and are kept in memory.
+    Scheduler and workers listen on the loopback device only, and accept only connections with the
+    credentials, which are new each time and are kept in memory.
 
     Parameters
     ----------
     workers : number of processes
-    memory : most memory of each, such as ``"2GB"``; by default its share of the machine's
+    memory : largest memory of each, such as ``"2GB"``; by default its share of the machine's
 
     Yields
     ------
     Access
-        for any process of this machine to which it is given
+        usable by any process of this machine
 
     Raises
     ------
     StudyError
-        when the script that runs would start workers in each of them
+        if the running script would start workers in each worker again
     """
     check_script()
     import dask  # takes a second to import
@@ -136,7 +136,7 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
             )
         except RuntimeError as error:  # as where a thread of the script asks for them
             raise RuntimeError(
-                "worker processes did not start; they import the calling script anew, so it must "
+                "worker processes did not start; they import the calling script again, so it must "
                 f"do its work under: {GUARD}"
             ) from error
         with cluster, _kept(cluster, workers):
@@ -150,7 +150,7 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
 
 @contextmanager
 def _kept(cluster: LocalCluster, workers: int) -> Iterator[None]:
-    """Replace workers that stay away: dask does not revive one that is killed while it starts."""
+    """Replace workers that disappear: dask does not restart one that is killed while it starts."""
     scheduler: Any = cluster.scheduler
     closing = threading.Event()
     away: dict[Any, float] = {}
@@ -210,12 +210,12 @@ def connect(access: Access) -> Client:
 
 
 def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
-    """Return what functions give that processes of their own call, in order.
+    """Call functions in separate processes, and return their results in order.
 
     Raises
     ------
     StudyError
-        when the script that runs would ask for processes in each of them
+        if the running script would start processes in each process again
     """
     check_script()
     from dask.base import compute

@@ -1,4 +1,4 @@
-"""Estimate of what a study will cost, before anything is computed, and its bounds."""
+"""Estimate of the cost of a study before it is computed, and bounds on it."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from studies.execution.pace import pace_of
 from studies.storage.store import Store
 
 _PER_RUN, _PER_PATH = 0.5, 1.0
-"""Seconds to look at a run, check and write it; to make the mesh of a path and its operators."""
+"""Seconds for the results, audit and file of a run; for the mesh and the operators of a path."""
 _BYTES, _COMBINED = 1.1e6, 1.8
-"""Size of a run's file where none is known; what the data set of a study adds to the files."""
+"""Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
-"""Bytes for each unknown that kept fields add to a run's file where none is known: 55 to 185."""
+"""Bytes per unknown that kept fields add to a run's file, if none is known: 55 to 185."""
 _BATCH = 500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """What a study asks for. But for `runs`, all is about what the store lacks.
+    """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
 
     Attributes
     ----------
-    runs : runs of the study
-    to_compute : those that the store does not have
-    paths : loading paths to walk
-    unknowns : most displacement unknowns of a run
-    increments : of all paths, when none is cut
-    longest : most increments of one path, where they are halved as often as they may be
+    runs : number of runs of the study
+    to_compute : number of runs that the store does not have
+    paths : number of loading paths to walk
+    unknowns : largest number of displacement unknowns of a run
+    increments : number of increments of all paths, if none is cut
+    longest : largest number of increments of one path, if all are halved as often as permitted
     cpu_seconds : processor time, low, likely and high: 16 %, 50 % and 84 % quantiles of past runs
-    bytes : on the disk, data set included
-    basis : what the estimate rests on, in words
+    bytes : size on the disk, with the data set
+    basis : on which data the estimate is based, as text
 
-    None stands for what cannot be estimated.
+    A number that cannot be estimated is None.
     """
 
     runs: int
@@ -57,15 +57,15 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """The most that a study may ask for; None sets no bound.
+    """Upper bounds on the cost of a study; None sets no bound.
 
     Attributes
     ----------
-    runs : runs of the study
-    unknowns : unknowns of a run
-    increments : increments of a loading path
+    runs : number of runs of the study
+    unknowns : number of unknowns of a run
+    increments : number of increments of a loading path
     cpu_seconds : likely processor time of the study
-    bytes : on the disk
+    bytes : size on the disk
     """
 
     runs: int | None = None
@@ -75,7 +75,7 @@ class Bounds:
     bytes: int | None = None
 
     def check_size(self, study: Study) -> None:
-        """Refuse a study of too many runs, before they are gone through.
+        """Refuse a study of too many runs, before each run is checked.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class Bounds:
         self._refuse("runs", study.size)
 
     def check(self, estimate: Estimate) -> None:
-        """Refuse a study that asks for more; what cannot be estimated is not refused.
+        """Refuse a study whose estimate exceeds a bound; None in the estimate is accepted.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Bounds:
             naming the bound, and the setting that holds it
         """
         likely = estimate.cpu_seconds[1] if estimate.cpu_seconds else None
-        asked = {
+        requested = {
             "runs": estimate.runs,
             "unknowns": estimate.unknowns,
             "increments": estimate.longest,
@@ -101,26 +101,26 @@ class Bounds:
             "bytes": estimate.bytes,
         }
         for bound in fields(self):
-            self._refuse(bound.name, asked[bound.name])
+            self._refuse(bound.name, requested[bound.name])
 
-    def _refuse(self, name: str, asked: float | None) -> None:
+    def _refuse(self, name: str, requested: float | None) -> None:
         most = getattr(self, name)
-        if most is not None and asked is not None and asked > most:
+        if most is not None and requested is not None and requested > most:
             allowed = f"at most {most:g}: {_MEANING[name]} (setting max_{name})"
-            raise StudyError(f"estimate.{name}", round(asked), allowed)
+            raise StudyError(f"estimate.{name}", round(requested), allowed)
 
 
 _MEANING = {
-    "runs": "ask for fewer values in sweep",
-    "unknowns": "take a coarser mesh",
-    "increments": "take larger steps, or fewer of them",
-    "cpu_seconds": "ask for fewer runs, a coarser mesh or larger steps",
-    "bytes": "ask for fewer runs",
+    "runs": "use fewer values in sweep",
+    "unknowns": "use a coarser mesh",
+    "increments": "use larger or fewer increments",
+    "cpu_seconds": "use fewer runs, a coarser mesh or larger increments",
+    "bytes": "use fewer runs",
 }
 
 
 def estimate(study: Study, store: Store) -> Estimate:
-    """Return what `study` will cost beyond what `store` has of it; nothing is written."""
+    """Return the cost of the runs of `study` that `store` lacks; nothing is written."""
     scene = study.problem
     pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
@@ -137,17 +137,17 @@ def estimate(study: Study, store: Store) -> Estimate:
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
     fixed = _PER_RUN * to_compute + _PER_PATH * paths
     low, likely, high = (fixed + each for each in seconds)
-    told = scene.effort is not None
+    known = scene.effort is not None
     return Estimate(
         runs=study.size,
         to_compute=to_compute,
         paths=paths,
-        unknowns=unknowns if told else None,
-        increments=increments if told else None,
-        longest=longest if told else None,
-        cpu_seconds=(low, likely, high) if told else None,
+        unknowns=unknowns if known else None,
+        increments=increments if known else None,
+        longest=longest if known else None,
+        cpu_seconds=(low, likely, high) if known else None,
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
-        basis=pace.basis if told else f"{scene.name} does not tell the work of its paths",
+        basis=pace.basis if known else f"{scene.name} does not estimate the work of its paths",
     )
 
 
@@ -164,7 +164,7 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
 
 
 def _file_size(study: Study, store: Store, unknowns: int) -> float:
-    """Return the usual size of a run's file [bytes], of runs that keep as much as these."""
+    """Return the usual size [bytes] of the file of a run with the same ``keep``."""
     rows, _ = store.catalogue.runs(scene=study.problem.name, status=OK, limit=20)
     files = (store.run_path(row["id"]) for row in rows if row["keep"] == study.keep)
     sizes: Sequence[int] = [file.stat().st_size for file in files if file.exists()]

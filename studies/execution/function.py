@@ -1,4 +1,4 @@
-"""Sweeps of a function of your own: from a notebook, nothing stored."""
+"""Sweep the user's own function, for instance in a notebook; nothing is stored."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ _DONE, _LIMIT, _FAILED = "ok", "limit_load", "not_converged"
 def sweep(
     function: Callable[..., Any], axes: Mapping[str, Sequence[Any]], *, workers: int = 1
 ) -> xr.Dataset:
-    """Return what a function gives at every combination of values, over the axes.
+    """Return the results of a function for every combination of values, over the axes.
 
     Parameters
     ----------
     function : called with one value of each axis, by name; returns a data set, or a mapping of
         names to numbers or arrays of xarray
     axes : argument of the function -> its values, which become a dimension
-    workers : processes; with more than one the function must not depend on what it cannot take
-        along, such as an open file
+    workers : number of processes; with more than one the function must be picklable: it must not
+        use an open file, for instance
 
     Returns
     -------
-    xarray.Dataset : with ``status``, which is ok, limit_load or not_converged; what failed is NaN,
-        and ``message`` says why
+    xarray.Dataset : with ``status``, which is ok, limit_load or not_converged; results of failed
+        calls are NaN, and ``message`` has the reason
 
     Raises
     ------
     StudyError
-        for axes that are none
+        if there is no axis, or an axis has no values or one twice
     """
     import xarray as xr
 
@@ -69,7 +69,7 @@ def sweep(
 
 
 def _run(function: Callable[..., Any], point: Mapping[str, Any]) -> tuple[Any, str, str]:
-    """Return what the function gives at a point, how it ended, and why."""
+    """Return the result of the function at a point, its status and its message."""
     try:
         return function(**point), _DONE, ""
     except LimitLoad as error:

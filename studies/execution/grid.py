@@ -1,4 +1,4 @@
-"""Work spread over the workers of a scheduler."""
+"""Distribution of tasks to the workers of a scheduler."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ from studies.execution.watch import Ticket, Waiting, Watch
 Report = Callable[[dict[str, Any]], None]
 """Sends a small message from a task to the caller."""
 StopCheck = Callable[[], bool]
-"""Tells a task whether it shall stop."""
+"""Returns whether a task shall stop."""
 Function = Callable[[Any, Report, StopCheck], Any]
 
 _POLL = 0.2
-"""Seconds between two looks at whether to stop."""
+"""Seconds between two checks whether to stop."""
 _LOOK = 1.0
-"""Seconds between two looks at what the workers do."""
+"""Seconds between two checks of the workers."""
 _HELD_UP = 5.0
-"""Seconds without a look that only a process that was stopped, or waited for a disk, lets pass."""
+"""Seconds between two checks above which this process must have been suspended or blocked."""
 _ANSWER = 5.0
 """Seconds within which the scheduler must answer."""
 _GRACE = 5.0
-"""Seconds that running tasks are given to stop; a frozen worker never does."""
+"""Seconds that running tasks have to stop; a frozen worker never does."""
 _SPARE = 2
-"""Tasks that wait at the scheduler, so that no worker waits for the next one."""
+"""Number of tasks that wait at the scheduler, so that no worker is idle."""
 _HEAD_START = 60.0
-"""Seconds by which each task that a study has here puts its next one off."""
+"""Seconds by which each submitted task of a study delays its next one, in favour of others."""
 _RESTART = 30.0
-"""Seconds within which the keeper of a worker must have killed it."""
+"""Seconds within which the nanny of a worker must have killed it."""
 _STARTS = 2
-"""Starts of a task that ended with the death of the worker, before the task is blamed."""
+"""Number of starts of a task that ended with the death of the worker, before the task is blamed."""
 _ROUNDS = 3
-"""The same for a task that dies before a word of its start gets through; dask counts two each."""
+"""The same number for tasks that die before their start is reported; dask counts two each."""
 
 _WORKER_DIED = (
     "the worker process died each time it computed this loading path; if memory ran out, "
@@ -55,14 +55,14 @@ _WORKER_DIED = (
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What a running task reported."""
+    """A report of a running task."""
 
     content: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """End of a task, with the error that took it down if there was one."""
+    """End of a task, with its error if it failed."""
 
     task: Any
     error: Exception | None = None
@@ -137,7 +137,7 @@ class _HandedOut:
         while not should_stop():
             since = time.monotonic() - looked
             if since > _LOOK:
-                yield from self._look(since if since > _HELD_UP else 0.0)
+                yield from self._check_workers(since if since > _HELD_UP else 0.0)
                 looked = time.monotonic()
             while len(self._tickets) < self._room and (task := next(tasks, None)) is not None:
                 self._hand_out(Ticket(task))
@@ -162,8 +162,8 @@ class _HandedOut:
         # tasks there are. Otherwise it would wait at one worker, which may be slow, or frozen.
         content = self._function, self._topic, key, ticket.task
         graph = {key: Task(key, _call, *content, _data_producer=True)}
-        # Who has just come does not wait behind what another study keeps in stock here, and who
-        # comes again and again does not go first for ever.
+        # A new study does not wait behind the waiting tasks of another study, and a study that
+        # submits tasks again and again does not always go first.
         priority = self._priority - (time.time() + _HEAD_START * len(self._tickets)) / 1e11
         (future,) = self._client.get(graph, [key], sync=False, priority=priority, fifo_timeout=0)
         ticket.future, ticket.worker, ticket.computing = future, "", False
@@ -171,7 +171,7 @@ class _HandedOut:
         future.add_done_callback(self._inbox.put)
 
     def _hear(self, item: dict[str, Any]) -> Iterator[Message | Waiting]:
-        """Take in what a task says; without content it has begun."""
+        """Process a message of a task; one without content says that it has begun."""
         ticket, content = self._tickets.get(item["key"]), item["content"]
         if ticket is not None:
             ticket.heard = time.monotonic()
@@ -185,7 +185,7 @@ class _HandedOut:
             yield Message(content)
 
     def _end(self, future: Future[Any]) -> Iterator[Waiting | Finished]:
-        """Take in that dask is done with a task."""
+        """Process the end of a task in dask."""
         ticket = self._tickets.pop(str(future.key), None)
         if ticket is None:
             return
@@ -200,17 +200,17 @@ class _HandedOut:
         elif isinstance(error, KilledWorker):
             ticket.rounds += 1
             if ticket.starts < _STARTS and ticket.rounds < _ROUNDS:
-                self._hand_out(ticket)  # it was there when others took the worker down
+                self._hand_out(ticket)  # another task may have killed the worker
             else:
                 yield Finished(ticket.task, RuntimeError(_WORKER_DIED))
         else:
             yield Finished(ticket.task, error)
 
-    def _look(self, held_up: float) -> Iterator[Waiting | Finished]:
-        """See what the workers do, and act on what has lasted too long.
+    def _check_workers(self, held_up: float) -> Iterator[Waiting | Finished]:
+        """Check the workers, and replace those whose task exceeds a limit.
 
-        The seconds for which this process was held up do not count: what came meanwhile is not
-        heard yet.
+        The seconds for which this process was suspended (``held_up``) do not count: messages of
+        that time have not been processed yet.
         """
         for ticket in self._tickets.values():
             ticket.begun, ticket.heard = ticket.begun + held_up, ticket.heard + held_up
@@ -227,7 +227,7 @@ class _HandedOut:
         yield from self._watch.look(at_workers, self._tickets, held_up)
 
     def _processing(self) -> dict[str, Any] | None:
-        """Return the keys at each worker; nothing when the scheduler does not answer."""
+        """Return the task keys at each worker; None if the scheduler does not answer."""
         with contextlib.suppress(OSError, TimeoutError):
             self._room = _SPARE + sum(self._ask("ncores", workers=None).values())
             return dict(self._ask("processing", workers=None))
@@ -240,14 +240,14 @@ class _HandedOut:
         )
 
     def _replace(self, worker: str) -> None:
-        """Have a worker killed and started anew, without waiting for it."""
+        """Restart a worker, without waiting for it."""
         for ticket in self._tickets.values():
             if ticket.worker == worker:
-                ticket.starts -= 1  # its death is no doing of this task, which begins anew
+                ticket.starts -= 1  # the death is not the fault of this task, which begins again
                 ticket.worker, ticket.computing = "", False
 
         def restart() -> None:
-            with contextlib.suppress(Exception):  # it is removed when its keeper is gone too
+            with contextlib.suppress(Exception):  # it is removed if its nanny is gone too
                 self._ask(
                     "restart_workers", 2 * _RESTART, workers=[worker], timeout=_RESTART,
                     wait_for_workers=False, on_error="return", stimulus_id=self._topic,
@@ -257,7 +257,7 @@ class _HandedOut:
         self._replacing[-1].start()
 
     def _stop(self) -> Iterator[Message]:
-        """Drop all tasks, and wait a little for those that run."""
+        """Cancel all tasks, and wait a little for those that run."""
         running = {key for key, ticket in self._tickets.items() if ticket.worker}
         for ticket in self._tickets.values():
             _drop(ticket)
@@ -272,7 +272,7 @@ class _HandedOut:
 
 
 def _drop(ticket: Ticket) -> None:
-    """Cancel a task that nobody needs any more; where it runs, it stops."""
+    """Cancel a task that is not needed any more; if it runs, it stops."""
     if ticket.future is not None:
         ticket.future.release()
         ticket.future = None

@@ -1,4 +1,4 @@
-"""How long, and with how much memory, a study may be carried out."""
+"""Limits on the time and the memory of the execution of a study."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ class Limits:
 
     Attributes
     ----------
-    stall_seconds : time a loading path may be on a worker without progress [s]; then its runs
-        are stored as ``error`` and the worker is replaced
-    path_seconds : time a loading path may be on a worker in all [s]; then the same
-    memory : most memory of each worker process of our own, such as ``"2GB"``; by default its
+    stall_seconds : longest time of a loading path without progress on a worker [s]; after it its
+        runs are stored as ``error`` and the worker is replaced
+    path_seconds : longest total time of a loading path on a worker [s], with the same consequence
+    memory : largest memory of each worker process started here, such as ``"2GB"``; by default its
         share of the machine's. A worker that needs more is killed and replaced
-    patience : time to wait while no worker takes the work [s]; then `GridLost` is raised
+    patience : longest time to wait for a worker [s]; after it `GridLost` is raised
 
     Raises
     ------
     StudyError
-        when a time is not above zero, or `memory` is no size
+        if a time is not above zero, or `memory` is not a size
     """
 
     stall_seconds: float | None = 900.0

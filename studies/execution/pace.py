@@ -1,8 +1,8 @@
-"""How long an increment takes: as long as those of the runs that the catalogue knows.
+"""The time of an increment, from past runs in the catalogue.
 
 seconds = c unknowns^p increments is fitted to past runs of the same scene. ``cpu_seconds`` and
-``increments`` of a run both include what it shares with other runs of its path, so that their ratio
-is that of the run.
+``increments`` of a run both include the increments that it shares with other runs of its path, so
+that their ratio is correct.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from studies.storage.store import Store
 
 _FIGURES = ("degrees_of_freedom", "increments", "cpu_seconds")
 _PAST = 1000
-"""Most past runs that count, the latest ones."""
+"""Largest number of past runs in the fit, the latest ones."""
 _ENOUGH = 8
-"""Fewest past runs that a fit is made of."""
+"""Smallest number of past runs for a fit."""
 _RATE, _AT, _EXPONENT = 15e-6, 14_000, 1.15
-"""Measured: seconds an unknown and increment at so many unknowns, and p."""
+"""Measured: seconds per unknown and increment, the number of unknowns at which, and p."""
 _DOUBT = 0.2
-"""Doubt of p, which matters as far as a study has other unknowns than the runs known."""
+"""Uncertainty of p; it matters for other numbers of unknowns than those of past runs."""
 _WIDE = 3.0
-"""Factor either way where no runs are known; 45 runs of one mesh differ by 1.5 either way."""
+"""Factor of the low and high estimates without past runs; 45 runs of one mesh differ by 1.5."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +34,9 @@ class Pace:
 
     Attributes
     ----------
-    low, high : factors of what one of six runs takes less than, and one of six more than
-    known_at : unknowns of the runs that it comes from
-    basis : where it comes from, in words
+    low, high : factors for the 16 % and 84 % quantiles of past runs
+    known_at : number of unknowns of the past runs
+    basis : on which data it is based, as text
     """
 
     rate: float
@@ -55,7 +55,7 @@ class Pace:
 
 
 def pace_of(store: Store, scene: str) -> Pace:
-    """Return the pace of the past runs of a scene; a measured one where they are too few."""
+    """Return the pace of past runs of a scene; if they are too few, one measured elsewhere."""
     found = store.catalogue.figures(scene, OK, _FIGURES, _PAST)
     past = np.array([row for row in found if None not in row and min(row) > 0], dtype=float)
     if len(past) < _ENOUGH:
@@ -68,10 +68,10 @@ def pace_of(store: Store, scene: str) -> Pace:
 
 
 def _fitted(unknowns: np.ndarray, increments: np.ndarray, seconds: np.ndarray, basis: str) -> Pace:
-    """Return the pace by least squares of logarithms, without what is far off.
+    """Return the pace by least squares of logarithms, without outliers.
 
-    Runs of one mesh tell nothing of the exponent: it is drawn to the usual one, as much as by one
-    doubt of it beside the usual scatter of runs (0.4).
+    Runs of one mesh do not determine the exponent. It is regularised towards the usual one, with
+    the weight of its uncertainty relative to the usual scatter of runs (0.4).
     """
     x, y = np.log(unknowns), np.log(seconds / increments)
     kept = np.full(len(x), True)

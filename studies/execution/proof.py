@@ -13,9 +13,9 @@ from studies.storage.appearing import appearing
 from studies.storage.store import Store
 
 _PATIENCE = 2.0
-"""Seconds a worker looks for the token. While it looks, other workers get the paths."""
+"""Seconds that a worker looks for the token. Meanwhile other workers get the paths."""
 _POLL = 0.2
-"""Seconds between two looks."""
+"""Seconds between two checks."""
 
 
 class Unfit(Exception):
@@ -24,13 +24,13 @@ class Unfit(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What only a worker that sees the directory can read.
+    """A token that only a worker with access to the directory can read.
 
     Attributes
     ----------
     path : file of the token
-    token : its content, another one each time the study is carried out
-    directory : of the store, as the user has named it
+    token : its content, new each time the study is computed
+    directory : directory of the store, as the user gave it
     """
 
     path: Path
@@ -43,7 +43,7 @@ class Proof:
         Raises
         ------
         Unfit
-            when it is not there
+            if it is not found
         """
         deadline = time.monotonic() + _PATIENCE
         while not self._seen():
@@ -63,7 +63,7 @@ class Proof:
 
 @contextmanager
 def proof_of(store: Store, study_id: str) -> Iterator[Proof]:
-    """Lay a token into the directory of a study while its paths are computed."""
+    """Keep a token in the directory of a study while its paths are computed."""
     path = store.study_directory(study_id).resolve() / "token"
     proof = Proof(path, uuid.uuid4().hex, str(store.directory))
     with appearing(path) as part:

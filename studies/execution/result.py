@@ -1,4 +1,4 @@
-"""The data set of a study: combined, or kept where it was made of the same runs."""
+"""The data set of a study: combined, or kept if it was made of the same runs."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _NAME = "data set"
 
 
 def result(study: Study, store: Store, *, complete: bool, stopped: bool) -> Combined:
-    """Combine the runs of a study, unless its data set is made of these already.
+    """Combine the runs of a study, unless its data set was made of the same runs.
 
     Parameters
     ----------
-    study, store : whose runs, and where they are
+    study, store : the study, and the store of its runs
     complete : whether nothing was computed, and the files of all runs have just been verified
-    stopped : whether runs were left out; a data set that has more of them is kept too
+    stopped : whether runs were left out; an existing data set with more runs is then kept
     """
     made = Made(study, store)
     if complete:

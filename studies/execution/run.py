@@ -1,4 +1,4 @@
-"""A study carried out: what is missing is computed, stored and combined."""
+"""Compute a study: missing runs are computed, stored and combined."""
 
 from __future__ import annotations
 
@@ -31,24 +31,25 @@ DEFAULT = Limits()
 
 
 _ROOM = 10_000_000
-"""Bytes that must be free for a study to begin: a few runs of the scenes."""
+"""Bytes that must be free to begin a study: enough for a few runs."""
 
 _BATCH = 500
-"""Runs whose rows are held at a time."""
+"""Number of runs whose rows are in memory at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyEvent:
-    """Something that happened in a study.
+    """An event during the execution of a study.
 
     Attributes
     ----------
-    kind : ``"path"`` (a loading path has advanced), ``"run"`` (a run has its outcome) or
-        ``"waiting"`` (no worker takes the work; `message` says why, and is empty when it goes on)
+    kind : ``"path"`` (progress of a loading path), ``"run"`` (a run has its status) or
+        ``"waiting"`` (no worker accepts tasks; `message` is the reason, and empty when work goes
+        on)
     progress : fraction of the whole study that is done, 0 to 1
     path : id of the path; empty while waiting
     fraction : fraction of this path that is done, 0 to 1
-    run, status, message : id and outcome of the run, or what the study waits for
+    run, status, message : id, status and message of the run, or the reason of waiting
     """
 
     kind: str
@@ -62,16 +63,16 @@ class StudyEvent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyOutcome:
-    """What came of a study.
+    """The result of the execution of a study.
 
     Attributes
     ----------
     study_id : content id of the study
-    counts : number of runs by status, ``missing`` included, as the data set holds them
+    counts : number of runs by status in the data set, with ``missing``
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
     dataset : the combined data set
-    anew : whether the data set was written anew; it is kept where it was made of the same runs
+    anew : whether the data set was written; it is kept if it was made of the same runs
     wall_seconds : duration
     stopped : whether it was stopped before all was computed
     """
@@ -105,23 +106,23 @@ def run_study(
     on_event: Callable[[StudyEvent], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> StudyOutcome:
-    """Compute what `store` lacks of `study`, and combine its runs into one data set.
+    """Compute the runs of `study` that `store` lacks, and combine all into one data set.
 
     Parameters
     ----------
-    study : what to compute: a study, or the content of a study file
-    store : where runs are kept, whichever study they were computed for
-    scene : with such content, a scene of one's own in place of the name of one
-    workers : worker processes on this machine; by default one a core
-    scheduler : a running dask scheduler, to be used instead; its workers must see the store
-        under the same path
-    resume : compute only the runs that have no outcome; by default failed runs are computed again
+    study : a study, or the content of a study file
+    store : the store of runs, shared by all studies
+    scene : for the content of a study file, the user's own scene in place of a scene's name
+    workers : number of worker processes on this machine; by default one per core
+    scheduler : a running dask scheduler to use instead; its workers must see the store under the
+        same path
+    resume : compute only runs without a stored status; by default failed runs are computed again
         too
     since : with `resume`, failed runs stored before this time are computed again [ns since 1970]
-    limits : on time and memory
-    priority : of studies that share a scheduler, the one with the higher number goes first
-    on_event : called, in this thread, with everything that happens
-    should_stop : called several times a second; once it is true the work stops, and finished
+    limits : limits on time and memory
+    priority : among studies that share a scheduler, the one with the higher number goes first
+    on_event : called, in this thread, with every event
+    should_stop : called several times a second; if it returns true the work stops, and finished
         runs stay
 
     Raises
@@ -129,25 +130,25 @@ def run_study(
     StoreBusy
         when another process computes into the same store
     StudyError
-        when the store cannot be written to, the certificates cannot be used, or a script calls this
-        where its workers would call it too
+        if the store cannot be written to, the certificates cannot be used, or a script calls this
+        outside of ``if __name__ == "__main__":``, so that its workers would call it too
     StoreFull
-        when the disk is full; with room, the same call computes the rest
+        if the disk is full; with free space, the same call computes the rest
     FileDiffers
-        when no file says what was computed, not even that of a run that failed
+        if the file of a run differs from its results, and that of a failed run cannot be written
     GridLost
-        when the scheduler is gone, or no worker took the work for too long; the same call
+        if the scheduler is gone, or no worker accepted the work for too long; the same call
         computes the rest
     """
     started = time.monotonic()
     if not isinstance(study, Study):
         study = Study.from_dict(study, scene)
-    asked = False
+    stop_requested = False
 
     def stop() -> bool:
-        nonlocal asked
-        asked = asked or (should_stop is not None and should_stop())
-        return asked
+        nonlocal stop_requested
+        stop_requested = stop_requested or (should_stop is not None and should_stop())
+        return stop_requested
 
     access = Access(scheduler) if isinstance(scheduler, str) else scheduler
     if access and not store.directory.exists():
@@ -166,9 +167,9 @@ def run_study(
         work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
         if wanted:
             if shutil.disk_usage(store.directory).free < _ROOM:
-                raise StoreFull(str(store.directory))  # no path is walked in vain
+                raise StoreFull(str(store.directory))  # before any path is computed in vain
             work.compute(workers or os.cpu_count() or 1, access, stop)
-        stopped = asked and bool(wanted - work.computed)
+        stopped = stop_requested and bool(wanted - work.computed)
         combined = result(study, store, complete=not wanted, stopped=stopped)
     return StudyOutcome(
         study_id=study.id,
@@ -183,14 +184,14 @@ def run_study(
 
 
 def _answering(access: Access) -> None:
-    """Refuse a scheduler that does not answer, before a directory is made for its results."""
+    """Raise `GridLost` if a scheduler does not answer, before a directory is made."""
     with connect(access):
         pass
 
 
 @dataclass(slots=True)
 class _Work:
-    """The runs still to compute, and how far they are."""
+    """The runs to compute, and their progress."""
 
     study: Study
     store: Store
@@ -229,7 +230,7 @@ class _Work:
                         unwritable.append(error)
                     case Finished(task, error):
                         self._close(task, error)
-        for error in unwritable:  # by the name the user gave, not the worker's
+        for error in unwritable:  # with the directory as the user gave it, not the worker's path
             directory = str(self.store.directory)
             if isinstance(error, StoreFull):
                 raise StoreFull(directory)
@@ -252,7 +253,7 @@ class _Work:
         if "row" in content:
             self._keep(path, [content["row"]])
             return
-        cases, before = self._walking.get(path, (0, 1.0))  # a late word of a path that is done
+        cases, before = self._walking.get(path, (0, 1.0))  # default: a late message of a done path
         fraction = max(before, content["fraction"])
         if cases:
             self._walking[path] = (cases, fraction)
@@ -273,7 +274,7 @@ class _Work:
         self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
 
     def _close(self, task: PathTask, error: Exception | None) -> None:
-        """Record the runs of a path that were not heard of; as broken when it did not end well."""
+        """Record the runs of a path without a report; as ``error`` if the path failed."""
         self._walked += self._walking.pop(task.path.id)[0]
         stored = task.stored(self.store)
         for case in task.path.cases:
@@ -285,7 +286,7 @@ class _Work:
                 self._keep(task.path.id, [self.store.write_run(case, str(error))])
 
     def _progress(self) -> float:
-        """Return the fraction of the study that is done, runs found finished included."""
+        """Return the completed fraction of the study, including runs found in the store."""
         total = self.study.size
         walked = sum(cases * fraction for cases, fraction in self._walking.values())
         done = max(self._walked + walked, len(self.computed))

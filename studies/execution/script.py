@@ -1,4 +1,4 @@
-"""Whether worker processes can import the script that asks for them."""
+"""Check that worker processes can import the script that starts them."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ GUARD = 'if __name__ == "__main__":'
 
 
 def check_script() -> None:
-    """Refuse to start workers from a script that they would run anew.
+    """Refuse to start workers from a script that each worker would run again.
 
-    A worker process imports the script that was started. Where this asks for workers as it is
-    imported, outside of `GUARD`, each worker would ask for more. A notebook, the interpreter's
-    prompt and ``python -c`` have no file to import.
+    A worker process imports the script that was started. If the script starts workers outside of
+    `GUARD`, each worker would start more. A notebook, the interpreter's prompt and ``python -c``
+    have no file to import.
 
     Raises
     ------
     StudyError
-        with the script and the line that asks
+        naming the script and the line
     """
     file = getattr(sys.modules["__main__"], "__file__", None)
     line = _line_of(file) if file else None
@@ -35,7 +35,7 @@ def check_script() -> None:
         return
     try:
         statements = ast.parse(Path(file).read_bytes()).body
-    except (OSError, SyntaxError, ValueError):  # no source that could be imported as text
+    except (OSError, SyntaxError, ValueError):  # not a Python source
         return
     if not any(only_as_script(each) and _guards(each, line) for each in statements):
         allowed = (
@@ -45,13 +45,13 @@ def check_script() -> None:
 
 
 def _guards(statement: ast.stmt, line: int) -> bool:
-    """Tell whether a line is in a statement, or after one that ends the module."""
+    """Whether a line is in the statement, or after it if it ends the module."""
     ends = isinstance(statement, ast.If) and isinstance(statement.body[-1], ast.Raise)
     return statement.lineno <= line and (ends or line <= (statement.end_lineno or line))
 
 
 def _line_of(file: str) -> int | None:
-    """Return the line of the script that is being carried out, outside of its functions."""
+    """Return the line of the script that is being run at module level."""
     frame: FrameType | None = inspect.currentframe()
     while frame is not None:
         if frame.f_globals is vars(sys.modules["__main__"]) and frame.f_code.co_name == "<module>":

@@ -1,4 +1,4 @@
-"""What a worker does: walk one loading path, and write each run as soon as it is known."""
+"""The task of a worker: compute one loading path, and write each run as soon as it is done."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ NO_RECORD = "the scene ended its loading path without a record of this run"
 
 
 _WORTH, _SILENCE = 0.01, 1.0
-"""Part of a path after which its progress is worth a message, and seconds after which it is in any
-case: a message costs as much as a short increment."""
+"""Progress of a path after which a message is sent, and seconds after which one is sent in any
+case. A message costs as much as a short increment."""
 
 REFUSAL_SECONDS = 1.0
-"""Time a worker takes to refuse a task; while it does, other workers get the paths."""
+"""Time that a worker waits before it refuses a task; meanwhile other workers get the paths."""
 
 
 @dataclass(frozen=True, slots=True)
 class PathTask:
-    """A loading path to walk, or what is left of it, and where its runs are written.
+    """A loading path to compute, or the rest of one, and the directory of its runs.
 
     Attributes
     ----------
-    scene, path : what to compute
-    directory : of the store
-    source : `solver_hash` of the process that started the study; a worker whose own differs
-        refuses the task, and the study waits for another one
-    keep : what is kept beyond the results of the scene
-    proof : that the worker sees the directory; None where this is known
-    stale : by id, the time of change [ns] of the files that the study replaces; a file that has
-        another one was written by a worker that died on this task, and is kept
+    scene, path : the scene and its loading path
+    directory : directory of the store
+    source : `solver_hash` of the process that started the study; a worker with another one refuses
+        the task, and the study waits for another worker
+    keep : what is kept in addition to the results of the scene
+    proof : proof that the worker sees the directory; None if this is certain
+    stale : by id, the time of change [ns] of files that the study replaces; a file with another
+        time was written by a worker that died on this task, and is kept
     """
 
     scene: Scene
@@ -53,7 +53,7 @@ class PathTask:
     stale: Mapping[str, int] = field(default_factory=dict)
 
     def __dask_tokenize__(self) -> tuple[Any, ...]:
-        """Return what tells this task from others: dask need not read what it is made of."""
+        """Return an identity of this task, so that dask need not hash its content."""
         return type(self).__name__, self.source, [case.id for case in self.path.cases]
 
     def stored(self, store: Store) -> dict[str, dict[str, Any]]:
@@ -64,7 +64,7 @@ class PathTask:
 
 
 class StopAsked(Exception):
-    """Raised inside a loading path to leave it, because the study was stopped."""
+    """Raised inside a loading path to end it, because the study was stopped."""
 
 
 def walk(
@@ -72,17 +72,17 @@ def walk(
 ) -> None:
     """Compute the runs of a loading path, and report their catalogue rows.
 
-    A run whose file exists is not computed again: where a worker died, the next one continues.
-    When the scene raises an error, the runs that have no record yet are written as broken, with
-    the error as their message. A record that cannot be written, or whose file would say something
-    else, breaks its own run only.
+    A run whose file exists is not computed again, so that the next worker continues after one that
+    died. If the scene raises an error, the runs without a record are written with the status
+    ``error`` and the error as their message. A record that cannot be written, or whose file would
+    differ, gives only its own run this status.
 
     Raises
     ------
     StoreFull, StudyError
-        when nothing can be written to the store, which is no run's fault
+        if the store cannot be written to, which is not the fault of a run
     FileDiffers
-        when not even the file of a broken run says what it should
+        if even the file of a run with the status ``error`` differs
     """
     if task.proof is not None:
         task.proof.check(should_stop)
@@ -95,20 +95,20 @@ def walk(
     store = Store(task.directory)
 
     def keep(row: dict[str, Any]) -> None:
-        with contextlib.suppress(Exception):  # the file tells it too
+        with contextlib.suppress(Exception):  # the file has the row too
             report({"path": task.path.id, "row": row})
 
-    told, since = -1.0, 0.0
+    reported, since = -1.0, 0.0
 
     def monitor(fraction: float) -> None:
-        nonlocal told, since
+        nonlocal reported, since
         now = time.monotonic()
         try:
-            if fraction >= min(told + _WORTH, 1.0) or now >= since + _SILENCE:
+            if fraction >= min(reported + _WORTH, 1.0) or now >= since + _SILENCE:
                 report({"path": task.path.id, "fraction": float(fraction)})
-                told, since = fraction, now
+                reported, since = fraction, now
             stop = should_stop()
-        except Exception as error:  # nobody listens: the worker is closing, which is no run's fault
+        except Exception as error:  # the worker is closing, which is not the fault of a run
             raise StopAsked from error
         if stop:
             raise StopAsked
@@ -139,7 +139,7 @@ def walk(
 
 
 def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:
-    """Write the run a record tells of, as broken when the record cannot be written."""
+    """Write the run of a record, with the status ``error`` if the record cannot be written."""
     try:
         return store.write_run(case, record, task.keep)
     except (StoreFull, StudyError):

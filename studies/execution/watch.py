@@ -1,4 +1,4 @@
-"""What is known of tasks that were handed out, and whether workers take the work at all."""
+"""The state of submitted tasks, and whether any worker accepts them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from studies.errors import GridLost
 from studies.execution.limits import Limits
 
 _QUIET = 10.0
-"""Seconds without a worker that takes the work until this is reported."""
+"""Seconds without a worker that accepts tasks until this is reported."""
 _BEGIN = 60.0
-"""Seconds that a worker may take to load what it needs for its first task."""
+"""Seconds that a worker may take to load the program for its first task."""
 
 _NO_WORKER = "no worker is connected to the scheduler: start one, or wait while they start again"
 _NOT_TAKEN = "of the workers that are connected ({}) none takes the work: see their logs"
@@ -22,20 +22,20 @@ _SILENT = "the scheduler does not answer"
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """No worker takes the work, for this `reason`; an empty one says that it goes on."""
+    """No worker accepts tasks, for this `reason`; an empty reason says that work goes on."""
 
     reason: str
 
 
 @dataclass(slots=True)
 class Ticket:
-    """A task that was handed out.
+    """A submitted task.
 
     Attributes
     ----------
-    task, future : what was handed out
-    worker : where it runs; empty while it waits for a worker
-    begun, heard : when it began there, and when it last reported [s]
+    task, future : the task, and its dask future
+    worker : the worker that runs it; empty while it waits for a worker
+    begun, heard : time of its start there, and of its last report [s]
     computing : whether it has reported anything there
     starts, rounds : how often a worker began it, and how often dask gave it up
     """
@@ -50,7 +50,7 @@ class Ticket:
     rounds: int = 0
 
     def overdue(self, limits: Limits) -> str:
-        """Return which limit the task has passed, in words; nothing when none."""
+        """Return the limit that the task has exceeded, as text; empty if none."""
         now = time.monotonic()
         if not self.worker:
             return ""
@@ -64,7 +64,7 @@ class Ticket:
 
 
 class Watch:
-    """Tells when no worker takes the work, and gives up when that lasts.
+    """Reports that no worker accepts tasks, and gives up after some time.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ class Watch:
         self._worked = self._quiet = time.monotonic()
 
     def goes_on(self) -> Iterator[Waiting]:
-        """Take in that a task computes."""
+        """Note that a task computes."""
         self._worked = self._quiet = time.monotonic()
         if self._reason:
             self._reason = ""
             yield Waiting("")
 
     def refused(self, reason: str, others: Iterable[Ticket]) -> Iterator[Waiting]:
-        """Tell that a worker refused: once for each, and when none of the `others` computes."""
+        """Report that a worker refused: once for each, and if none of the `others` computes."""
         idle = not any(other.computing for other in others)
         if reason not in self._refusals or (idle and not self._reason):
             self._refusals.add(reason)
@@ -99,14 +99,14 @@ class Watch:
         tickets: Mapping[str, Ticket],
         held_up: float = 0.0,
     ) -> Iterator[Waiting]:
-        """Judge the keys that are at each worker; there are none when the scheduler is silent.
+        """Evaluate the task keys at each worker; None if the scheduler does not answer.
 
         Time for which this process was `held_up` does not count [s].
 
         Raises
         ------
         GridLost
-            when patience is at its end
+            if no worker has accepted tasks for longer than `patience`
         """
         reason = _NOT_TAKEN.format(len(at_workers)) if at_workers else _NO_WORKER
         if at_workers is None:
@@ -125,13 +125,13 @@ class Watch:
     def _taken(
         self, at_workers: Mapping[str, Iterable[str]], tickets: Mapping[str, Ticket], now: float
     ) -> bool:
-        """Tell whether a worker computes, for us or for others, or is about to begin."""
+        """Whether a worker computes, for this study or others, or is about to begin."""
         self._since = {worker: self._since.get(worker, now) for worker in at_workers}
         others = any(key not in tickets for keys in at_workers.values() for key in keys)
         if others or not tickets or any(ticket.computing for ticket in tickets.values()):
             self._worked = now
             return True
-        # A worker that has just come may be killed again; one that stays is loading the program.
+        # A new worker may be killed again; one that stays is loading the program.
         queued = {key for key, ticket in tickets.items() if not ticket.worker}
         return (
             now - self._worked < _BEGIN

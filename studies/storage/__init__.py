@@ -1,1 +1,1 @@
-"""Where results are kept: one file a run, one data set a study, a catalogue of all."""
+"""Storage of results: one file for each run, one data set for each study, a catalogue of all."""

@@ -1,4 +1,4 @@
-"""Files that are there in full, or not at all."""
+"""Atomic writing of files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 @contextmanager
 def appearing(path: Path) -> Iterator[Path]:
-    """Give a path to write to; what was written appears under `path` at once, or not at all."""
+    """Give a temporary path to write to; the finished file then gets the name `path` at once."""
     part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
     try:
         yield part

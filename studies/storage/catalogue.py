@@ -1,10 +1,10 @@
 """The catalogue: every run of a directory in one table that can be queried.
 
-The process that computes is the only writer. Readers, in other threads or processes, open
-their own short connections. They may write, for one reason: the first to come after a writer was
-killed undoes what that left half done. The journal is SQLite's rollback journal: unlike the
-write-ahead log it needs no memory shared between machines, so the directory may lie on a network
-volume. SQLite has no checksums: each row carries its own.
+The process that computes is the only writer. Readers, in other threads or processes, open their own
+short connections. They write only in one case: after a writer was killed, the first reader rolls
+its unfinished transaction back. The journal is SQLite's rollback journal: unlike the write-ahead
+log it needs no memory shared between machines, so the directory may be on a network volume. SQLite
+has no checksums, so each row has its own.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ Row = dict[str, Any]
 class Catalogue:
     """Rows of runs in an SQLite file.
 
-    Every method raises `CatalogueDamaged` where the file is not what was written, `StoreFull` where
-    the disk is full, and `StoreBusy` where another process does not let go of the file.
+    Every method raises `CatalogueDamaged` if the file is damaged, `StoreFull` if the disk is full,
+    and `StoreBusy` if another process locks the file for too long.
 
     Parameters
     ----------
-    path : the file; it is made by the first write
+    path : the file; the first write creates it
     """
 
     def __init__(self, path: Path) -> None:
@@ -92,14 +92,14 @@ class Catalogue:
         return page, total
 
     def rows(self, run_ids: Iterable[str]) -> dict[str, Row]:
-        """Return, by id, the rows of those of `run_ids` that are known."""
+        """Return, by id, the rows of those `run_ids` that the catalogue has."""
         wanted = json.dumps(list(run_ids))
         with self._reading() as connection:
             found = _select(connection, "WHERE id IN (SELECT value FROM json_each(?))", [wanted])
         return {row["id"]: row for row in found}
 
     def counts(self, run_ids: Iterable[str] | None = None) -> dict[str, int]:
-        """Return how many runs, or how many of `run_ids`, are known, by status."""
+        """Return the number of runs by status, of all or of `run_ids`."""
         where, values = "", []
         if run_ids is not None:
             where, values = "WHERE id IN (SELECT value FROM json_each(?))", [list(run_ids)]
@@ -111,7 +111,7 @@ class Catalogue:
             return dict(found.fetchall())
 
     def having(self, statuses: Iterable[str], run_ids: Iterable[str], keep: str = "") -> set[str]:
-        """Return those of `run_ids` that have such a status, and keep what is to be kept."""
+        """Return those `run_ids` with one of the `statuses` and this value of ``keep``."""
         wanted, these = json.dumps(list(run_ids)), json.dumps(list(statuses))
         with self._reading() as connection:
             found = connection.execute(
@@ -134,7 +134,7 @@ class Catalogue:
             ).fetchall()
 
     def changes(self) -> tuple[int, int]:
-        """Return what every change of the catalogue changes: its file, and how often it changed.
+        """Return a value that changes with every change of the catalogue: file and change counter.
 
         SQLite counts the transactions in the head of its file: https://sqlite.org/fileformat.html,
         section 1.3.7.
@@ -154,7 +154,7 @@ class Catalogue:
             connection.executemany(f"INSERT OR REPLACE INTO runs VALUES ({marks})", values)
 
     def remove(self, run_ids: Iterable[str]) -> None:
-        """Forget runs."""
+        """Delete the rows of runs."""
         with self._writing() as connection:
             connection.executemany("DELETE FROM runs WHERE id = ?", [[each] for each in run_ids])
 
@@ -164,9 +164,9 @@ class Catalogue:
             return {row[0] for row in connection.execute("SELECT id FROM runs")}
 
     def stamps(self) -> dict[str, tuple[int | None, int | None]]:
-        """Return, by id, length and time of change [ns] of each run's file, as they were noted.
+        """Return, by id, the recorded length and time of change [ns] of each run's file.
 
-        All there is is read and compared with its checksums: a damaged catalogue is found here.
+        The whole catalogue is read and compared with its checksums, which detects damage.
         """
         with self._reading() as connection:
             for (finding,) in connection.execute("PRAGMA integrity_check(1)"):
@@ -177,7 +177,7 @@ class Catalogue:
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
-        """Give a connection that sees one state; nothing written yet is a table without rows."""
+        """Give a connection that sees one state; without a file the table is empty."""
         there = self.path.exists()
         address = f"{self.path.resolve().as_uri()}?mode=rw" if there else ":memory:"
         with self._connection(address, "BEGIN") as connection:
@@ -187,7 +187,7 @@ class Catalogue:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """Give a connection whose changes, the table itself included, come at once or never."""
+        """Give a connection for one transaction, which creates the table if needed."""
         address = self.path.resolve().as_uri()
         with self._connection(address, "BEGIN IMMEDIATE") as connection, connection:
             if not self._made(connection):
@@ -197,7 +197,7 @@ class Catalogue:
             yield connection
 
     def _made(self, connection: sqlite3.Connection) -> bool:
-        """Tell whether there is a table, and refuse one that another version has made."""
+        """Whether there is a table; raise `CatalogueDamaged` for one of another version."""
         found = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         if found and found[0] != f"CREATE TABLE {_TABLE}":
             raise CatalogueDamaged(f"{self.path.name} has the columns of another version")
@@ -211,12 +211,12 @@ class Catalogue:
                 connection.execute(begin)
                 yield connection
         except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
-            raise  # not the file's doing
+            raise  # a programming error, not damage of the file
         except (sqlite3.DatabaseError, _WrongRow) as error:
-            raise self._told(error) from error
+            raise self._translated(error) from error
 
-    def _told(self, error: Exception) -> Exception:
-        """Return an error of SQLite in our terms."""
+    def _translated(self, error: Exception) -> Exception:
+        """Return the error of this package for an error of SQLite."""
         reason = f"{self.path.name} cannot be used: {error}"
         # A write past a quota or past the allowed size of a file is an I/O error to SQLite.
         full = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE}
@@ -225,15 +225,15 @@ class Catalogue:
             return StoreFull(str(self.path.parent))
         if code & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
             return StoreBusy(f"{reason}; another process holds it")
-        # A plain error is content that no statement of ours expects, such as text that is no JSON.
+        # A plain error is unexpected content, such as text that is not JSON.
         damaged = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR}
         if code & 0xFF in damaged or self.path.is_dir():
-            return CatalogueDamaged(f"{reason}; it is made anew when a study is computed here")
+            return CatalogueDamaged(f"{reason}; it is made again when a study is computed here")
         return OSError(reason)
 
 
 class _WrongRow(ValueError):
-    """A row is not what was written."""
+    """A row does not agree with its checksum."""
 
 
 def _select(connection: sqlite3.Connection, rest: str, values: list[Any]) -> list[Row]:

@@ -1,4 +1,4 @@
-"""The runs of a study laid side by side in one data set, written run by run."""
+"""Combine the runs of a study in one data set, which is written run by run."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from studies.storage.store import Store
 def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
     """Write the combined data set of `study`, and return what it holds.
 
-    Sweep dimensions come first: the usual ones, then the other axes. What a linked axis sets is a
-    coordinate over its labels. Runs are matched by *label* along labelled dimensions
-    (``component``, ``stage``, ``body``), which get the union of the labels; along numeric ones
-    (``x``, ``depth``) too where all runs have the same grid, or the beginning of the longest. Where
-    grids differ, as when a length is swept, runs are matched by position, and ``x`` becomes a
-    variable over the sweep; where they differ in scale alone, ``x_fraction`` is the index, the
-    position as a fraction of the run's largest one. Shorter grids are filled up with NaN. Runs
+    Sweep dimensions come first: the usual ones, then the other axes. A parameter set by a linked
+    axis is a coordinate over its labels. Runs are matched by *label* along labelled dimensions
+    (``component``, ``stage``, ``body``), which get the union of the labels. Along numeric ones
+    (``x``, ``depth``) they are matched by value if all runs have the same grid, or the beginning of
+    the longest. If grids differ, as when a length is swept, runs are matched by index, and ``x``
+    becomes a variable over the sweep; if they differ only in scale, ``x_fraction`` is the index,
+    the position as a fraction of the run's largest one. Shorter grids are filled up with NaN. Runs
     without a record are NaN.
     """
     places = {case.id: case.index for case in cases}
@@ -41,7 +41,7 @@ def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
         found = {key: at for key, at in places.items() if store.run_path(key).exists()}
         try:
             return _combined(study, store, found, [key for key in places if key not in found])
-        except RunUnreadable as error:  # what it left in the data set must go: from the beginning
+        except RunUnreadable as error:  # the data set has parts of it: begin again
             store.set_aside(error)
 
 
@@ -65,13 +65,13 @@ def _combined(
             outcomes[run_id] = study.taken(str(status)), str(message)
             frame.small["status"][0][at] = outcomes[run_id][0]
             ran.add(what_ran(global_attributes(run)))
-            if SYMMETRIC in run.attrs:  # a run without a record does not know
+            if SYMMETRIC in run.attrs:  # a run without a record lacks it
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    told = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
+    attrs = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
     store.clear_directory(target)
     with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
         with h5netcdf.File(disk, "w") as file:
-            file.attrs.update(told | {"id": study.id, SYMMETRIC: int(halves == {1})})
+            file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})
             frame.create_axes(file)
             frame.create_fields(file)
             frame.write_small(file)
@@ -93,7 +93,7 @@ def _combined(
 
 
 def _words(study: Study) -> dict[str, str]:
-    """Return the study's own words as attributes, where it has any."""
+    """Return note and tags of the study as attributes, if it has them."""
     words = {"note": study.note, "tags": " ".join(study.tags)}
     return {name: text for name, text in words.items() if text}
 

@@ -1,4 +1,4 @@
-"""One run as a labelled data set: names, units and flags in CF terms."""
+"""One run as a labelled data set, with names, units and flags by the CF conventions."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
 
 
 def attributes_of(name: str, scene: Scene | None = None) -> dict[str, str]:
-    """Return the CF attributes of a variable or coordinate; unknown ones are named in words.
+    """Return the CF attributes of a variable or coordinate; an unknown one gets its name as text.
 
-    A ``scene`` may have numbers of its own.
+    A ``scene`` may declare its own quantities.
     """
     own = {each.name: each for each in scene.quantities} if scene else {}
     quantity = QUANTITIES.get(name) or own.get(name) or IN_SPACE.get(name)
@@ -50,8 +50,8 @@ def usual_dimensions(scene: Scene) -> tuple[str, ...]:
 def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.Dataset:
     """Return the data set of a run.
 
-    Of its study it holds nothing but what the study wants kept: with ``keep`` the fields
-    at the nodes, where the run is complete.
+    It does not depend on the study, except for ``keep``: with it a complete run has the fields at
+    the nodes.
     """
     sweep = usual_dimensions(scene)
     ones = (1,) * len(sweep)
@@ -75,7 +75,7 @@ def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.
 
 
 def broken_dataset(scene: Scene, case: Case, message: str) -> xr.Dataset:
-    """Return the data set of a run that gave no record: status and message only."""
+    """Return the data set of a run without a record: status and message only."""
     return _frame(scene, case, usual_dimensions(scene), ERROR, message)
 
 
@@ -93,7 +93,7 @@ def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
 
 
 def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the catalogue keeps of a run: identity, outcome, parameters and figures.
+    """Return the catalogue's entry of a run: identity, status, parameters and figures.
 
     Parameters
     ----------
@@ -123,8 +123,8 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
 def _frame(
     scene: Scene, case: Case, sweep: tuple[str, ...], status: str, message: str
 ) -> xr.Dataset:
-    """Return a data set with everything but what the solver computed."""
-    import xarray as xr  # half a second: only who makes a data set waits for it
+    """Return a data set without the results of the solver."""
+    import xarray as xr  # takes half a second, and is needed only to make a data set
 
     ones = (1,) * len(sweep)
     outcome, text = (np.full(ones, each, dtype=object) for each in (status, message))
@@ -150,6 +150,6 @@ def _scalar(name: str, number: float) -> np.ndarray:
 
 
 def _plain(name: str, number: float) -> float | None:
-    """Return a number as JSON has it: None for one that is absent."""
+    """Return a number as a JSON value: None for one that is absent."""
     absent = number == INTEGER_FILL if _is_count(name) else not np.isfinite(number)
     return None if absent else number

@@ -1,4 +1,4 @@
-"""The shape of a combined data set: axes, grids, variables, and where a run is written."""
+"""The layout of a combined data set: axes, grids, variables, and the place of each run."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from studies.storage import dataset as layout
 from studies.storage.runfile import variables
 
 SAME = 1e-9
-"""Relative difference below which two runs are taken to have the same grid."""
+"""Relative difference below which two grids are the same."""
 FRACTION = "_fraction"
-"""Ends the name of the index of grids that differ from run to run but in scale."""
+"""Suffix of the index of grids that differ from run to run only in scale."""
 _PIECE = 32
-"""Values along a dimension that are compressed together at least, where lengths differ."""
+"""Least number of values along a dimension in a compressed chunk, if lengths differ."""
 _NO_COORDINATE = "_nc4_non_coord_"
-"""Before the name HDF5 has for a variable called like a dimension whose coordinate it is not."""
+"""Prefix of the HDF5 name of a variable that has the name of a dimension, but is no coordinate."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Frame:
-    """Shape of the combined data set, learnt from the runs, and what is small enough to hold.
+    """Layout of the combined data set, found from the runs, with all small variables in memory.
 
     Attributes
     ----------
-    scene, axes, usual : all sweep dimensions with their values; those that a run's file has
+    scene, axes, usual : the scene; all sweep dimensions with their values; those of a run's file
     linked : parameter set by a linked axis -> the axis, the values over it
     labels : labelled dimension -> union of the labels
-    grids, sizes, shortest : numeric dimension -> the grid found, of several alike the longest;
-        the greatest length; the smallest
+    grids, sizes, shortest : numeric dimension -> the grid, the longest of several that agree; the
+        greatest length; the smallest
     ragged : numeric dimensions whose grid differs from run to run
-    shares : numeric dimension -> its grid / the largest position on it, None where these differ
+    shares : numeric dimension -> its grid / the largest position on it, None if these differ
     fields : variable -> (dimensions after the sweep's, attributes)
     small : variable -> its values over the sweep: scalars, flags, texts
     """
@@ -69,11 +69,11 @@ class Frame:
 
     @property
     def auxiliary(self) -> dict[str, str]:
-        """CF attribute of a variable over the sweep: its coordinates that are no dimensions."""
+        """CF attribute of a variable over the sweep: its coordinates that are not dimensions."""
         return {"coordinates": " ".join(self.linked)} if self.linked else {}
 
     def learn(self, run: h5py.File, at: tuple[int, ...]) -> None:
-        """Take in the grids and variables of one run, and its values that are small."""
+        """Add the grids and variables of one run, and its small values."""
         for name in variables(run):
             if name in self.usual or name in self.fields:
                 continue
@@ -122,12 +122,12 @@ class Frame:
 
     @property
     def fractions(self) -> dict[str, np.ndarray]:
-        """Grids that differ from run to run in scale alone, as fractions of their largest value."""
+        """Grids that differ from run to run only in scale, as fractions of their largest value."""
         found = {name: self.shares[name] for name in sorted(self.ragged)}
         return {name: share for name, share in found.items() if share is not None}
 
     def create_axes(self, file: h5netcdf.File) -> None:
-        """Make the dimensions and their coordinates."""
+        """Create the dimensions and their coordinates."""
         lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
         file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
         own = {name: (name, values) for name, values in self.axes.items()}
@@ -144,14 +144,14 @@ class Frame:
                 _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
         for name, share in self.fractions.items():
             words = f"{name} / the largest {name} of the run"
-            told = {"long_name": words, "units": "1"}
-            _write(file, f"{name}{FRACTION}", (name,), share, told, complete=True)
+            attrs = {"long_name": words, "units": "1"}
+            _write(file, f"{name}{FRACTION}", (name,), share, attrs, complete=True)
 
     def create_fields(self, file: h5netcdf.File) -> None:
-        """Make the variables that are written run by run.
+        """Create the variables that are written run by run.
 
-        A run has one compressed chunk, or several along a dimension that is longer in other runs:
-        the length that it lacks is not written.
+        A run has one compressed chunk, or several along a dimension that is longer in other runs,
+        so that the missing length is not written.
         """
         for name, (inner, attributes) in self.fields.items():
             sizes = [self.sizes.get(each) or len(self.labels[each]) for each in inner]
@@ -182,16 +182,16 @@ class Frame:
                 target[(*at, *map(slice, whole.shape))] = whole
 
     def write_small(self, file: h5netcdf.File) -> None:
-        """Write what was held in memory."""
+        """Write the variables that are in memory."""
         for name, (values, attributes) in self.small.items():
             _write(file, name, tuple(self.axes), values, attributes | self.auxiliary)
 
     def _extent(self, dimension: str, length: int) -> int:
-        """Return up to where a run that has this length writes along a dimension."""
+        """Return the end up to which a run with this length writes along a dimension."""
         return len(self.labels[dimension]) if dimension in self.labels else length
 
     def _places(self, run: h5py.File, dimension: str) -> list[int]:
-        """Return where a run's points along a dimension lie in the combined one."""
+        """Return the positions of a run's points along a dimension in the combined one."""
         if dimension in self.labels:
             return [self.labels[dimension].index(label) for label in _values(run[dimension])]
         return list(range(len(run[dimension])))
@@ -231,14 +231,14 @@ def _write(
 
 
 def _absent(name: str, kind: np.dtype[Any]) -> Any:
-    """Return what stands for a run that has not given this variable."""
+    """Return the value for a run that does not have this variable."""
     if name == "status":
         return MISSING
     return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
 
 
 def _axis_array(values: Sequence[Any]) -> np.ndarray:
-    """Return numbers as numbers, left-out ones as NaN, and anything else as text."""
+    """Return numbers as numbers, None as NaN, and anything else as text."""
     values = [np.nan if value is None else value for value in values]
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.asarray(values)

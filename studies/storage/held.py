@@ -1,4 +1,4 @@
-"""What the catalogue holds of a study: how its runs ended, and a digest of them."""
+"""The runs of a study in the catalogue: their statuses, and a digest of them."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from studies.definition.vocabulary import MISSING, OK
 from studies.storage.store import Store
 
 _BATCH = 500
-"""Runs whose rows are held at a time."""
+"""Number of runs whose rows are in memory at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Combined:
-    """What the data set of a study holds.
+    """The content of the data set of a study.
 
     Attributes
     ----------
-    path : the data set
-    counts, failed : as those of a `StudyOutcome`
+    path : path of the data set
+    counts, failed : as in `StudyOutcome`
     missing : ids of the runs that it lacks
     anew : whether it was written now, not kept
     """
@@ -37,10 +37,10 @@ class Combined:
 
 
 def held(study: Study, store: Store) -> tuple[str, Combined]:
-    """Return a digest of the runs of `study`, and what a data set made of them holds.
+    """Return a digest of the runs of `study`, and the content of a data set made of them.
 
-    The digest is another one when a run is there or gone, or when its file has another length or
-    time of change: whoever relies on it has compared the catalogue with the files (`Store.sound`).
+    The digest changes if a run is added or removed, or if its file has another length or time of
+    change in the catalogue. Compare the catalogue with the files first (`Store.sound`).
     """
     digest = hashlib.sha256()
     counts: Counter[str] = Counter()

@@ -14,12 +14,12 @@ from studies.errors import StoreBusy
 
 @contextmanager
 def locked(directory: Path, file: TextIO) -> Iterator[None]:
-    """Hold a directory by its lock file, which tells who holds it.
+    """Lock a directory by its lock file, which contains the id of the process.
 
     Raises
     ------
     StoreBusy
-        when another process holds it; with its process id
+        if another process has the lock; with its process id
     """
     with file:
         try:
@@ -32,7 +32,7 @@ def locked(directory: Path, file: TextIO) -> Iterator[None]:
                 f"{directory}: {who} computes here; "
                 "wait until it has ended, or name another directory"
             ) from None
-        with suppress(OSError):  # a full disk is reported by whoever writes results
+        with suppress(OSError):  # a full disk is reported when results are written
             os.ftruncate(file.fileno(), 0)
             os.write(file.fileno(), f"{os.getpid()}\n".encode())
         yield

@@ -1,9 +1,8 @@
 """Memo of derived files (``made.json``): data set, report, picture are kept while inputs last.
 
-A result is one or several files, such as the data set. Of each, a digest of all it was made of is
-kept, and one of every file. A result is made anew where a file is gone or is not what was written,
-where it was made of something else, and after any change of our sources or of the libraries that
-write and draw.
+A result is one or several files, such as the data set. The memo has a digest of its inputs, and one
+of each file. A result is made again if a file is missing or changed, if its inputs differ, and
+after any change of this project's sources or of the libraries that write and draw.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ class Made:
 
     Parameters
     ----------
-    study, store : whose, and where
+    study, store : the study, and the store of its results
     """
 
     def __init__(self, study: Study, store: Store) -> None:
@@ -39,7 +38,7 @@ class Made:
         self._file = self._directory / "made.json"
 
     def kept(self, result: str, of: str) -> list[Path] | None:
-        """Return the files of a result that is there, made of this; None where it must be made."""
+        """Return the files of a result if it was made of the inputs ``of``, else None."""
         try:
             entry = self._entries()[result]
             files = {self._directory / name: digest for name, digest in entry["files"].items()}
@@ -51,15 +50,15 @@ class Made:
         return None
 
     def digest(self, name: str) -> str:
-        """Return the digest of a file, of which something can be made; of none where it is gone."""
+        """Return the digest of a file, as an input of other results; empty if it is missing."""
         return str(_digest(self._directory / name))
 
     def note(self, result: str, of: str, names: Iterable[str]) -> None:
-        """Keep in mind what files were made of, while nobody else writes them."""
+        """Record the inputs of files, while no other process writes them."""
         self._note(result, of, {name: _digest(self._directory / name) for name in names})
 
     def write(self, result: str, of: str, contents: Mapping[str, bytes]) -> list[Path]:
-        """Write files with these contents, keep in mind what they were made of, return them."""
+        """Write files with these contents, record their inputs, and return their paths."""
         for name, content in contents.items():
             self._write(self._directory / name, content)
         self._note(result, of, {name: _hex(content) for name, content in contents.items()})
@@ -92,7 +91,7 @@ class Made:
 
 
 def _digest(path: Path) -> str | None:
-    """Return the digest of a file; None of one that cannot be read."""
+    """Return the digest of a file; None if it cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

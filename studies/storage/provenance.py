@@ -1,4 +1,4 @@
-"""Where a file comes from: which problem, which sources, and what ran to compute it."""
+"""Provenance of a file: the problem, the sources, and the software that computed it."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from studies.definition.identity import solver_hash
 from studies.scenes.registry import attributes
 
 NONE = "none"
-"""Stands for a library that is not installed, and for a linear solver that cannot be had."""
+"""Value for a library that is not installed, and for a linear solver that is not available."""
 
 _LIBRARIES = ("numba", "mkl", "numpy", "scipy", "scikit-fem", "xarray")
 
 
 def provenance(title: str, scene: Scene, parameters: Mapping[str, Any]) -> dict[str, str]:
-    """Return the global attributes of a file: what this is, made from what, by what and when.
+    """Return the global attributes of a file: title, inputs, software and time.
 
-    What ran is in two of them: ``versions``, a JSON object of the versions of solver and
+    The software is in two of them: ``versions``, a JSON object of the versions of solver and
     libraries, and ``linear_solver``, which is ``pardiso`` or ``superlu``.
     """
     return {
@@ -44,15 +44,15 @@ def provenance(title: str, scene: Scene, parameters: Mapping[str, Any]) -> dict[
 
 
 def what_ran(attributes: Mapping[str, str]) -> tuple[str, str]:
-    """Return the attributes of a file that tell what ran to compute it."""
+    """Return the attributes of a file on the software that computed it."""
     return attributes["versions"], attributes["linear_solver"]
 
 
 def together(ran: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Return what ran to compute several runs, each as `what_ran` gives it.
+    """Return the attributes on the software of several runs, each as `what_ran` returns it.
 
-    Runs of one study may come from different machines and times: where they differ, all that
-    ran is listed, with commas. Nothing is returned for no run.
+    Runs of one study may come from different machines and times: different values are listed, with
+    commas. Without runs the result is empty.
     """
     known = sorted(set(ran))
     if not known:
@@ -69,7 +69,7 @@ def _listed(texts: Iterable[str]) -> str:
 
 @cache
 def _versions() -> dict[str, str]:
-    """Return versions from what the packages say of themselves: importing numba takes a second."""
+    """Return versions from the metadata of packages: importing numba would take a second."""
     found = {"solver": solver.__version__}
     for name in _LIBRARIES:
         try:
@@ -80,8 +80,8 @@ def _versions() -> dict[str, str]:
 
 
 def _linear_solver() -> str:
-    """Return the linear solver this process uses; a run that asks for another one has failed."""
-    from solver.linear.solvers import chosen  # scipy: only who writes a file waits for it
+    """Return the linear solver that this process uses."""
+    from solver.linear.solvers import chosen  # imports scipy, needed only to write a file
 
     try:
         return chosen()
@@ -91,7 +91,7 @@ def _linear_solver() -> str:
 
 @cache
 def _commit() -> dict[str, str]:
-    """Return the commit of the solver's own working tree, or nothing where it is not under git."""
+    """Return the commit of the solver's working tree; empty if it is not under git."""
     root = Path(solver.__file__).parent
     git = ["git", "-C", str(root)]
     try:

@@ -1,9 +1,9 @@
-"""The file of a run, read back as its users read it, and compared with the record that was audited.
+"""Read the file of a run back, and compare it with the record that was audited.
 
-The audit judges the record in memory. This is the way from there to the file. What must be in it
-follows from the record and from the declarations of its quantities, not from what the writer has
-made of them; h5py reads the file, which netCDF's own library has written. A reader of netCDF
-scales, shifts and masks values as attributes tell: attributes that no run needs are refused.
+The audit checks the record in memory; this module checks the way from there to the file. The
+required content follows from the record and from the declarations of its quantities, not from the
+code that writes. h5py reads the file, which the netCDF library has written. A reader of netCDF
+scales, shifts and masks values by attributes: attributes that no run needs are refused.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ _DECODED = ("scale_factor", "add_offset", "missing_value", "valid_min", "valid_m
             "_Unsigned", "calendar", "dtype")  # fmt: skip
 """Attributes by which readers change values."""
 _BARE = b"This is a netCDF dimension but not a netCDF variable"
-"""What HDF5 tells of a dimension that has no coordinate."""
+"""Name that HDF5 has for a dimension without a coordinate."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Meant:
-    """What a variable must be: its dimensions, values, and attributes; those not named are free."""
+class _Required:
+    """What a variable must be: its dimensions, values, and attributes; others are free."""
 
     dims: tuple[str, ...]
     values: np.ndarray
@@ -48,38 +48,38 @@ class _Meant:
 
 
 def verified(path: Path, case: Case, outcome: Record | str, keep: str = "") -> dict[str, Any]:
-    """Return the catalogue's row of a run, read from a file that says what it holds.
+    """Return the catalogue's row of a run from its file, if the file has the expected content.
 
     Parameters
     ----------
-    path : of the file, under whatever name
-    outcome : the record of the run, or why there is none
-    keep : what is kept beyond the results of the scene
+    path : path of the file, under any name
+    outcome : the record of the run, or the reason why there is none
+    keep : what is kept in addition to the results of the scene
 
     Raises
     ------
     FileDiffers
-        when anything else is in the file
+        if the file has any other content
     """
     sweep = layout.usual_dimensions(case.scene)
-    meant = dict(_meant(case, outcome, sweep, keep))
+    expected = dict(_expected(case, outcome, sweep, keep))
     try:
-        attributes, values, found = _read(path, meant)
+        attributes, values, found = _read(path, expected)
         found += _of_the_whole(attributes, case, outcome, keep)
     except (OSError, RuntimeError, LookupError, TypeError, ValueError) as error:  # all of h5py
-        told = f"it cannot be read: {type(error).__name__}: {error}"
-        raise FileDiffers(case.id, [told]) from None
+        reason = f"it cannot be read: {type(error).__name__}: {error}"
+        raise FileDiffers(case.id, [reason]) from None
     if found:
         raise FileDiffers(case.id, sorted(found))
-    single = {name: values[name].item() for name in meant if meant[name].dims == sweep}
+    single = {name: values[name].item() for name in expected if expected[name].dims == sweep}
     return layout.summary(attributes, single)
 
 
 def _read(
-    path: Path, meant: Mapping[str, _Meant]
+    path: Path, expected: Mapping[str, _Required]
 ) -> tuple[dict[str, Any], dict[str, np.ndarray], list[str]]:
-    """Return the attributes of a file, the values of its variables, and what is wrong."""
-    import h5py  # a complete study does not wait for it
+    """Return the attributes of a file, the values of its variables, and the differences."""
+    import h5py  # not needed by a complete study
 
     values: dict[str, np.ndarray] = {}
     with h5py.File(path, "r") as file:
@@ -87,21 +87,21 @@ def _read(
         every = {name: file[name] for name in file}
         scales = {each.id: name for name, each in every.items() if each.is_scale}
         there = {name: each for name, each in every.items() if not _is_bare(each, scales)}
-        found = [f"{name} is missing" for name in meant.keys() - there.keys()]
-        found += [f"{name} does not belong there" for name in there.keys() - meant.keys()]
-        own = {name for name, each in meant.items() if not _of_mesh(name, each.dims)}
+        found = [f"{name} is missing" for name in expected.keys() - there.keys()]
+        found += [f"{name} is not expected" for name in there.keys() - expected.keys()]
+        own = {name for name, each in expected.items() if not _of_mesh(name, each.dims)}
         if set(runfile.variables(file)) != own:
-            found.append("the list of its variables is another one")
-        for name in there.keys() & meant.keys():
-            values[name], wrong = _compared(name, there[name], meant[name], scales)
+            found.append("the list of its variables differs")
+        for name in there.keys() & expected.keys():
+            values[name], wrong = _compared(name, there[name], expected[name], scales)
             found += wrong
     return attributes, values, found
 
 
-def _meant(
+def _expected(
     case: Case, outcome: Record | str, sweep: tuple[str, ...], keep: str
-) -> Iterator[tuple[str, _Meant]]:
-    """Yield names and what they must be."""
+) -> Iterator[tuple[str, _Required]]:
+    """Yield names of variables and their expected content."""
     known = parameters_of(case.scene)
     record = None if isinstance(outcome, str) else outcome
     parameters = record.parameters if record else case.parameters
@@ -111,26 +111,26 @@ def _meant(
     ones = (1,) * len(sweep)
     for name in sweep:
         words = {"long_name": known[name].description, "units": known[name].unit}
-        told = {key: text or None for key, text in words.items()}
-        yield name, _Meant((name,), np.array([getattr(parameters, name)]), told)
+        attributes = {key: text or None for key, text in words.items()}
+        yield name, _Required((name,), np.array([getattr(parameters, name)]), attributes)
     for name, text in (("status", status), ("message", message)):
         value = np.full(ones, text, dtype=object)
-        yield name, _Meant(sweep, value, LABEL_ATTRIBUTES[name])
+        yield name, _Required(sweep, value, LABEL_ATTRIBUTES[name])
     if record is None:
         return
     for name, labels in record.coordinates.items():
-        yield name, _Meant((name,), np.asarray(labels), _words(name, case.scene))
+        yield name, _Required((name,), np.asarray(labels), _words(name, case.scene))
     for name, (dims, array) in record.fields.items():
         full = np.reshape(np.asarray(array, dtype=float), ones + np.shape(array))
-        yield name, _Meant((*sweep, *dims), full, _words(name, case.scene))
+        yield name, _Required((*sweep, *dims), full, _words(name, case.scene))
     for name, number in record.scalars.items():
-        yield name, _Meant(sweep, np.full(ones, number, dtype=float), _words(name, case.scene))
+        yield name, _Required(sweep, np.full(ones, number, dtype=float), _words(name, case.scene))
     if keep and record.mesh is not None:
-        yield from _meant_mesh(record.mesh())
+        yield from _expected_mesh(record.mesh())
 
 
 def _words(name: str, scene: Scene) -> dict[str, Any]:
-    """Return the attributes of a quantity as it was declared; one that was not has its name."""
+    """Return the declared attributes of a quantity; an undeclared one gets its name."""
     own = (each for each in scene.quantities if each.name == name)
     declared = QUANTITIES.get(name) or next(own, None) or IN_SPACE.get(name)
     if declared is None:
@@ -146,8 +146,8 @@ def _words(name: str, scene: Scene) -> dict[str, Any]:
     }
 
 
-def _meant_mesh(fields: MeshFields) -> Iterator[tuple[str, _Meant]]:
-    """Yield the variables of the mesh; numbers of nodes that are absent are NaN."""
+def _expected_mesh(fields: MeshFields) -> Iterator[tuple[str, _Required]]:
+    """Yield the expected variables of the mesh; absent node numbers are NaN."""
     cells = [nodes for _, nodes in fields.bodies.values()]
     table = np.full((sum(map(len, cells)), max(c.shape[1] for c in cells)), np.nan)
     first = 0
@@ -163,16 +163,16 @@ def _meant_mesh(fields: MeshFields) -> Iterator[tuple[str, _Meant]]:
     }
     elements = json.dumps({name: element for name, (element, _) in fields.bodies.items()})
     corners = np.where(faces == NO_NODE, np.nan, faces)
-    yield "mesh", _Meant((), np.zeros(()), {"face_node_connectivity": "mesh_face_nodes"})
-    yield "mesh_face_nodes", _Meant(("mesh_face", "mesh_corner"), corners, {"start_index": 0})
-    yield "mesh_body", _Meant(("mesh_face",), of, flags)
-    yield "mesh_cell_nodes", _Meant(("mesh_cell", "mesh_cell_node"), table, {"start_index": 0})
-    yield "mesh_cell_body", _Meant(("mesh_cell",), of_cell, flags | {"elements": elements})
-    yield "time", _Meant(("time",), np.arange(len(fields.stages), dtype=float), {"units": None})
+    yield "mesh", _Required((), np.zeros(()), {"face_node_connectivity": "mesh_face_nodes"})
+    yield "mesh_face_nodes", _Required(("mesh_face", "mesh_corner"), corners, {"start_index": 0})
+    yield "mesh_body", _Required(("mesh_face",), of, flags)
+    yield "mesh_cell_nodes", _Required(("mesh_cell", "mesh_cell_node"), table, {"start_index": 0})
+    yield "mesh_cell_body", _Required(("mesh_cell",), of_cell, flags | {"elements": elements})
+    yield "time", _Required(("time",), np.arange(len(fields.stages), dtype=float), {"units": None})
     stages = np.array(list(fields.stages), dtype=object)
-    yield "mesh_stage", _Meant(("time",), stages)
+    yield "mesh_stage", _Required(("time",), stages)
     for axis, x in zip(AXES, fields.X, strict=False):
-        yield f"mesh_node_{axis}", _Meant(("mesh_node",), x, {"units": "mm"})
+        yield f"mesh_node_{axis}", _Required(("mesh_node",), x, {"units": "mm"})
     at = list(fields.stages.values())
     parts = {f"displacement_{a}": ("mm", [s["displacement"][k] for s in at])
              for k, a in enumerate(AXES[: len(at[0]["displacement"])])}  # fmt: skip
@@ -181,7 +181,7 @@ def _meant_mesh(fields: MeshFields) -> Iterator[tuple[str, _Meant]]:
     parts |= {"mises": ("MPa", [s["mises"] for s in at]),
               "plastic_strain": ("1", [s["plastic_strain"] for s in at])}  # fmt: skip
     for name, (units, values) in parts.items():
-        yield f"mesh_{name}", _Meant(("time", "mesh_node"), np.stack(values), {"units": units})
+        yield f"mesh_{name}", _Required(("time", "mesh_node"), np.stack(values), {"units": units})
 
 
 def _of_mesh(name: str, dims: tuple[str, ...]) -> bool:
@@ -191,15 +191,15 @@ def _of_mesh(name: str, dims: tuple[str, ...]) -> bool:
 def _of_the_whole(
     attributes: Mapping[str, Any], case: Case, outcome: Record | str, keep: str
 ) -> Iterator[str]:
-    """Yield what is wrong with the attributes of the file."""
+    """Yield the differences in the attributes of the file."""
     record = None if isinstance(outcome, str) else outcome
-    told = {
+    required = {
         "id": case.id,
         "scene": case.scene.name,
         SYMMETRIC: int(record.symmetric) if record else None,
         KEEP: keep if record and keep and record.mesh is not None else None,
     }
-    for name, value in told.items():
+    for name, value in required.items():
         if _plain(attributes.get(name)) != value:
             yield f"its attribute {name} is {_plain(attributes.get(name))!r}, not {value!r}"
     parameters = build(case.scene, json.loads(attributes["parameters"]))
@@ -208,58 +208,58 @@ def _of_the_whole(
 
 
 def _compared(
-    name: str, variable: h5py.Dataset, meant: _Meant, scales: Mapping[Any, str]
+    name: str, variable: h5py.Dataset, expected: _Required, scales: Mapping[Any, str]
 ) -> tuple[np.ndarray, list[str]]:
-    """Return the values of a variable as they are stored, and what is wrong with it.
+    """Return the stored values of a variable, and its differences.
 
     Parameters
     ----------
-    scales : names of the dimensions by their HDF5 object: to ask for a name takes ten times as long
+    scales : names of the dimensions by their HDF5 object; reading a name takes ten times as long
     """
     found = []
-    text = meant.values.dtype.kind in "OUS"
+    text = expected.values.dtype.kind in "OUS"
     stored = variable.asstr()[...] if variable.dtype.kind == "O" else variable[...]
     stored = np.asarray(stored)
     own = variable.id in scales
     dims = (name,) if own else tuple(scales[axis[0].id] for axis in variable.dims)
-    if dims != meant.dims:
-        found.append(f"{name} has the dimensions {dims}, not {meant.dims}")
-    told = {key: _plain(variable.attrs[key]) for key in variable.attrs if not _internal(key)}
-    for key, value in (dict.fromkeys(_DECODED) | {**meant.attributes}).items():
-        if told.get(key) != _plain(value):
-            found.append(f"{name} has the {key} {told.get(key)!r}, not {value!r}")
+    if dims != expected.dims:
+        found.append(f"{name} has the dimensions {dims}, not {expected.dims}")
+    attributes = {key: _plain(variable.attrs[key]) for key in variable.attrs if not _internal(key)}
+    for key, value in (dict.fromkeys(_DECODED) | {**expected.attributes}).items():
+        if attributes.get(key) != _plain(value):
+            found.append(f"{name} has the {key} {attributes.get(key)!r}, not {value!r}")
     seen = stored
     if not text and stored.dtype.kind in "iu":
-        seen = np.where(stored == told.get("_FillValue"), np.nan, stored)
-    elif not text and not np.isnan(told.get("_FillValue", np.nan)):
-        found.append(f"{name} has the fill value {told['_FillValue']}, not NaN")
+        seen = np.where(stored == attributes.get("_FillValue"), np.nan, stored)
+    elif not text and not np.isnan(attributes.get("_FillValue", np.nan)):
+        found.append(f"{name} has the fill value {attributes['_FillValue']}, not NaN")
     if not text and variable.dtype.kind == "f" and variable.dtype.itemsize < 8:
         found.append(f"{name} has numbers of {variable.dtype.itemsize} bytes, not 8")
-    if seen.shape != meant.values.shape:
-        found.append(f"{name} has the shape {seen.shape}, not {meant.values.shape}")
-    elif not _same(seen, meant.values, text):
+    if seen.shape != expected.values.shape:
+        found.append(f"{name} has the shape {seen.shape}, not {expected.values.shape}")
+    elif not _same(seen, expected.values, text):
         found.append(f"{name} has other values")
     return stored, found
 
 
-def _same(seen: np.ndarray, meant: np.ndarray, text: bool) -> bool:
+def _same(seen: np.ndarray, expected: np.ndarray, text: bool) -> bool:
     if text:
-        return bool((seen == meant).all())
-    return seen.dtype.kind != "O" and np.array_equal(seen, meant, equal_nan=True)
+        return bool((seen == expected).all())
+    return seen.dtype.kind != "O" and np.array_equal(seen, expected, equal_nan=True)
 
 
 def _is_bare(variable: h5py.Dataset, scales: Mapping[Any, str]) -> bool:
-    """Tell whether it is a dimension only."""
+    """Whether a variable is only a dimension."""
     return variable.id in scales and variable.attrs.get("NAME", b"").startswith(_BARE)
 
 
 def _internal(attribute: str) -> bool:
-    """Tell whether HDF5 or netCDF has made an attribute for itself."""
+    """Whether HDF5 or netCDF made an attribute for internal use."""
     return attribute.isupper() or attribute.startswith("_Netcdf4")
 
 
 def _plain(value: Any) -> Any:
-    """Return the value of an attribute as Python has it; netCDF has a number as an array of one."""
+    """Return the value of an attribute as a Python value; netCDF stores a number as an array."""
     if isinstance(value, bytes):
         return value.decode()
     if isinstance(value, np.ndarray | np.generic):

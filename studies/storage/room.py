@@ -1,4 +1,4 @@
-"""A full disk, distinguished from other failures, and kept away from the HDF5 library."""
+"""Handling of a full disk: recognised among other errors, and hidden from the HDF5 library."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 from studies.errors import StoreFull
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
-"""What the system says when a device, a quota or the allowed size of a file is used up."""
+"""Error numbers for a full device, an exhausted quota, and the largest size of a file."""
 
 
 @contextmanager
 def needs_room(directory: Path) -> Iterator[None]:
-    """Raise `StoreFull`, which names `directory`, where a call finds no room left."""
+    """Raise `StoreFull`, which names `directory`, if a call fails because the disk is full."""
     try:
         yield
     except OSError as error:
@@ -26,14 +26,14 @@ def needs_room(directory: Path) -> Iterator[None]:
 
 
 class Reservoir(io.FileIO):
-    """A new file for HDF5 to write to; what finds no room on the disk is held in memory.
+    """A new file for HDF5 to write to; data that does not fit on the disk is kept in memory.
 
-    HDF5 does not survive a write that fails: closing the file afterwards ends the process. So
-    every write succeeds here, and `check` tells in between whether it has reached the disk.
+    HDF5 does not survive a failed write: closing the file afterwards ends the process. Therefore
+    every write succeeds here, and `check` reports in between whether the disk was full.
 
     Parameters
     ----------
-    path : of the file
+    path : path of the file
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,7 +42,7 @@ class Reservoir(io.FileIO):
         self._reason: OSError | None = None
 
     def check(self) -> None:
-        """Raise the `OSError` of the first write that found no room."""
+        """Raise the `OSError` of the first write that failed, if one did."""
         if self._reason is not None:
             raise self._reason
 
@@ -64,7 +64,7 @@ class Reservoir(io.FileIO):
         return len(content)
 
     def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
-        """Fill `buffer` with what was written here, zeros beyond the end of the file."""
+        """Fill `buffer` with the data written here, zeros beyond the end of the file."""
         at = self.tell()
         content = bytearray((super().read(len(buffer)) or b"").ljust(len(buffer), b"\0"))
         for start, held in self._held:
@@ -76,5 +76,5 @@ class Reservoir(io.FileIO):
         return len(content)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the length of the file; one that lacks content is of no use."""
+        """Set the length of the file; after a failed write the file is not used."""
         return super().truncate(size) if self._reason is None else self.tell()

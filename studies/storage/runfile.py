@@ -1,8 +1,8 @@
-"""The file of a run: its last line is a checksum of the whole, which every reading looks at first.
+"""The file of a run: its last line is a checksum of the whole file, verified at every reading.
 
-The line follows the end that HDF5 knows, so that every netCDF reader opens the file as any other.
-It covers each byte and the id. HDF5's own checksums, which the arrays have too, leave names,
-attributes and texts uncovered, and HDF5 may end the process when it reads damaged ones.
+The line is after the end of the HDF5 data, so that every netCDF reader can open the file. It covers
+each byte and the id. HDF5's own checksums, which the arrays also have, do not cover names,
+attributes and texts, and HDF5 may end the process when it reads damaged ones.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
-"""Attribute of a file that has the line; a file without either is older, and has no checksum."""
+"""Attribute of a file that has the line; an older file has neither."""
 
 _LINE = re.compile(rb"\nrun ([0-9a-f]{32}) sha256 ([0-9a-f]{64})\n")
 _LENGTH = 110
 _DIGEST = 65
-"""Bytes of the whole line, and of what it does not cover itself."""
+"""Length of the line in bytes; the checksum covers everything before it."""
 _FIRST_BYTES = 1 << 16
-"""Size with which a file in memory begins; it grows."""
+"""Initial size of a file in memory, which grows."""
 _ORDER = "variables"
-"""Attribute with the names of the variables in their order, which netCDF loses in memory; without
-those of the mesh."""
+"""Attribute with the names of the variables in order, except those of the mesh; netCDF loses the
+order in memory."""
 _NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
 
 
 def sealed(run: xr.Dataset) -> bytes:
-    """Return what to write of a run: its netCDF, and the last line."""
+    """Return the content of a run's file: its netCDF, and the last line."""
     begun = _packed(run) + f"\nrun {run.attrs['id']} sha256 ".encode()
     return begun + hashlib.sha256(begun).hexdigest().encode() + b"\n"
 
 
 def _packed(run: xr.Dataset) -> bytes:
     """Return a run as netCDF, made in memory: HDF5 does not survive a full disk."""
-    import netCDF4  # with xarray half a second: a complete study waits for neither
+    import netCDF4  # takes half a second, and a complete study does not need it
     from xarray.backends import NetCDF4DataStore
     from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
@@ -67,12 +67,12 @@ def _packed(run: xr.Dataset) -> bytes:
 
 
 def verify(path: Path) -> bool:
-    """Tell whether a checksum vouches for the file, which an older file lacks.
+    """Verify the checksum of a file; return False for an older file without one.
 
     Raises
     ------
     RunUnreadable
-        when it is not what was written under this name
+        if the file is missing, damaged, or that of another run
     """
     try:
         content = path.read_bytes()
@@ -96,8 +96,8 @@ def verify(path: Path) -> bool:
 def opened(path: Path) -> Iterator[h5py.File]:
     """Give the file of a run, verified and open.
 
-    What goes wrong while a file without checksum is read is taken for damage of that file. What
-    goes wrong with a sound one is not.
+    An error while a file without checksum is read counts as damage of that file. An error with a
+    verified file does not.
     """
     import h5py
 
@@ -108,19 +108,19 @@ def opened(path: Path) -> Iterator[h5py.File]:
             yield run
     except (MemoryError, RunUnreadable, StoreFull):
         raise
-    except Exception as error:  # h5py knows no error of its own: OSError, KeyError, RuntimeError …
+    except Exception as error:  # h5py raises OSError, KeyError, RuntimeError …
         if vouched:
             raise
         raise RunUnreadable(path.stem, f"{type(error).__name__}: {error}") from None
 
 
 def global_attributes(run: h5py.File) -> dict[str, Any]:
-    """Return the global attributes; h5py gives a text of ASCII letters as bytes."""
+    """Return the global attributes; h5py returns ASCII texts as bytes."""
     return {name: _text(value) for name, value in run.attrs.items()}
 
 
 def variables(run: h5py.File) -> list[str]:
-    """Return the names of the variables in the order in which they were given, the mesh's not."""
+    """Return the names of the variables in their original order, without those of the mesh."""
     return _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else list(run)
 
 
@@ -129,7 +129,7 @@ def _text(value: Any) -> Any:
 
 
 def stamp(path: Path) -> dict[str, int]:
-    """Return length and time of change [ns] of a file, by which the catalogue knows it again."""
+    """Return length and time of change [ns] of a file, by which the catalogue recognises it."""
     state = path.stat()
     return {"size": state.st_size, "modified": state.st_mtime_ns}
 
@@ -147,7 +147,7 @@ def row(path: Path) -> dict[str, Any]:
             for name, each in every.items()
             if each.ndim == rank and not each.is_scale
         }
-        if not isinstance(values["status"], str):  # its number, as earlier versions wrote it
+        if not isinstance(values["status"], str):  # a number in files of earlier versions
             values["status"] = _text(run["status"].attrs["flag_meanings"]).split()[values["status"]]
         return layout.summary(global_attributes(run), values) | stamp(path)
 

@@ -1,4 +1,4 @@
-"""Scenes of files kept beside the runs: ``scenes/<scene id>/`` with scene.json and the meshes."""
+"""Scenes from files, stored beside the runs: ``scenes/<scene id>/`` with scene.json and meshes."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _FILE = "scene.json"
 
 
 def keep(directory: Path, scene: Scene) -> None:
-    """Keep the content of a scene, if it comes from a file that is none of the package."""
+    """Store the content of a scene, if it comes from a file that is not part of the package."""
     if not (isinstance(scene, FileScene) and scene.posted):
         return
     folder = directory / "scenes" / scene.id
-    with suppress(StudyError):  # one that is damaged is written anew
+    with suppress(StudyError):  # a damaged one is written again
         if kept(directory, scene.id):
             return
     folder.mkdir(parents=True, exist_ok=True)
@@ -35,33 +35,33 @@ def keep(directory: Path, scene: Scene) -> None:
 
 
 def kept(directory: Path, scene_id: str) -> FileScene | None:
-    """Return the scene of this id, None where it is not kept.
+    """Return the scene of this id, None if it is not stored.
 
     Raises
     ------
     StudyError
-        when what is kept is not what its id says
+        if the stored content does not have this id
     """
     folder = directory / "scenes" / scene_id
     path = folder / _FILE
     if len(Path(scene_id).parts) != 1 or not path.is_file():
         return None
     try:
-        told = json.loads(path.read_bytes())
-        names = mesh_names(told["content"])
+        saved = json.loads(path.read_bytes())
+        names = mesh_names(saved["content"])
         meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
-        scene = file_scene(Description(told["file"], told["content"], meshes))
+        scene = file_scene(Description(saved["file"], saved["content"], meshes))
     except (OSError, ValueError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise StudyError("scene", scene_id, f"is kept damaged, post it again: {reason}") from None
+        raise StudyError("scene", scene_id, f"is stored damaged, post it again: {reason}") from None
     if scene.id != scene_id:
-        allowed = "is kept damaged, post it again: its content has changed"
+        allowed = "is stored damaged, post it again: its content has changed"
         raise StudyError("scene", scene_id, allowed)
     return scene
 
 
 def newest(directory: Path, count: int) -> list[FileScene]:
-    """Return the scenes that were kept last, the newest first; none that cannot be read."""
+    """Return the latest stored scenes, newest first, without those that cannot be read."""
     files = sorted((directory / "scenes").glob(f"*/{_FILE}"), key=lambda f: -f.stat().st_mtime_ns)
     found = []
     for each in files[:count]:

@@ -5,14 +5,14 @@ runs/<run id>.nc              one file a run, shared by all studies
 scenes/<scene id>/             scenes of files: scene.json and the meshes
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
-studies/<study id>/made.json  what it was made of, and what was made of it
-catalogue.sqlite              made anew from the files when it is missing or damaged
+studies/<study id>/made.json  digests of its inputs, and of files made from it
+catalogue.sqlite              made again from the files if it is missing or damaged
 unreadable/                   files that were damaged or in a wrong place
 ```
-A file appears under its name only when it is complete; that of a run, when it has been read back
-and says what was computed. It is believed as long as its checksum is right and its id is its name;
-it is verified in full when a study relies on it, and when its length or time of change is not what
-the catalogue noted.
+A file gets its name only when it is complete; that of a run, only after it has been read back and
+compared with the results. It is valid if its checksum is correct and its id is its name. It is
+verified in full when a study uses it, and when its length or time of change differs from the
+catalogue.
 """
 
 from __future__ import annotations
@@ -44,27 +44,27 @@ from studies.storage.readback import verified
 from studies.storage.room import needs_room
 
 ENGINE: Literal["h5netcdf"] = "h5netcdf"
-"""netCDF backend of every file read here; safe with several threads."""
+"""netCDF backend for reading; safe with several threads."""
 
 
 _BATCH = 500
-"""Runs that are verified before their rows are put."""
+"""Number of runs that are verified before their rows are written."""
 
 _UNFINISHED = 600.0
-"""Seconds after which what is beside a data set, and not finished, will not be."""
+"""Seconds after which an unfinished file beside a data set counts as abandoned."""
 _LOG = logging.getLogger("studies")
 
 
 class Store:
     """Results under one directory.
 
-    Whatever writes raises `StoreFull` where the disk is full, and `StudyError` where the directory
-    does not let itself be written to.
+    Methods that write raise `StoreFull` if the disk is full, and `StudyError` if the directory is
+    not writable.
 
     Parameters
     ----------
-    directory : made by the first write
-    held : whether the caller holds the writer's lock for us, as the service does for its children
+    directory : the directory; the first write creates it
+    held : whether the caller already has the writer's lock, as the service has for its children
     """
 
     def __init__(self, directory: Path | str, held: bool = False) -> None:
@@ -73,7 +73,7 @@ class Store:
         self.catalogue = Catalogue(self.directory / "catalogue.sqlite")
 
     def run_path(self, run_id: str) -> Path:
-        """Return where the file of a run is or will be."""
+        """Return the path of the file of a run."""
         return self.directory / "runs" / f"{_checked(run_id)}.nc"
 
     def study_directory(self, study_id: str) -> Path:
@@ -81,20 +81,20 @@ class Store:
         return self.directory / "studies" / _checked(study_id)
 
     def dataset_path(self, study_id: str) -> Path:
-        """Return where the combined data set of a study is or will be."""
+        """Return the path of the combined data set of a study."""
         return self.study_directory(study_id) / "dataset.nc"
 
     def scene(self, scene_id: str) -> Scene | None:
-        """Return the scene of a file that is kept here under this id, if it is."""
+        """Return the scene from a file that is stored here under this id, or None."""
         return shelf.kept(self.directory, scene_id) if is_id(scene_id) else None
 
     def save_scene(self, scene: Scene) -> None:
-        """Keep a scene of a file, so that studies can name it by its id."""
+        """Store a scene from a file, so that studies can name it by its id."""
         with self._writable():
             shelf.keep(self.directory, scene)
 
     def outcomes(self, study_id: str) -> Counter[str]:
-        """Return how many runs the data set of a study holds, by status."""
+        """Return the number of runs by status in the data set of a study."""
         import h5py
 
         try:
@@ -104,7 +104,7 @@ class Store:
             return Counter()
 
     def save_study(self, study: Study) -> Path:
-        """Keep what the study asks for, its scene too, and return its directory."""
+        """Store the definition of the study and its scene, and return its directory."""
         self.save_scene(study.problem)
         directory = self.study_directory(study.id)
         path = directory / "study.json"
@@ -121,13 +121,13 @@ class Store:
 
         Parameters
         ----------
-        outcome : the record of the run, or why there is none
-        keep : what is kept beyond the results of the scene
+        outcome : the record of the run, or the reason why there is none
+        keep : what is kept in addition to the results of the scene
 
         Raises
         ------
         FileDiffers
-            when the file does not say what the record says; then there is no file
+            if the file differs from the record; then there is no file
         """
         if isinstance(outcome, str):
             run = layout.broken_dataset(case.scene, case, outcome)
@@ -149,17 +149,17 @@ class Store:
         Raises
         ------
         RunUnreadable
-            when there is no file, or not what was written under this name
+            if the file is missing, damaged, or that of another run
         """
         return runfile.row(self.run_path(run_id))
 
     def found(self, run_id: str, known: Row | None = None) -> Row | None:
-        """Return the row of a run as its file has it; a file that cannot be read is set aside.
+        """Return the row of a run from its file; an unreadable file is moved to ``unreadable/``.
 
         Parameters
         ----------
-        run_id : of the run
-        known : its row in the catalogue, which saves opening a sound file that has not changed
+        run_id : id of the run
+        known : its row in the catalogue, which makes opening an unchanged file unnecessary
         """
         path = self.run_path(run_id)
         try:
@@ -171,9 +171,10 @@ class Store:
             return None
 
     def sound(self, run_ids: Iterable[str]) -> dict[str, Row]:
-        """Return, by id, the rows of the runs whose file is there and as it was written.
+        """Return, by id, the rows of the runs whose file exists and is valid.
 
-        Every file is verified in full; the others are set aside. The catalogue follows the files.
+        Every file is verified in full; invalid ones are moved to ``unreadable/``. The catalogue is
+        updated to the files.
         """
         wanted = list(run_ids)
         try:
@@ -194,13 +195,13 @@ class Store:
         return rows
 
     def set_aside(self, error: RunUnreadable) -> None:
-        """Move a file that cannot be read out of the way, so that the run is computed again."""
+        """Move an unreadable file to ``unreadable/``, so that the run is computed again."""
         path = self.run_path(error.run_id)
         if path.exists():
             self._move(path, f"{error.reason}; the run will be computed again")
 
     def modified(self, run_ids: Iterable[str]) -> dict[str, int]:
-        """Return, by id, the time of change [ns] of those runs' files that are there."""
+        """Return, by id, the time of change [ns] of the files of runs that exist."""
         times = {}
         for run_id in run_ids:
             with suppress(FileNotFoundError):
@@ -218,7 +219,7 @@ class Store:
         self.discard([run_id])
 
     def reconcile(self) -> None:
-        """Bring the catalogue into line with the files that exist and can be read."""
+        """Update the catalogue to the files that exist and can be read."""
         try:
             known = self.catalogue.stamps()
         except CatalogueDamaged as error:
@@ -239,18 +240,17 @@ class Store:
 
     @contextmanager
     def writing(self, tidy: bool = True) -> Iterator[None]:
-        """Hold the directory as its only writer.
+        """Lock the directory, as its only writer.
 
-        With `tidy`, unfinished files of killed writers are deleted: nobody else writes runs here.
-
-        A store whose lock the caller holds (`held`) takes it as it is.
+        With `tidy`, unfinished files of killed writers are deleted. A store whose caller has the
+        lock (`held`) does nothing here.
 
         Raises
         ------
         StoreBusy
-            when another process holds it
+            if another process has the lock
         StudyError
-            when it cannot be written to
+            if the directory is not writable
         """
         if self.held:
             yield
@@ -259,7 +259,7 @@ class Store:
             for name in ("runs", "studies"):
                 (self.directory / name).mkdir(parents=True, exist_ok=True)
                 with tempfile.TemporaryFile(dir=self.directory / name):
-                    pass  # a directory may be there and yet refuse files
+                    pass  # a directory may exist and still not be writable
             file = (self.directory / ".lock").open("a+", encoding="ascii")
         with locked(self.directory, file):
             parts = self.directory.glob("*/**/*.part") if tidy else ()  # keys are next to them
@@ -270,7 +270,7 @@ class Store:
 
     @contextmanager
     def _writable(self) -> Iterator[None]:
-        """Say in our terms, with the directory as it was given, why nothing can be written."""
+        """Raise `Unusable`, with the directory as it was given, if it is not writable."""
         try:
             with needs_room(self.directory):
                 yield
@@ -279,12 +279,12 @@ class Store:
             raise Unusable("directory", str(self.directory), allowed) from None
 
     def clear_directory(self, path: Path) -> None:
-        """Set a directory aside that stands in the place of a file."""
+        """Move a directory that has the name of a file to ``unreadable/``."""
         if path.is_dir():
-            self._move(path, "it is a directory in the place of a file")
+            self._move(path, "it is a directory instead of a file")
 
     def _move(self, path: Path, reason: str) -> None:
-        """Move what is in the way to ``unreadable/``, and say so in one line."""
+        """Move a file or directory to ``unreadable/``, and log it in one line."""
         target = self.directory / "unreadable" / path.name
         with self._writable():
             target.parent.mkdir(exist_ok=True)
@@ -296,7 +296,7 @@ class Store:
 
 
 def _left(part: Path) -> bool:
-    """Whether nobody writes an unfinished file any more; a report is written without the lock."""
+    """Whether an unfinished file is abandoned; a report is written without the lock."""
     try:
         return part.parent.name == "runs" or time.time() - part.stat().st_mtime > _UNFINISHED
     except FileNotFoundError:

@@ -1,8 +1,8 @@
-"""Fields at the nodes of a run in its netCDF file, as the UGRID conventions have them.
+"""Fields at the nodes of a run in its netCDF file, by the UGRID conventions.
 
-xugrid opens the file, and so does ParaView's reader for UGRID, which takes a dimension ``time`` and
-faces with three or four nodes: elements with nodes between their corners are divided into such
-faces, and stages stand for time. ``mesh_cell_nodes`` has the elements themselves.
+xugrid and ParaView's reader for UGRID open the file. ParaView needs a dimension ``time`` and faces
+with three or four nodes: elements with nodes between their corners are divided into such faces, and
+stages are the times. ``mesh_cell_nodes`` has the elements themselves.
 
 https://ugrid-conventions.github.io/ugrid-conventions/, version 1.0.
 """
@@ -28,7 +28,7 @@ _TIME, _NODE, _FACE, _CELL = "time", "mesh_node", "mesh_face", "mesh_cell"
 
 
 def variables(fields: MeshFields) -> dict[str, Any]:
-    """Return the variables that a run's data set gets: dimensions, values, attributes."""
+    """Return the variables for a run's data set: dimensions, values, attributes."""
     faces, of = fields.faces
     every = list(fields.bodies.items())
     widest = max(cells.shape[1] for _, (_, cells) in every)
@@ -84,17 +84,17 @@ def variables(fields: MeshFields) -> dict[str, Any]:
 
 
 def owns(name: str, dims: Iterable[Hashable]) -> bool:
-    """Tell whether a variable of a run's file is one of the mesh: no study combines these."""
+    """Whether a variable of a run's file belongs to the mesh: studies do not combine these."""
     return name == _MESH or not {_TIME, _NODE, _FACE, _CELL}.isdisjoint(dims)
 
 
 def read(run: xr.Dataset) -> MeshFields:
-    """Return the fields that the data set of a run keeps.
+    """Return the fields at the nodes from the data set of a run.
 
     Raises
     ------
     StudyError
-        where it keeps none
+        if it has none
     """
     if run.attrs.get(KEEP) != FIELDS or _MESH not in run.variables:
         allowed = 'keeps no fields: its study must say keep = "fields", and the run must succeed'
@@ -122,7 +122,7 @@ def read(run: xr.Dataset) -> MeshFields:
 
 
 def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
-    """Return fields of one component each over stages and nodes, as ParaView's reader has them."""
+    """Return fields of one component each over stages and nodes, for ParaView's reader."""
     stacked = {
         name: np.stack([at[name] for at in fields.stages.values()])
         for name in next(iter(fields.stages.values()))
@@ -146,7 +146,7 @@ def _whole(values: np.ndarray) -> np.ndarray:
 
 
 def _nodes(variable: xr.DataArray) -> np.ndarray:
-    """Return numbers of nodes; a reader has made those that are absent NaN."""
+    """Return node numbers; a reader has replaced absent ones by NaN."""
     return np.nan_to_num(variable.to_numpy(), nan=NO_NODE).astype(np.int64)
 
 

@@ -327,7 +327,7 @@ def test_runs_that_were_there_are_told(screen: io.StringIO) -> None:
     for number, case in enumerate(list(study.cases())[2:], start=3):
         bar(StudyEvent(kind="run", progress=number / 4, path="a", run=case.id, status="ok"))
     bar.close()
-    told = "4 of 4 runs (2 were there)" if screen.isatty() else "2 of 4 runs are there already"
+    told = "4 of 4 runs (2 were there)" if screen.isatty() else "2 of 4 runs exist already"
     assert told in screen.getvalue()
 
 

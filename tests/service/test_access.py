@@ -193,7 +193,7 @@ def test_where_others_get_in_a_service_without_keys_is_refused(
     tmp_path: Path, asked: bool, settings: dict[str, Any]
 ) -> None:
     chosen = Settings(data=tmp_path, **settings)
-    assert chosen.keys_asked is asked
+    assert chosen.keys_required is asked
     if asked:
         with pytest.raises(KeysError, match=r"residua keys add NAME --scope admin --data "):
             create_app(chosen)

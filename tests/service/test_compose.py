@@ -117,7 +117,7 @@ def test_the_service_is_opened_to_others_only_with_keys(tmp_path: Path) -> None:
     assert service["ports"] == [f"{given}:8000:8000"]
     host = service["command"][service["command"].index("--host") + 1]
     for published, asked in ((interpolated(given), False), ("0.0.0.0", True), ("10.1.2.3", True)):
-        assert Settings(data=tmp_path, host=host, published=published).keys_asked is asked
+        assert Settings(data=tmp_path, host=host, published=published).keys_required is asked
 
 
 def test_only_who_has_the_certificate_reaches_the_scheduler() -> None:

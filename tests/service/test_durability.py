@@ -214,7 +214,7 @@ def test_a_damaged_queue_is_named_kept_and_made_anew(
     queue.write_text("no queue" * 1000)
     create_app(Settings(data=tmp_path))
     (line,) = [record.getMessage() for record in caplog.records if record.levelname == "ERROR"]
-    assert "jobs.sqlite is gone or damaged" in line and "kept as jobs.sqlite.damaged" in line
+    assert "jobs.sqlite is missing or damaged" in line and "kept as jobs.sqlite.damaged" in line
     assert (tmp_path / "jobs.sqlite.damaged").read_text() == "no queue" * 1000
     assert Jobs(queue).page(limit=1, offset=0) == ([], 0)
 

@@ -139,7 +139,7 @@ def test_a_bad_row_hides_only_itself(jobs: Jobs, nonsense: dict[str, object]) ->
 def test_a_queue_that_is_gone_is_not_made_anew_behind_the_back_of_its_users(jobs: Jobs) -> None:
     jobs.accept("a", STUDY, ["run"])
     jobs.path.unlink()
-    with pytest.raises(QueueLost, match=r"jobs\.sqlite is gone or damaged"):
+    with pytest.raises(QueueLost, match=r"jobs\.sqlite is missing or damaged"):
         jobs.get("a")
     assert not jobs.path.exists()
 

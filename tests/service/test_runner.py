@@ -85,7 +85,7 @@ def test_a_study_that_brings_nothing_new_is_given_up(tmp_path: Path) -> None:
 def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line: str) -> None:
     job, orders = carried_out(tmp_path, [RUN, line])
     assert len(orders) == 2
-    assert job.state is StudyState.FAILED and "sent what cannot be read" in job.message
+    assert job.state is StudyState.FAILED and "sent an unreadable message" in job.message
 
 
 def test_time_of_work_is_no_time_of_waiting(tmp_path: Path) -> None:

@@ -101,8 +101,8 @@ def test_a_pair_that_never_touches_is_told_and_passes_its_audit(gap: float) -> N
     audit = solution.audit()
     assert audit.passed, audit.violations
     assert audit.warnings == (
-        "upper.bottom and lower.top touch at the end of no stage: move them together, or take the "
-        "pair out",
+        "upper.bottom and lower.top do not touch at the end of any stage: move them together, or "
+        "remove the pair",
     )
     # moved as a whole: no stress but that of rounding, of the modulus times strain of the machine
     assert np.abs(solution.stress("upper", "loaded")).max() < 1e-10 * STEEL.youngs_modulus

@@ -159,7 +159,7 @@ def test_friction_that_is_almost_spent_is_told_with_its_bodies() -> None:
         state: Any = SimpleNamespace(contacts=[contact], time=1.0)
         return spent(system, state)
 
-    told = "; just before, friction between pad and plate bears 97%"
+    told = "; just before, friction between pad and plate was at 97%"
     assert found(Coulomb(friction=0.3), 0.97).startswith(told)
     assert found(Coulomb(friction=0.3), 0.9) == ""
     assert found(Coulomb(friction=0.3, cohesion=0.1), 0.97) == ""

@@ -259,7 +259,7 @@ def test_what_equilibrium_makes_of_an_initial_stress_is_told() -> None:
     far = x[0] < 20.0
     assert told[0] == pytest.approx(balanced(x)[0] + 40.0, abs=0.5)  # linear between its points
     assert np.abs(left[0] - balanced(x)[0])[far].max() < 3.5
-    with pytest.raises(ModelError, match="grid must hold the whole body"):
+    with pytest.raises(ModelError, match="grid must cover the whole body"):
         solve(Model(bodies=(replace(body, mesh=mesh.translated((1.0, 0.0))),)))
     for x_, y_, stress in (([0, 1], y, field[:, 1:]), ([1, 1], y, field)):
         with pytest.raises(ModelError, match=r"initial_stress\.stress = "):

@@ -197,7 +197,7 @@ def test_a_turn_in_one_increment_is_divided(turn: float) -> None:
             {"surfaces": {"base": RigidSurface(points=np.zeros((2, 1)))}},
             "surfaces.base .* two or more",
         ),
-        ({"surfaces": {"base": RigidSurface(points=np.zeros((2, 2)))}}, "must be points apart"),
+        ({"surfaces": {"base": RigidSurface(points=np.zeros((2, 2)))}}, "must be distinct points"),
         ({"surfaces": {"base": RigidSurface(points=np.full((2, 2), np.nan))}}, "must be finite"),
         (
             {"surfaces": {"base": RigidSurface(points=np.eye(2), quadratic=True)}},

@@ -119,7 +119,7 @@ def test_a_scene_that_does_not_tell_its_work_is_told_by_its_runs(store: Store) -
     assert (found.runs, found.to_compute, found.paths) == (4, 4, 2)
     assert found.unknowns is found.increments is found.cpu_seconds is None
     assert found.bytes > 0
-    assert found.basis == "fake does not tell the work of its paths"
+    assert found.basis == "fake does not estimate the work of its paths"
     Bounds(unknowns=1, increments=1, cpu_seconds=1.0).check(found)
 
 

@@ -123,4 +123,4 @@ def test_a_word_is_listed_with_its_parameters_and_a_bad_file_is_one_line(tmp_pat
     assert refused.returncode == 2
     (line,) = refused.stderr.splitlines()
     assert line.startswith("residua: RESIDUA_PARTS = ")
-    assert line.endswith("must run: it imports scenes, which are made of its parts")
+    assert line.endswith("must run: it imports scenes, whose parameters include those of its parts")

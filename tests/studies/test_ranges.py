@@ -45,7 +45,7 @@ def test_a_range_of_a_parameter_that_counts_has_whole_numbers() -> None:
         ({"start": 0.0, "stop": float("nan"), "num": 3}, "sweep.friction.stop = nan"),
         (
             {"start": 0.0, "stop": 0.4, "num": 3, "spacing": "log"},
-            "sweep.friction.start = 0.0: must be > 0 where spacing = log",
+            "sweep.friction.start = 0.0: must be > 0 for spacing = log",
         ),
         ({"start": 0, "stop": 1, "num": 3, "spacing": "cubic"}, "one of linear, log"),
         ({"start": 0.1, "stop": 0.1, "num": 3}, r"sweep.friction\[1\] = 0.1: occurs already"),

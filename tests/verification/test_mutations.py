@@ -117,7 +117,7 @@ def test_a_run_whose_file_would_say_something_else_has_failed(
     row = walked(case, audited, tmp_path, monkeypatch)
     assert row == runfile.row(Store(tmp_path).run_path(case.id))
     assert row["status"] == "error"
-    assert row["message"].startswith("FileDiffers: the file would not say what was computed")
+    assert row["message"].startswith("FileDiffers: the file would differ from the computed results")
     assert "residual_stress has other values" in row["message"]
     assert row["scalars"] == {}
 

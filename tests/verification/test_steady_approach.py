@@ -90,7 +90,7 @@ def faded(hardest_to_find=0.0, own=0.0, largest=np.inf, step=0.3):
         tried.append(ratio)
         if ratio <= hardest_to_find or (guess is not None and ratio < step * guess):
             raise NotConverged("lost")
-        return SimpleNamespace(strain=ratio, gathered=0.01 / ratio)
+        return SimpleNamespace(strain=ratio, most_added=0.01 / ratio)
 
     found = _fading(eased, lambda guess: SimpleNamespace(strain=guess), own, largest)
     return tried, found.strain
@@ -126,7 +126,7 @@ def test_where_a_material_hardens_more_hardening_fades_if_the_hardest_pass_is_no
         tried.append(ratio)
         if guess is None and ratio < 0.2:
             raise NotConverged("lost")
-        return SimpleNamespace(strain=ratio, gathered=0.01)
+        return SimpleNamespace(strain=ratio, most_added=0.01)
 
     def exactly(guess):
         return SimpleNamespace(strain=guess)
@@ -140,7 +140,7 @@ def test_where_a_material_hardens_more_hardening_fades_if_the_hardest_pass_is_no
 
 @pytest.mark.parametrize("ratio", [0.0, 1e-3])
 def test_only_what_does_not_harden_is_at_its_limit_where_it_gathers_much(monkeypatch, ratio):
-    found = SimpleNamespace(strain=1.0, gathered=0.5)
+    found = SimpleNamespace(strain=1.0, most_added=0.5)
     monkeypatch.setattr(steady_search, "passing", lambda *given, **settings: found)
     steel = Material(
         youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=500.0,
@@ -165,7 +165,7 @@ def test_passes_of_fading_hardening_that_gather_too_much_are_at_their_limit():
 
 @pytest.mark.parametrize("failure", [LimitLoad, NotConverged])
 def test_a_bad_guess_does_not_make_a_limit_of_a_pass_that_exists(monkeypatch, failure):
-    found = SimpleNamespace(strain=1.0, gathered=0.01)
+    found = SimpleNamespace(strain=1.0, most_added=0.01)
 
     def passing(track, material, load, before, guess=None, **settings):
         if guess is not None:

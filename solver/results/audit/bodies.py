@@ -1,4 +1,4 @@
-"""Figures of each body by itself: balance, its law, its loads and reactions."""
+"""Audit figures of single bodies: balance, material law, loads and reactions."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _SAMPLE = 200
-"""Flowing points at which an increment is followed in smaller steps."""
+"""Number of flowing points at which an increment is repeated in smaller steps."""
 
 
 class AuditedBody:
-    """A body of a system in a converged increment; values for several figures are computed once.
+    """A body of a system in a converged increment; common values are computed once.
 
-    ``plain`` is the body itself, which all its states share.
+    ``plain`` evaluates the body independently; all states of the body share it.
     """
 
     def __init__(self, system: System, plain: PlainBody, converged: Converged) -> None:
@@ -44,7 +44,7 @@ class AuditedBody:
 
     @property
     def meshed(self) -> bool:
-        """Whether increments solve for all of its nodes, and not for a condensed body."""
+        """Whether the system solves for all of its nodes: the body is not condensed."""
         return self.part.meshed
 
     def _strain(self, state: State) -> Array:
@@ -62,25 +62,25 @@ class AuditedBody:
 
     @cached_property
     def stress(self) -> Array:
-        """Mandel stress (4, n_points): of the increment, or of elastic strain [MPa]."""
+        """Mandel stress (4, n_points) [MPa]; of a condensed body by Hooke's law."""
         if self.meshed:
             return self._response.stress
         return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
 
     @property
     def force_level(self) -> float:
-        """The largest force level met so far [N]."""
+        """The largest force level so far [N]."""
         return self._converged.state.force_scale
 
     @property
     def rounding(self) -> float:
-        """How large nodal forces can be that are rounding [N]."""
+        """The nodal force that rounding can cause [N]."""
         u = self._system.displacement(self.name, self._converged.state)
         return self.plain.part.rounding(u)
 
     @cached_property
     def balancing(self) -> Array:
-        """Nodal forces (n_nodes, 2) that are in balance with the stress of the body [N]."""
+        """Nodal forces (n_nodes, 2) that balance the stress of the body [N]."""
         return self.plain.forces(self.stress)
 
     @cached_property
@@ -105,10 +105,10 @@ class AuditedBody:
         return self.plain.applied(self._converged.state.time)
 
     def misapplied(self) -> Array:
-        """Return the moments about x and y (2, 2) of nodal forces less those declared / size [N].
+        """Return the error (2, 2) of the first moments of nodal forces, over the body's size [N].
 
-        They tell of loads without a resultant, such as centrifugal forces. Loads that move, and the
-        copies of a periodic body, are left out.
+        First moments, force times x and y, also show loads without a resultant, such as centrifugal
+        forces. Moving loads and periodic bodies are left out.
         """
         body, whole = self.plain.body, self.plain.part
         if body.axle or body.travelling or body.periodic:
@@ -119,7 +119,7 @@ class AuditedBody:
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
-        """Which displacements (n_nodes, 2) supports hold, or loads prescribe."""
+        """Whether supports hold, or loads prescribe, displacements (n_nodes, 2)."""
         body = self.plain.body
         held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
         each = [(boundary, "xy".index(axis)) for boundary, axes in body.supports.items()
@@ -132,22 +132,22 @@ class AuditedBody:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which unknowns (n_nodes, 2) nothing holds, copies of a periodic body left out."""
+        """Whether unknowns (n_nodes, 2) are free; False for the copies of a periodic body."""
         part = self.plain.part
         own = part.same == np.arange(len(part.same))
         return np.asarray(~self.held & own[:, None])
 
     def stored(self) -> float:
-        """Return the elastic energy [N mm]; of a condensed body that of its kept unknowns."""
+        """Return the elastic energy [N mm]; of a condensed body from its kept unknowns."""
         if self.meshed:
             return self.plain.elastic_energy(self.stress, self._converged.state.time)
         return self.part.stiffness_along(self._u, self._response)[1] / 2
 
     @property
     def strength(self) -> float:
-        """The yield stress, or the largest stress of a body that cannot yield [MPa].
+        """The yield stress, or the largest stress of an elastic body [MPa].
 
-        At least what is rounding where the body moves, but is not strained.
+        It is at least the rounding of stress in a body that moves without strain.
         """
         law = self.plain.body.law
         if not law.elastic:
@@ -157,7 +157,7 @@ class AuditedBody:
         return float(max(np.abs(self.stress).max(), rounded))
 
     def law(self) -> tuple[float, float]:
-        """Return how far the increment is from its law, and its stress beyond yield [MPa]."""
+        """Return the misfit of the increment to its law, and its stress beyond yield [MPa]."""
         if not self.meshed:
             return 0.0, 0.0
         law, after = self._law, self._response.state
@@ -166,7 +166,7 @@ class AuditedBody:
         return float(broken.max(initial=0.0)), float(beyond.max(initial=0.0))
 
     def increment_error(self) -> float:
-        """Return the change of stress by smaller steps / yield stress, where the body flows."""
+        """Return the change of stress by smaller steps over the yield stress, at flowing points."""
         law, after = self._law, self._response.state
         if not self.meshed or law.elastic:
             return 0.0

@@ -1,4 +1,4 @@
-"""Values compared with others: the largest difference over the scale of its quantity."""
+"""Compare values: the largest difference over the scale of its quantity."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 LIMIT = 1e-6
-"""Largest difference / scale: rounding. The same places are interpolated in the same elements."""
+"""Limit of difference / scale, a multiple of rounding: both interpolate in the same elements."""
 MEASURED = 0.02
-"""The same of gap, slip and reactions where surfaces are curved or slide far: another projection
-measures them, and means over hats differ by what surfaces turn within an edge."""
+"""Limit for gap, slip and reactions if surfaces are curved or slide far: the audit projects points
+differently, and means over hats differ with the angle of the surface within an edge."""
 AREA = 1e-4
-"""The same of pressure and shear there: at its ends, another projection finds another share of the
-surface that faces its partner."""
+"""Limit for pressure and shear on such surfaces: at the ends of the contact another projection
+gives another share of a hat that faces the partner."""
 STEADY = 1e-3
-"""The same of stress under a load that passes: its strains are those of equilibrium, up to
+"""Limit for stress under a steady load: its strains are those of equilibrium up to
 `audit_steadiness`."""
 LEAST_STRAIN = 1e-6
-"""Strain, and times Young's modulus stress, that is next to nothing."""
+"""Least scale of strains; times Young's modulus, least scale of stresses."""
 _COUNT = 24
-"""Values of a field that are computed anew, besides the largest."""
+"""Number of values of a field that are computed again, besides the largest."""
 _GOLDEN = (5**0.5 - 1) / 2
 
 
 @dataclass(slots=True)
 class Compared:
-    """The largest difference so far / scale of its quantity, and which quantity that is."""
+    """The largest ratio of a difference to its scale so far, and the name of its quantity."""
 
     figure: float = 0.0
     name: str = ""
     seen: set[str] = field(default_factory=set)
 
     def add(self, name: str, stored: Any, own: Any, scale: float, share: float = 1.0) -> None:
-        """Compare values with others; where these are not known (NaN) nothing is compared.
+        """Compare stored with recomputed values ``own``; NaN in ``own`` is not compared.
 
-        A difference counts with a ``share``.
+        The ratio is multiplied by ``share``, so that another limit becomes `LIMIT`.
         """
         self.seen.add(name)
         stored, own = np.broadcast_arrays(np.asarray(stored, float), np.asarray(own, float))
@@ -50,7 +50,7 @@ class Compared:
         self._worst(name, float(np.where(np.isnan(off), 1.0, off).max(initial=0.0)))
 
     def absent(self, name: str, stored: Array, outside: NDArray[np.bool_]) -> None:
-        """Compare values (..., n) where there is no body: there must be none."""
+        """Check that values (..., n) are NaN at places outside the body."""
         if np.isfinite(stored[..., outside]).any():
             self._worst(name, 1.0)
 
@@ -60,7 +60,7 @@ class Compared:
 
 
 def some(count: int, *fields: Array) -> NDArray[np.int64]:
-    """Return numbers of places spread over all, and those where fields (..., n) are largest."""
+    """Return the numbers of some places, evenly spread, and where fields (..., n) are largest."""
     spread = np.floor(np.arange(1, _COUNT + 1) * _GOLDEN % 1.0 * count).astype(np.int64)
     largest = [np.argmax(np.abs(np.nan_to_num(one)))
                for field in fields for one in field.reshape(-1, count)]  # fmt: skip

@@ -1,15 +1,13 @@
-"""How far contact pressure is from that of a finer mesh: an estimate from the stress under it.
+"""Estimate of the discretisation error of contact pressure, from the stress under the surface.
 
-Pressure comes from contact forces, which the increments have found. The stress of the body has to
-balance it, and tells it a second time: -n . sigma . n, where sigma is recovered from patches of
-elements inside the body (`ErrorPoints`), which know no contact force. Both tend to the true
-pressure as the mesh is refined, by different ways. What they differ by is of the size of the
-error, and where few edges lie across a contact, neither can follow the other.
+Pressure comes from the contact forces. The stress of the body gives a second value, -n . sigma . n,
+with sigma recovered from patches of elements inside the body (`ErrorPoints`), without the contact
+forces. Both tend to the true pressure as the mesh is refined, but differently: their difference has
+the size of the error. It is large if few edges lie across a contact.
 
-The surface is that of the slave, whose vertices contact forces belong to and which is not the
-coarser one; of a rigid slave, which has no stress, that of its master. The difference is taken by
-its amount, over the area before loading, to which the stress refers: it is a share of the contact
-force. Its square would have no limit under refinement at a sharp corner.
+It is evaluated on the slave, or on the master of a rigid slave, which has no stress. The absolute
+difference is integrated over the area before loading, and given as a share of the contact force.
+The square of the difference would be unbounded under refinement at a sharp corner.
 """
 
 from __future__ import annotations
@@ -35,13 +33,13 @@ if TYPE_CHECKING:
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _BEYOND = 1e-6
-"""Part of a chord, by which a point may lie beyond its end and still count as beside it."""
+"""Fraction of a chord by which a point may lie beyond its end and still belong to it."""
 
 
 def contact_error(system: System, converged: Converged) -> float:
-    """Return the estimated error of contact pressure, as a share of the force of all pairs.
+    """Return the estimated error of contact pressure, over the contact force of all pairs.
 
-    Edges count that bear pressure. It is 0 where none does.
+    Only edges with pressure count; 0 if there are none.
     """
     error, level = 0.0, 0.0
     recovered: dict[str, Array] = {}
@@ -69,7 +67,7 @@ def _carried(
 ) -> Array:
     """Return the pressure of a rigid slave at points of its master (n_edges, n_points).
 
-    Each point takes that of the nearest place of the chords that bear pressure, and none where it
+    Each point takes the pressure of the nearest place on the chords with pressure, or zero if it
     lies beyond their ends.
     """
     pair = system.model.contacts[number]
@@ -103,8 +101,8 @@ def _integrals(chain: Surface, pressure: Array, stress: Array) -> tuple[float, f
 
     Parameters
     ----------
-    pressure : at the points of its edges (n_edges, n_points)
-    stress : at its nodes, components xx, yy, zz, xy (4, n_nodes)
+    pressure : (n_edges, n_points) at points of its edges [MPa]
+    stress : (4, n_nodes) components xx, yy, zz, xy at its nodes [MPa]
     """
     k = chain.edges.shape[1]
     at, shape = chain.X[:, chain.edges], shape_functions(_XI, k)

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def cut_force(
     system: Bodies, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
 ) -> float:
-    """Return the normal force on a plane cut / the force that its area carries at yield.
+    """Return the normal force on a plane cut, over yield stress times area of the cut.
 
-    ``where`` (2, n) are points along the straight cut; ``stress`` (4, n_points) Mandel. A residual
-    stress is in balance with itself: it gives zero, apart from the discretisation error.
+    ``where`` (2, n) are points along the straight cut [mm]; ``stress`` (4, n_points) is Mandel
+    [MPa]. A residual stress is self-equilibrated: the result is zero up to discretisation error.
     """
     p = system.full(body)
     along = where[:, -1] - where[:, 0]

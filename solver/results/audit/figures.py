@@ -31,7 +31,7 @@ _DECLARED = [
     ),
     declare(
         "audit_slip_resolution",
-        "normal force times way of its contact in an increment / width / largest normal force",
+        "motion of a contact along a surface in an increment / width, weighted with its force",
     ),
     declare("audit_energy", "work missing in the energy balance / work"),
     declare("audit_tension", "largest tensile contact force", "N"),
@@ -45,11 +45,12 @@ _DECLARED = [
     declare("audit_yield", "largest stress beyond the yield surface / yield stress"),
     declare(
         "audit_dissipation",
-        "smallest plastic dissipation of an increment in a unit of volume", "MPa",
+        "smallest plastic dissipation of an increment per unit of volume", "MPa",
     ),
     declare(
         "audit_history",
-        "what an increment or pass begins with, less what the one before has left / yield stress",
+        "difference between the end of an increment or pass and the beginning of the next / yield "
+        "stress",
     ),
     declare(
         "audit_contact_after_unloading",
@@ -57,14 +58,17 @@ _DECLARED = [
     ),
     declare(
         "audit_inflow",
-        "plastic strain gathered where material enters the window of a steady pass / the most that "
-        "the pass gathers, at least 0.05 yield strains",
+        "plastic strain added where material enters the window of a steady pass / largest plastic "
+        "strain added by the pass, at least 0.05 yield strains",
     ),
-    declare("audit_outflow", "plastic strain gathered behind that window / the same"),
+    declare(
+        "audit_outflow",
+        "plastic strain added behind the window of a steady pass / largest plastic strain added",
+    ),
     declare(
         "audit_steadiness",
-        "difference between the strain that material meets in a steady pass and that of "
-        "equilibrium, its deviator times 2 G / yield stress",
+        "difference between the strain in the material law and that of equilibrium in a steady "
+        "pass, its deviator times 2 G / yield stress",
     ),
     declare(
         "audit_plastic_strain", "largest equivalent plastic strain away from singular points"
@@ -75,12 +79,12 @@ _DECLARED = [
     ),
     declare(
         "audit_stored",
-        "difference between what is stored of a run and what is computed anew / its scale",
+        "difference between stored and recomputed results of a run / scale of the quantity",
     ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare(
         "audit_error_contact",
-        "estimated error of contact pressure under load, its amount over the contact / force",
+        "estimated error of contact pressure under load, absolute, integrated / contact force",
     ),
     declare("audit_error_residual", "estimated relative error of residual stress, energy norm"),
 ]  # fmt: skip

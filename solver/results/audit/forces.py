@@ -1,4 +1,4 @@
-"""Whether forces balance: at every node, between the bodies, and with what is applied."""
+"""Balance of forces: at every node, between bodies in contact, and of each body."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _ROUNDED = 1e-5
-"""Largest rounding of nodal forces that is left out / force level."""
+"""Ratio to the force level up to which rounding is subtracted from nodal forces."""
 _LITTLE = 1e-4
-"""Ratio of the contact force to the force level, below which errors are compared with this level
-instead."""
+"""Ratio of the contact force to the force level; below it errors refer to this ratio of the level.
+"""
 
 
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
@@ -43,9 +43,9 @@ def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
 
 
 def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converged) -> float:
-    """Return forces out of balance, less what is rounding, over the force level.
+    """Return the out-of-balance force, minus rounding, over the force level.
 
-    They are external, internal and contact forces.
+    It is the sum of external, internal and contact forces at nodes.
     """
     contact = _on_bodies(system, converged)
     left = [_beyond_rounding(body, contact[body.name] - body.lacking) for body in bodies]
@@ -53,24 +53,24 @@ def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converge
 
 
 def _beyond_rounding(body: AuditedBody, force: Array) -> float:
-    """Return the size of the forces (n_nodes, 2) on free unknowns, less what is rounding [N].
+    """Return the norm of forces (n_nodes, 2) on free unknowns, minus rounding [N].
 
-    Rounding counts up to a share of the force level: a body that has flowed far moves far.
+    At most `_ROUNDED` of the force level is subtracted: a body that has flowed far moves far.
     """
     rounding = min(body.rounding, _ROUNDED * body.force_level)
     return max(float(np.linalg.norm(force[body.free])) - rounding, 0.0)
 
 
 def left_on(bodies: Sequence[AuditedBody]) -> float:
-    """Return the force, no reaction or rounding, that the stress of bodies needs for balance [N].
+    """Return the out-of-balance force of the stress of released bodies at free nodes [N].
 
-    On unloaded bodies taken apart no such force acts, whatever shape they have kept.
+    Neither loads nor contact act on released bodies: their stress must balance itself.
     """
     return float(np.linalg.norm([_beyond_rounding(body, body.balancing) for body in bodies]))
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return nodal forces (n_nodes, 2) of the pairs on a body, in space, and where they act."""
+    """Return nodal forces (n_nodes, 2) of the pairs on a body, in space, and whether they act."""
     whole = body.plain.part
     force = np.zeros((whole.X.shape[1], 2))
     for pair in pairs:
@@ -90,10 +90,10 @@ def action_reaction(
     pairs: Sequence[AuditedPair],
     converged: Converged,
 ) -> float:
-    """Return the difference between contact forces and the forces that bodies feel, relative.
+    """Return the relative difference between contact forces and the forces that balance stress.
 
-    A body feels the forces that balance its stress at the nodes of its contact surfaces. Resultant
-    and moment are compared for both bodies of every pair, so that both feel the same. They are
+    For both bodies of every pair, resultant and moment of the contact forces are compared with
+    those of the nodal forces that balance the stress at the contact surfaces. Differences are
     divided by the sum of normal forces of the body's least loaded pair (the moment also by the
     length of the contact).
     """
@@ -120,24 +120,24 @@ def action_reaction(
 def reactions(
     bodies: Sequence[AuditedBody], pairs: Sequence[AuditedPair], converged: Converged
 ) -> float:
-    """Return how far loads, contact and reactions of a body are from balance, over the force level.
+    """Return the sum of loads, contact forces and reactions of a body, over the force level.
 
     The resultant of pressures comes from the shape of their boundary, that of forces per volume
-    from points of its own, that of a wheel from the amplitude of its axle; reactions come from the
-    stress where supports hold. First moments of nodal forces are compared with those of the loads.
+    from separate points, that of a wheel from the amplitude of its axle; reactions come from the
+    stress at supports. First moments of nodal forces are also compared with those of the loads.
     """
     worst = 0.0
     for body in bodies:
         contact, _ = _of_pairs(body, pairs)
         total = contact.sum(axis=0)
         if isinstance(body.part, Wheel):
-            # the advance is prescribed: what it takes along x is not known beforehand
+            # the advance is prescribed: its force along x is not known beforehand
             force = body.part.axle.force.at(converged.state.time)
             total = np.array([0.0, total[1] - force])
         else:
             held = np.where(body.held, contact - body.lacking, 0.0)
             total = total + body.applied() - held.sum(axis=0)
             if body.plain.body.kinematics == "axisymmetric":
-                total[0] = 0.0  # radial forces balance round the axis
+                total[0] = 0.0  # radial forces balance around the axis
         worst = max(worst, float(np.abs(total).max()), float(np.abs(body.misapplied()).max()))
     return worst / (converged.state.force_scale or 1.0)

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 def increment_error(
     law: Law, strains: tuple[Array, Array], stress: Array, before: PlasticState, steps: int = 4
 ) -> float:
-    """Return the largest change of a stress component by smaller steps / yield stress.
+    """Return the largest change of a stress component by smaller steps, over the yield stress.
 
     Parameters
     ----------
-    strains : two Mandel strains (n_components, n); the points go straight from one to the other
-    stress : the result of one step to the second strain (n_components, n), Mandel [MPa]
+    strains : two Mandel strains (n_components, n), start and end of a straight strain path
+    stress : (n_components, n) result of one step to the second strain, Mandel [MPa]
     before : internal variables at the first strain
     steps : number of steps the increment is divided into
     """

@@ -1,4 +1,4 @@
-"""What a record stores at places that have names, against what is computed anew."""
+"""Compare stored results at named places with recomputed values."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _LEAST_LENGTH = 1e-9
-"""Displacement, gap or slip / size of the bodies, that is next to nothing."""
+"""Least scale of displacement, gap and slip, over the size of the bodies."""
 _PARTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 _ROUNDED = 1e-9
-"""Difference of times of the program that is rounding."""
+"""Largest difference of two equal times of the program."""
 
 
 class NamedPlacesCheck:
-    """Lines, points, contact surfaces, the course of forces and motions, and numbers.
+    """Comparison of lines, points, contact surfaces, forces and motions over time, and numbers.
 
     Parameters
     ----------
-    stress_scale : that differences of stress are divided by [MPa]
+    stress_scale : scale by which differences of stress are divided [MPa]
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class NamedPlacesCheck:
                        "gap": length, "slip": length}  # fmt: skip
 
     def compare(self) -> None:
-        """Compare all that is declared."""
+        """Compare all declared results."""
         self._lines()
         self._points()
         self._pairs()
@@ -113,15 +113,15 @@ class NamedPlacesCheck:
         places = Located(self._source.plain(body), X)
         for k, stage in enumerate(self._run.view.stages):
             fields = self._source.fields(body, stage)
-            for name, told, nodal in (
+            for name, recorded, nodal in (
                 ("stress", stress[k], fields.stress),
                 ("mises", mises[k], np.maximum(fields.mises, 0.0)),
                 ("plastic_strain", strain[k], flowed(fields)),
             ):
                 own = places.of(nodal)
                 own = own if name == "stress" else np.maximum(own, 0.0)
-                self._out.add(f"{kind}_{name}", told, own, self._scale(name, nodal))
-                self._out.absent(f"{kind}_{name}", told, places.outside)
+                self._out.add(f"{kind}_{name}", recorded, own, self._scale(name, nodal))
+                self._out.absent(f"{kind}_{name}", recorded, places.outside)
         return places
 
     # -- contact and forces ------------------------------------------------------------------
@@ -141,11 +141,11 @@ class NamedPlacesCheck:
                     self._out.add(name, self._field(name)[k], own, float(np.abs(found.X).max()))
                 for name in ("pressure", "shear", "pressure_deformed", "gap", "slip"):
                     values = _on_slave(found, name)
-                    told = self._field(f"contact_{name}")[k, j]
+                    recorded = self._field(f"contact_{name}")[k, j]
                     scale = self._scale(name, values)
-                    if name in ("gap", "slip"):  # unloaded, what is left of them is rounding
+                    if name in ("gap", "slip"):  # after unloading only rounding may be left
                         scale = max(found.way, self._least[name])
-                    self._out.add(f"contact_{name}", told, between(s, found.s, values), scale,
+                    self._out.add(f"contact_{name}", recorded, between(s, found.s, values), scale,
                                   self._share(found, name))  # fmt: skip
 
     def _increments(self) -> None:
@@ -165,8 +165,8 @@ class NamedPlacesCheck:
                 contact[pair.master[0]] += found.touching.on_master.sum(axis=0)
                 for name, sign in (("normal", 1.0), ("tangential", -1.0)):
                     own = sign * getattr(state.contacts[k], name).sum()
-                    told = self._field(f"contact_{name}_force")[k, near[-1]]
-                    self._out.add(f"contact_{name}_force", told, own, state.force_scale)
+                    recorded = self._field(f"contact_{name}_force")[k, near[-1]]
+                    self._out.add(f"contact_{name}_force", recorded, own, state.force_scale)
             for j, name in enumerate(self._source.system.all_names):
                 body = self._source.system.model.body(name)
                 self._part(body, j, int(near[-1]), contact[name], state, measured=finite)
@@ -188,19 +188,19 @@ class NamedPlacesCheck:
         else:
             own = own - self._source.plain(body.name).applied(state.time)[0]
             if body.kinematics == "axisymmetric":
-                own[0] = np.nan  # radial forces are in balance round the axis
+                own[0] = np.nan  # radial forces balance around the axis
         share = LIMIT / MEASURED if measured else 1.0
         for name, value in zip(("reaction_x", "reaction_y"), own, strict=True):
-            told = self._field(name)[j, increment]
-            if np.isfinite(told):
-                self._out.add(name, told, value, state.force_scale, share)
+            recorded = self._field(name)[j, increment]
+            if np.isfinite(recorded):
+                self._out.add(name, recorded, value, state.force_scale, share)
 
     # -- numbers -----------------------------------------------------------------------------
 
     def _number(self, number: RequestedNumber) -> None:
         """Compare an extreme value and its place, an integral or an extent."""
         kind, _, part = number.of.partition(".")
-        told, share = self._record.scalars[number.name], 1.0
+        recorded, share = self._record.scalars[number.name], 1.0
         if number.contact is not None:
             found = self._source.tractions(
                 self._places.contacts.index(number.contact), number.stage
@@ -211,7 +211,7 @@ class NamedPlacesCheck:
                 return
             if (kind, number.take) == ("pressure", "extent"):
                 share = LIMIT / MEASURED if found.measured else 1.0
-                self._out.add(number.name, told, found.length, s[-1], share)
+                self._out.add(number.name, recorded, found.length, s[-1], share)
                 return
             values = np.where(np.isnan(values) & ~found.closed, 0.0, values) if kind in (
                 "pressure", "shear") else values  # fmt: skip
@@ -223,7 +223,7 @@ class NamedPlacesCheck:
             return
         if number.take in ("maximum", "minimum"):
             own = np.nanmax(values) if number.take == "maximum" else np.nanmin(values)
-            self._out.add(number.name, told, own, scale, share)
+            self._out.add(number.name, recorded, own, scale, share)
             place = [self._record.scalars[f"{number.name}_{axis}"] for axis in AXES[: len(X)]]
             off = np.hypot.reduce(X - np.array(place)[:, None])
             there = values[off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()]
@@ -234,12 +234,12 @@ class NamedPlacesCheck:
         values = np.nan_to_num(values)
         if number.take == "integral":
             whole, most = (float((v[1:] + v[:-1]) @ np.diff(s) / 2) for v in (values, abs(values)))
-            self._out.add(number.name, told, whole, max(most, self._least[kind] * s[-1]), share)
+            self._out.add(number.name, recorded, whole, max(most, self._least[kind] * s[-1]), share)
             return
-        self._out.add(number.name, told, _above_zero(values, s), s[-1], share)
+        self._out.add(number.name, recorded, _above_zero(values, s), s[-1], share)
 
     def _values(self, number: RequestedNumber, kind: str, part: str) -> tuple[Array, Array]:
-        """Return the values (n,) of a field of a body or line, and where they are (2, n)."""
+        """Return the values (n,) of a field of a body or line, and their positions (2, n)."""
         if number.line is not None:
             line = self._places.lines[number.line]
             body, X = line.body, line.X
@@ -268,7 +268,7 @@ def _lengths(X: Array) -> Array:
 
 
 def _on_slave(found: Tractions, kind: str) -> Array:
-    """Return what acts at the vertices of a slave (n,), NaN where it is not known."""
+    """Return pressure, shear, gap or slip at the vertices of a slave (n,), NaN if not known."""
     if kind in ("pressure", "pressure_deformed"):
         moved = kind == "pressure_deformed"
         return np.where(found.known, found.pressure(moved=moved), np.nan)
@@ -279,7 +279,7 @@ def _on_slave(found: Tractions, kind: str) -> Array:
 
 
 def _above_zero(values: Array, s: Array) -> float:
-    """Return the length along which values, linear between places, are above zero."""
+    """Return the length on which values, linear between positions s, are above zero [mm]."""
     total = 0.0
     for a, b, length in zip(values[:-1], values[1:], np.diff(s), strict=True):
         if a > 0 and b > 0:

@@ -1,4 +1,4 @@
-"""Figures of each contact pair, measured on the deformed bodies."""
+"""Audit figures of each contact pair, measured on the deformed bodies."""
 
 from __future__ import annotations
 
@@ -24,30 +24,32 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _PRESSED = 1e-6
-"""Ratio of the normal force to the force level, below which a vertex counts as open."""
+"""Ratio of the normal force to the force level; below it a vertex counts as open."""
 _GAP = 2e-3
-"""Largest gap allowed / elastic approach."""
+"""Ratio of the largest permitted gap to the elastic approach."""
 _OVERLAP = (0.02, 2.5e-3)
-"""Largest overlap allowed / elastic approach, and / side of an element; the larger one counts."""
+"""Ratios of the largest permitted overlap to the elastic approach, and to the side of an element;
+the larger limit counts."""
 _COARSE = 0.36
-"""Largest edge allowed / width of the contact of curved surfaces: three vertices across it, which
-tell Hertz's pressure to 4 %."""
+"""Ratio of the largest permitted edge to the width of the contact of curved surfaces: about three
+vertices across it, with which Hertz's pressure has an error of 4 %."""
 _LITTLE = 0.01
-"""Ratio of the force to the force level, below which it does not count how well a contact is
-resolved."""
+"""Ratio of the force of a pair to the force level; below it the resolution of its contact does not
+count."""
 _STILL = 1e-3
-"""Least slip / elastic approach, in the work that wrong slip is compared with."""
+"""Ratio of the least slip to the elastic approach in the friction work that is the scale of wrong
+slip."""
 
 
 class LeftOut(NamedTuple):
-    """What small sliding leaves out, means weighted with the force.
+    """The error of small sliding; means are weighted with the normal force.
 
     Attributes
     ----------
-    way : motion along the partner [mm]; ``sides`` the same / side of an element, ``length`` the
-        same / length of the contact
-    off : error of the gap / elastic approach
-    x, y : where most of the motion is [mm]
+    way : motion along the partner [mm]
+    sides, length : this motion over the side of an element, and over the length of the contact
+    off : error of the gap over the elastic approach
+    x, y : position of the largest motion [mm]
     """
 
     way: float
@@ -59,14 +61,15 @@ class LeftOut(NamedTuple):
 
 
 _LEFT_OUT = LeftOut(way=np.inf, sides=1.0, length=0.01, off=5e-3, x=np.nan, y=np.nan)
-"""What it may leave out; of the length of the contact where a surface is curved."""
+"""Limits; that of ``length`` applies if a surface is curved."""
 
 
 def untouched(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
     """Return a warning for each pair that touches in none of the states."""
     every = [converged.state for converged in states]
     return tuple(
-        f"{_words(pair)} touch at the end of no stage: move them together, or take the pair out"
+        f"{_words(pair)} do not touch at the end of any stage: move them together, or remove the "
+        "pair"
         for k, pair in enumerate(system.model.contacts)
         if not any(_closed(state, k).any() for state in every)
     )
@@ -85,8 +88,8 @@ class AuditedPair:
 
     Attributes
     ----------
-    touching : gaps, slips and nodal forces, from the bodies
-    normal, tangential : the contact forces (n,) of the state [N]
+    touching : gaps, slips and nodal forces, measured on the bodies
+    normal, tangential : contact forces (n,) of the state [N]
     """
 
     def __init__(self, system: System, number: int, converged: Converged) -> None:
@@ -109,9 +112,9 @@ class AuditedPair:
 
     @property
     def approach(self) -> float:
-        """How far contact presses the bodies into each other elastically [mm].
+        """The elastic approach of the bodies [mm].
 
-        The peak pressure over the contact modulus E*, times the width of the contact.
+        It is peak pressure over contact modulus E*, times the width of the contact.
         """
         closed, area = self._closed & (self.touching.area > 0), self.touching.area
         if not closed.any():
@@ -127,7 +130,7 @@ class AuditedPair:
 
     @property
     def rounding(self) -> float:
-        """Gap or slip that is nothing to speak of for the forces that act in the model [mm]."""
+        """Gap or slip that counts as zero for the forces in the model [mm]."""
         depth = self.touching.area.sum() / self.touching.edge.sum()
         closer = self._state.force_scale * self._compliance / depth if depth else 0.0
         return max(LEAST * closer, self._system.touching)
@@ -139,7 +142,7 @@ class AuditedPair:
 
     @property
     def limits(self) -> dict[str, float]:
-        """The largest gap and overlap allowed for this pair [mm], and its coarsest contact."""
+        """Limits of this pair: gap and overlap [mm], and coarseness of the contact."""
         edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
         overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()))
         return {
@@ -150,7 +153,7 @@ class AuditedPair:
 
     @cached_property
     def left_out(self) -> LeftOut | None:
-        """What small sliding leaves out; None where nothing slides, or sliding is finite."""
+        """The error of small sliding; None if nothing slides, or sliding is finite."""
         if self.surfaces.finite or self.force <= 0.0:
             return None
         share = np.where(self._closed, self.normal, 0.0) / self.force
@@ -171,32 +174,32 @@ class AuditedPair:
 
     @property
     def outside(self) -> tuple[str, ...]:
-        """What small sliding leaves out, where that is more than the side of an element."""
+        """A message if surfaces have moved by more than the side of an element."""
         left_out = self.left_out
-        return (self._told(left_out),) if left_out and left_out.sides > _LEFT_OUT.sides else ()
+        return (self._describe(left_out),) if left_out and left_out.sides > _LEFT_OUT.sides else ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What small sliding leaves out, where that is less and yet matters."""
+        """A message if the error of small sliding is smaller than that, but matters."""
         left_out = self.left_out
         if not left_out or self.outside:
             return ()
         far = self.surfaces.curved and left_out.length > _LEFT_OUT.length
-        return (self._told(left_out),) if far or left_out.off > _LEFT_OUT.off else ()
+        return (self._describe(left_out),) if far or left_out.off > _LEFT_OUT.off else ()
 
-    def _told(self, left_out: LeftOut) -> str:
+    def _describe(self, left_out: LeftOut) -> str:
         slave, master = (".".join(side) for side in (self._pair.slave, self._pair.master))
         return (
             f"{slave} moved {left_out.way:.2g} mm along {master}, mostly at ({left_out.x:z.4g}, "
             f"{left_out.y:z.4g}): {left_out.sides:.2g} sides of an element, "
             f"{left_out.length:.1%} of the length of contact; gaps differ by {left_out.off:.1%} of "
-            "the elastic approach. Small sliding leaves this out: give this pair "
+            "the elastic approach. Small sliding neglects this: give this pair "
             'sliding = "finite"'
         )
 
     @cached_property
     def _bound(self) -> Array:
-        """The largest tangential forces (n,), under the area and strength found here [N]."""
+        """The friction bound (n,) [N], with area and strength as measured here."""
         places = ContactPlaces(
             n=len(self.normal),
             find_strength=lambda: self.touching.strength,
@@ -211,7 +214,7 @@ class AuditedPair:
         gap, true = np.nan_to_num(self.touching.gap), np.nan_to_num(self.touching.true_gap)
         pressed = np.where(self._closed, self.normal, 0.0)
         pressed /= max(float(pressed.sum()), 1e-300)
-        # mean over the area: at a sharp corner the overlap of the last vertex is mostly distortion
+        # mean over the area: at a sharp corner the last vertex overlaps mostly by distortion
         deep = np.maximum(-np.minimum(gap, true), 0.0) @ self.touching.area
         area = float(self.touching.area[self._closed].sum() or self.touching.area.sum())
         return {
@@ -226,9 +229,9 @@ class AuditedPair:
         }
 
     def _coarseness(self) -> float:
-        """Return the longest edge in a contact of curved surfaces / its width; 0 where flat.
+        """Return the longest edge in a contact of curved surfaces over its width; 0 if flat.
 
-        Where no vertex bears and the bodies overlap, the contact is as wide as their overlap.
+        If no vertex has force although the bodies overlap, the width is that of the overlap.
         """
         if not self.surfaces.curved:
             return 0.0
@@ -242,11 +245,10 @@ class AuditedPair:
         return self.surfaces.coarseness(self._state, np.where(self._closed, self.normal, 0.0))
 
     def _wrong_slip(self) -> float:
-        """Return the friction work that is missing in slip / the work it should do.
+        """Return the friction work missing because of wrong slip, over the friction work.
 
-        Slip is wrong where the shear is below its bound, and where it has the direction of the
-        shear: nothing may slip below the bound, and friction opposes slip. Vertices new in contact
-        are left out.
+        Slip is wrong if the shear is below its bound, or if it has the direction of the friction
+        force on the vertex, which must oppose it. Vertices new in contact are left out.
         """
         before = self._start.contacts[self._number].touching
         judged = self._closed & before & (self.touching.area > 0)

@@ -1,9 +1,8 @@
-"""A second, plain evaluation of a body: strain, stress, nodal forces, applied forces, energy.
+"""A second, independent evaluation of a body: strain, stress, forces, applied loads, energy.
 
-Nothing here uses the operators that increments are solved with: gradients come from the elements
-themselves, volumes from the quadrature, heat and initial stress from the loads as they were
-declared, and the resultants of pressures from the shape of the boundary. Stress and strain are
-Mandel vectors, elements and points last.
+The solver's operators are not used: gradients come from the elements, volumes from the quadrature,
+heat and initial stress from the declared loads, and resultants of pressures from the shape of the
+boundary. Stress and strain are Mandel vectors, elements and points last.
 """
 
 from __future__ import annotations
@@ -35,13 +34,13 @@ if TYPE_CHECKING:
 
 
 _CHORDS = 64
-"""Chords of an edge."""
+"""Number of chords into which an edge is divided."""
 _VOLUME_DEGREE = 10
 """Polynomial degree up to which forces per volume are integrated exactly."""
 
 
 def load_factor(amplitude: Amplitude | None, time: float) -> float:
-    """Return the factor at a time of a load with this amplitude: time itself, where it has none."""
+    """Return the load factor at a time: that of the amplitude, or without one the time itself."""
     return time if amplitude is None else float(np.interp(time, amplitude.time, amplitude.value))
 
 
@@ -53,7 +52,7 @@ class PlainBody:
 
     @property
     def body(self) -> Body:
-        """What was declared."""
+        """The declared body."""
         return self.part.body
 
     @cached_property
@@ -67,7 +66,7 @@ class PlainBody:
 
     @property
     def steepest(self) -> float:
-        """Largest strain of an element if one of its nodes moves by a unit [1/mm]."""
+        """Largest strain of an element per displacement of one of its nodes [1/mm]."""
         return float(np.abs(self._gradients).max())
 
     @cached_property
@@ -92,7 +91,7 @@ class PlainBody:
         return kind.mean_dilatation and self.body.kinematics != "plane_stress"
 
     def _level(self, field: Array) -> Array:
-        """Return a tensor field with its trace averaged over each element, where that applies."""
+        """Return a tensor field, for B-bar elements with its trace averaged over each element."""
         if not self._averaged:
             return field
         trace = field[:3].sum(axis=0)
@@ -115,14 +114,14 @@ class PlainBody:
 
     @cached_property
     def points(self) -> Array:
-        """Places of the points (2, n_points) [mm]."""
+        """Positions of the points (2, n_points) [mm]."""
         return np.asarray(self.part.basis.global_coordinates()).reshape(2, -1)
 
     def recovered(self, values: Array) -> Array:
         """Return nodal values (..., n_nodes) of values at points (..., n_points).
 
-        In each element the values are those of a (bi)linear field that is nearest to them at its
-        points; at a node the mean over elements counts, weighted with their volume.
+        In each element a (bi)linear field is fitted to the points by least squares; a node takes
+        the mean of its elements, weighted with their volume.
         """
         basis = self.part.basis
         terms = 4 if basis.mesh.t.shape[0] == 4 else 3
@@ -138,12 +137,12 @@ class PlainBody:
         weighted = values.reshape(*values.shape[:-1], *self.volume.shape) * volume[:, None]
         each = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
         total = np.bincount(nodes.ravel(), np.tile(volume, len(nodes)), count)
-        total[total == 0] = 1.0  # copies of a periodic body have no element of their own
+        total[total == 0] = 1.0  # copies of a periodic body belong to no element
         sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in each]) / total
         return np.asarray(sums[:, self.part.same].reshape(*values.shape[:-1], count))
 
     def eigenstrain(self, time: float) -> Array:
-        """Return the Mandel strain (4, n_points) of heat and of making, without stress."""
+        """Return the eigenstrain (4, n_points, Mandel) of heat and initial stress."""
         out, elasticity = np.zeros((4, self.points.shape[1])), self.body.material.elasticity
         for load in self.body.every_load:
             factor = load_factor(load.amplitude, time)
@@ -157,7 +156,7 @@ class PlainBody:
         return out
 
     def _left(self, time: float) -> tuple[Array, Array]:
-        """Return the shares of Young's modulus and of the yield stress that heat leaves."""
+        """Return the ratios of Young's modulus and of the yield stress to their cold values."""
         stiff, strong = np.ones((2, self.points.shape[1]))
         for load in self.body.every_load:
             lost = load.softening(self.points)
@@ -180,7 +179,7 @@ class PlainBody:
         Parameters
         ----------
         u : (n,) displacements [mm]
-        plastic : internal variables at the points, None where nothing has yielded
+        plastic : internal variables at the points, None if nothing has yielded
         """
         elasticity = self.body.material.elasticity
         nu, double_shear = elasticity.poisson_ratio, 2 * elasticity.shear_modulus
@@ -211,11 +210,11 @@ class PlainBody:
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in (x, y)], axis=1)
 
     def applied(self, time: float) -> Array:
-        """Return the resultant [N] of the loads at a time and its moments [N mm] (3, 2).
+        """Return the resultant [N] of the loads at a time and its first moments [N mm] (3, 2).
 
-        Moments are forces times x and times y from the middle of the body. A pressure p on a chord
-        from A to B pushes with p times the depth and the length of AB, against its normal; edges
-        have many chords.
+        First moments are force times x and force times y, from the centre of the body. A pressure p
+        on a chord from A to B gives the force p times depth times length of AB, against the outward
+        normal; an edge has many chords.
         """
         total = np.zeros((3, 2))
         for load in self.body.every_load:
@@ -224,7 +223,7 @@ class PlainBody:
         return total
 
     def moments(self, force: Array, x: Array) -> Array:
-        """Return forces (2, n) times 1, x and y, added up (3, 2), at places (2, n)."""
+        """Return the sums (3, 2) of forces (2, n) times 1, x and y, at places (2, n)."""
         arm = x - self.part.X.mean(axis=1, keepdims=True)
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 
@@ -243,7 +242,7 @@ class PlainBody:
         return total
 
     def _on_volume(self, load: Load) -> Array:
-        """Return the moments (3, 2) of the force per volume, each element's at its nodes."""
+        """Return the moments (3, 2) of a load's force per volume, integrated over elements."""
         if load.body_force(self.points) is None:
             return np.zeros((3, 2))
         basis = CellBasis(self.body.mesh, self.part.basis.elem, intorder=_VOLUME_DEGREE)

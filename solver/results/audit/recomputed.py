@@ -1,4 +1,4 @@
-"""What a record is compared with: what there is of a run that is computed anew."""
+"""Interface of the recomputed results with which a record is compared."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ if TYPE_CHECKING:
 
 
 class BodyFields(Protocol):
-    """Fields of one body in one state: stress xx, yy, zz, xy [MPa], and flow.
+    """Fields of one body in one state; NaN where they are not known.
 
     Attributes
     ----------
     plain : the body
-    stress, mises, accumulated : at its nodes (4, n_nodes), (n_nodes,), (n_nodes,), accumulated
-        plastic strain with what recovery undershoots; NaN where they are not known
+    stress : (4, n_nodes) components xx, yy, zz, xy at its nodes [MPa]
+    mises : (n_nodes,) von Mises stress [MPa]
+    accumulated : (n_nodes,) accumulated plastic strain; recovery may make it negative
     displacement : (2, n_nodes) [mm]
-    at_points : places (2, n), von Mises stress and plastic strain (n,) at points
+    at_points : positions (2, n) [mm], von Mises stress (n,) [MPa] and plastic strain (n,) at points
     """
 
     @property
@@ -53,8 +54,8 @@ class BodyFields(Protocol):
 class Acting(NamedTuple):
     """Pressure, shear along +s on the lower body [MPa] and gap [mm] at places (n,), or NaN.
 
-    ``way`` is how far the surfaces have moved [mm]; ``measured`` tells that gaps are means over
-    other projections than those of the solver.
+    ``way`` is how far the surfaces have moved [mm]; ``measured`` says that gaps are means with
+    another projection than the solver's.
     """
 
     pressure: Array
@@ -65,7 +66,7 @@ class Acting(NamedTuple):
 
 
 class Recomputed(Protocol):
-    """A run, computed anew."""
+    """The recomputed results of a run."""
 
     def plain(self, name: str) -> PlainBody:
         """Return a body."""
@@ -74,13 +75,13 @@ class Recomputed(Protocol):
         """Return the fields of a body in a state."""
 
     def exact(self, stage: str) -> bool:
-        """Return whether its fields are those of the states, up to rounding."""
+        """Return whether its fields in a state are exact up to rounding."""
 
     def centre(self, stage: str) -> float:
-        """Return where s is zero along the axis of the view in a state [mm]."""
+        """Return the position of s = 0 along the axis of the view in a state [mm]."""
 
     def acting(self, stage: str, x: Array) -> Acting:
-        """Return what acts at places (n,) along the axis of the view."""
+        """Return pressure, shear and gap at places (n,) along the axis of the view."""
 
     def extent(self, stage: str) -> tuple[float, float, float]:
-        """Return the least and the largest half-width [mm], and the peak [MPa] of the contact."""
+        """Return bounds of the contact's half-width, least and largest [mm], and its peak [MPa]."""

@@ -39,22 +39,22 @@ _LIMITS = {
     "audit_history": 1e-6,
     "audit_energy": 1e-5,
 }
-_TURNING = 0.02  # energy error where the directions of contact turn within an increment
-TRAVELLING = 5e-3  # of the force: the elements integrate a Hertz pressure, which has no slope
+_TURNING = 0.02  # energy error under finite sliding: contact normals rotate within an increment
+TRAVELLING = 5e-3  # of the force: elements integrate a Hertz pressure with its steep ends
 _FORCE = 1e-6  # of the force level
 
 
 @dataclass(frozen=True, slots=True)
 class Audit:
-    """What was found of a run.
+    """The audit of a run.
 
     Attributes
     ----------
-    figures : by name
-    violations : conditions that the solution violates
-    warnings : what the user should know
-    outside : what puts the run outside small-strain theory: it is solved as it should be, and
-        strain or sliding is too large for its equations
+    figures : values of the figures by name
+    violations : messages on conditions that the solution violates
+    warnings : messages on results that need attention
+    outside : messages on strain or sliding too large for small-strain theory; the run is solved
+        correctly, but its equations do not describe the bodies
     """
 
     figures: Mapping[str, float]
@@ -64,12 +64,12 @@ class Audit:
 
     @property
     def passed(self) -> bool:
-        """Whether no condition is violated; a run that has passed may be ``outside``."""
+        """Whether no condition is violated; a run that passes may still be ``outside``."""
         return not self.violations
 
 
 def _largest(*values: float) -> float:
-    """Return the largest value, or NaN where one is NaN: NaN violates every limit."""
+    """Return the largest value, or NaN if one is NaN: NaN violates every limit."""
     return float(np.max(values))
 
 
@@ -80,9 +80,9 @@ def audit(
     least_dissipation: float,
     lost: float = 0.0,
 ) -> Audit:
-    """Check one run: its state under load and, where there is one, after unloading.
+    """Check one run: its state under load and, if there is one, that after unloading.
 
-    ``least_dissipation`` and ``lost`` are those of all its increments, see `Tally`.
+    ``least_dissipation`` [MPa] and ``lost`` are the extremes over all its increments, see `Tally`.
     """
     states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
@@ -127,7 +127,7 @@ def audit(
 
 
 def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tuple[float, float]:
-    """Return the largest deviation from the law, and stress beyond yield, / strength."""
+    """Return the largest deviation from the law, and stress beyond yield, over the strength."""
     broken, beyond = 0.0, 0.0
     for both in zip(bodies, released, strict=True):
         strength = max(*(body.strength for body in both), 1e-300)
@@ -138,7 +138,7 @@ def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tup
 
 
 def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
-    """Return the work missing in the energy balance / the largest term of the balance so far."""
+    """Return the error of the energy balance, over the largest term of the balance so far."""
     work = loaded.energy
     terms = np.array([
         sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
@@ -149,7 +149,7 @@ def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
 
 
 def _strength(system: System, loaded: Converged) -> dict[str, float]:
-    """Return contact shear, and the most that friction bears, / shear yield stress."""
+    """Return contact shear, and the shear that friction permits, over the shear yield stress."""
     shear, friction = 0.0, 0.0
     for k, interface in enumerate(system.interfaces):
         state, start = loaded.state, loaded.start
@@ -170,7 +170,7 @@ def _discretisation(
 ) -> dict[str, float]:
     """Return the estimated relative errors of stress in the energy norm.
 
-    That of stress whose energy is rounding of the run's is none.
+    Stress whose energy is rounding, compared with that of the run, has no error.
     """
     names = [body.name for body in system.model.bodies]
     return {
@@ -187,7 +187,7 @@ def estimated_error(
 ) -> float:
     """Return the estimated relative error of the stress of bodies in the energy norm.
 
-    An energy below ``least`` [N mm] counts as that.
+    A smaller energy than ``least`` [N mm] is replaced by it.
     """
     error, energy = 0.0, 0.0
     for body, stress in bodies:
@@ -217,7 +217,7 @@ def _violations(
 
 
 def limits_at(scale: float) -> dict[str, float]:
-    """Return the limits of figures that every kind of run has, for a force level [N]."""
+    """Return the limits of the figures that every kind of run has, for a force level [N]."""
     return _LIMITS | {
         "audit_tension": _FORCE * scale,
         "audit_friction_excess": _FORCE * scale,
@@ -228,7 +228,7 @@ def limits_at(scale: float) -> dict[str, float]:
 def broken(
     figures: Mapping[str, float], limits: Mapping[str, float], yield_stress: float
 ) -> tuple[str, ...]:
-    """Return the conditions violated: figures beyond their limits, and negative dissipation."""
+    """Return messages on violations: figures beyond their limits, and negative dissipation."""
     found = _beyond(figures, limits)
     if not figures["audit_dissipation"] >= -_LIMITS["audit_yield"] * yield_stress:
         found += (f"plastic dissipation is negative: {figures['audit_dissipation']:.2e}",)
@@ -244,7 +244,7 @@ def _beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[
 
 
 def warnings(figures: Mapping[str, float]) -> tuple[str, ...]:
-    """Return warnings for figures."""
+    """Return the warnings that follow from figures."""
     shear = figures.get("audit_surface_shear", 0.0)
-    told = f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
-    return (told,) if shear > _SURFACE_SHEAR else ()
+    message = f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
+    return (message,) if shear > _SURFACE_SHEAR else ()

@@ -1,4 +1,4 @@
-"""What a record is compared with: fields and contact of a run by increments, from its states."""
+"""Recomputed fields and contact of a run by increments, from its states."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 
 
 def between(x: Array, at: Array, values: Array) -> Array:
-    """Return values at places x, linear between those known; NaN beyond the first and the last."""
+    """Return values at x, linearly interpolated from ``values`` at ``at``; NaN outside."""
     return np.asarray(np.interp(x, at, values, left=np.nan, right=np.nan))
 
 
 def along(view: View, X: Array) -> Array:
-    """Return how far along the axis of a view places (n_axes, n) are (n,) [mm]."""
+    """Return the coordinates (n,) of places (n_axes, n) along the axis of a view [mm]."""
     each = zip(X, *view.axis, strict=True)
     return np.asarray(sum((x - x0) * ax for x, x0, ax in each))
 
 
 class OfStates:
-    """A run of a system of bodies."""
+    """Recomputed results of a run by increments (see `Recomputed`)."""
 
     def __init__(self, run: FinishedRun) -> None:
         self._run = run
@@ -57,7 +57,10 @@ class OfStates:
         return True
 
     def held(self, name: str, stage: str) -> tuple[Array, Array]:
-        """Return displacements where a body is held or moved: those found, those declared [mm]."""
+        """Return the solved and the declared displacements (2, n_nodes) each [mm].
+
+        Declared are those of supports and moved boundaries, NaN elsewhere.
+        """
         body, fields = self.plain(name).body, self.fields(name, stage)
         declared = np.full_like(fields.displacement, np.nan)
         for boundary, axes in body.supports.items():
@@ -113,7 +116,7 @@ class OfStates:
             between(x, at[order], (values + unknown)[order])
             for values in (found.pressure(moved=False), -found.shear(moved=False), found.gap)
         )
-        if found.repeated:  # gaps of the copies of a periodic surface are not measured
+        if found.repeated:  # the gaps of periodic copies are not measured
             gap = nowhere
         return Acting(pressure, shear, gap, found.way, found.measured)
 

@@ -1,4 +1,4 @@
-"""The audit of a steady pass, in the frame of the load, and what its record is compared with."""
+"""The audit of a steady pass, in the frame of the load, and its recomputed results."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ _LIMITS = {
 def audit_pass(
     track: Track, material: Law, found: Pass, previous: Pass | None, direction: int
 ) -> Audit:
-    """Check a steady pass: the state under load, what it leaves, and how material came there.
+    """Check a steady pass: the state under load, the state behind it, and the flow of material.
 
     Parameters
     ----------
-    previous : the pass before it, None of the first one
-    direction : its way along x, as declared
+    previous : the pass before it, None for the first one
+    direction : declared direction of the pass, 1 along +x, -1 along -x
     """
     plain, C = PlainBody(track.part), material.stiffness(4)
     loaded, left = under_load(track, found), of_layers(track, material, found.after)
@@ -93,14 +93,14 @@ def audit_pass(
 
 
 def _strain(track: Track, found: Pass) -> Strained:
-    """Return the largest strain that the pass leaves; it is the same all along x."""
+    """Return the largest plastic strain behind the pass, which does not depend on x."""
     layers = found.after.whole
     places = np.stack([np.zeros_like(layers.depth), -layers.depth])
     return largest_strain([(track.part.body.name, places, layers.accumulated)])
 
 
 class _Way:
-    """The way of material through the window: at each column, the last increment before it."""
+    """The flow of material through the window: for each column, the last increment before it."""
 
     def __init__(self, track: Track, material: Law, found: Pass) -> None:
         self._material, self._found, self._elasticity = material, found, track.elasticity
@@ -113,16 +113,16 @@ class _Way:
         self._stress = material.stiffness(4) @ (self._strain - self._after.plastic_strain)
 
     def misfit(self) -> float:
-        """Return how far the increments are from the law [MPa]."""
+        """Return the misfit of the increments to the law [MPa]."""
         off = self._material.misfit(self._strain, self._stress, self._before, self._after)
         return _largest(off)
 
     def retraced(self) -> float:
-        """Return how far states are from those that the law gives, from column to column [MPa].
+        """Return the difference of the states from those of the law, column by column [MPa].
 
-        The law is asked for all increments to each column, from the state at the one upstream;
-        that at the first one begins with what was there before the pass, and what is left begins
-        with the state at the last one, in one increment.
+        All increments between two columns are repeated with the law, from the state at the upstream
+        column. The first column starts from the state before the pass. The state behind the load is
+        one increment from the last column.
         """
         found, law = self._found, self._material
         states = found.states.packed
@@ -137,13 +137,15 @@ class _Way:
         left = law.respond(found.after.strain(self._elasticity).T, last)
         across = float(np.abs(left.stress[[1, 3]]).max())
         return max(
-            across, self._apart(self._after, state), self._apart(found.after.state, left.state)
+            across,
+            self._difference(self._after, state),
+            self._difference(found.after.state, left.state),
         )
 
-    def _apart(self, one: PlasticState, other: PlasticState) -> float:
+    def _difference(self, one: PlasticState, other: PlasticState) -> float:
         """Return the largest difference of internal variables, as stress [MPa].
 
-        Strain counts times 2 G, any other variable as a share of its largest value.
+        Strain is multiplied by 2 G; any other variable counts relative to its largest value.
         """
         double_shear, worst = 2 * self._material.elasticity.shear_modulus, []
         for name in (f.name for f in fields(one)):
@@ -161,16 +163,16 @@ class _Way:
         return _largest(self._material.yield_value(self._stress, self._after))
 
     def dissipation(self) -> float:
-        """Return the least work that an increment turns into heat [N mm/mm3]."""
+        """Return the least plastic dissipation of an increment [N mm/mm3]."""
         nothing = np.zeros((4, 4, 0)), np.zeros(0, dtype=bool)
         response = Response(self._stress, nothing[0], self._after, nothing[1])
         return float(self._material.dissipation(self._before, response).min())
 
     def lost(self, previous: Pass | None, direction: int) -> float:
-        """Return how far the state before the pass is from that which the last one left.
+        """Return the difference between the state before the pass and that behind the last one.
 
-        It is the largest difference of internal variables / yield stress. Seen along the other way
-        shear has the other sign.
+        It is the largest difference of internal variables, as stress over the yield stress. In the
+        opposite direction shear has the opposite sign.
         """
         found = self._found
         before = found.before.whole.state
@@ -180,23 +182,23 @@ class _Way:
             left = previous.after.whole.state
             left = left if previous.direction == direction else left.mirrored
         turned = float(found.direction != direction)
-        return max(turned, self._apart(before, left) / self._material.yield_stress)
+        return max(turned, self._difference(before, left) / self._material.yield_stress)
 
     def inflow(self) -> float:
-        """Return the plastic strain gathered in the first column / that of the pass."""
+        """Return the plastic strain added in the first column, over that of the pass."""
         found = self._found
-        return _largest(found.accumulated[:, 0] - found.before.accumulated) / self._gathered
+        return _largest(found.accumulated[:, 0] - found.before.accumulated) / self._most_added
 
     def outflow(self) -> float:
-        """Return the plastic strain gathered behind the window / that of the pass."""
+        """Return the plastic strain added behind the window, over that of the pass."""
         found = self._found
-        return _largest(found.after.accumulated - found.accumulated[:, -1]) / self._gathered
+        return _largest(found.after.accumulated - found.accumulated[:, -1]) / self._most_added
 
     @property
-    def _gathered(self) -> float:
-        """The most plastic strain that the pass gathers, or what is nothing to speak of."""
+    def _most_added(self) -> float:
+        """The largest plastic strain that the pass adds, at least `LEAST` of the yield strain."""
         yield_strain = self._material.yield_stress / self._elasticity.youngs_modulus
-        return max(LEAST * yield_strain, self._found.gathered)
+        return max(LEAST * yield_strain, self._found.most_added)
 
 
 def _flat(values: Array) -> Array:
@@ -210,7 +212,7 @@ def _largest(values: Array) -> float:
 
 
 def _of_contact(material: Law, found: Pass) -> dict[str, float]:
-    """Return the figures of the contact with a wheel, none without a wheel."""
+    """Return the figures of the contact with a wheel; empty without a wheel."""
     touching = found.loading
     if not isinstance(touching, RollingContact):
         return {}
@@ -226,12 +228,12 @@ def _of_contact(material: Law, found: Pass) -> dict[str, float]:
 
 
 class OfPass:
-    """A steady pass.
+    """Recomputed results of a steady pass (see `Recomputed`).
 
     Parameters
     ----------
-    moving : the pressure as it really goes, where no wheel makes it
-    released : name of the state that the pass leaves
+    moving : the travelling pressure, None if the load is a wheel
+    released : name of the state behind the pass
     """
 
     def __init__(
@@ -251,7 +253,7 @@ class OfPass:
         return PassFields(self._half_plane, self._found, loaded=stage != self._released)
 
     def exact(self, stage: str) -> bool:
-        """See `Recomputed`: under the load there are two strains, see `audit_steadiness`."""
+        """See `Recomputed`; under the load two strains differ, by `audit_steadiness`."""
         return stage == self._released
 
     def centre(self, stage: str) -> float:
@@ -261,7 +263,7 @@ class OfPass:
 
     @property
     def _vertices(self) -> tuple[Array, Array, Array]:
-        """Places along x, and pressure and shear there, as one sees them who stands beside."""
+        """Positions along x, pressure and shear there, in the coordinates of the track."""
         touching, chain = self._found.loading, self._half_plane.track.surface
         assert isinstance(touching, RollingContact)
         x, way = chain.X[0, chain.vertices], self._found.direction
@@ -290,5 +292,5 @@ class OfPass:
         if stage == self._released:
             return np.nan, np.nan, 0.0
         at, pressure, _ = self._vertices
-        width, side = np.ptp(at[pressure > 0]) / 2, np.diff(at).max()  # gaps are not known here
+        width, side = np.ptp(at[pressure > 0]) / 2, np.diff(at).max()  # gaps are not available
         return float(width - side), float(width + side), float(pressure.max())

@@ -1,11 +1,11 @@
-"""The last part of the audit: what a record stores, against what is computed anew.
+"""The last part of the audit: compare the stored results of a run with recomputed values.
 
-It begins at the end of the chain. Of each quantity of a record some values are taken, and those
-where it is largest; they are computed again at the places that view and scene file declare, from
-displacements, internal variables, contact forces and declared loads (`sources`). The sampler, the
-recovery, the samplers and the outputs that made the record take no part.
+Of each quantity of a record some values are taken, and the largest. They are computed again at the
+places that view and scene file declare, from displacements, internal variables, contact forces and
+declared loads (`sources`). The samplers, the recovery and the outputs that made the record are not
+used.
 
-Quantities that a scene computes by itself are left out: nothing is declared of them.
+Quantities that a scene computes itself are left out, because nothing is declared about them.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
 _FIGURE = AUDIT["audit_stored"].name
 _NEAR = 0.1
-"""Ratio of the gap to the largest way or gap, below which gaps measured by other projections are
+"""Ratio of the gap to the largest motion or gap; below it gaps by different projections are
 compared."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """The figure, the condition violated if any, and the names of what was compared."""
+    """The figure, the message on a violation if any, and the names of compared quantities."""
 
     figure: float
     violations: tuple[str, ...]
@@ -52,13 +52,13 @@ class Stored:
 
 
 def stored(run: FinishedRun, record: Record, view: View, places: NamedPlaces | None) -> Stored:
-    """Compare a record with values computed anew.
+    """Compare a record with recomputed values.
 
     Parameters
     ----------
     run : the finished run
-    record : what is stored of it
-    view, places : where its results are taken, as its parameters declare it
+    record : the stored results
+    view, places : the places of its results, as its parameters declare them
     """
     source = run.source or OfStates(run)
     viewed = _Viewed(run, record, view, source)
@@ -68,19 +68,19 @@ def stored(run: FinishedRun, record: Record, view: View, places: NamedPlaces | N
     violations: tuple[str, ...] = ()
     if not found.figure <= LIMIT:
         text = f"{_FIGURE} = {found.figure:.2e} exceeds {LIMIT:.2e}"
-        violations = (f"{text}: {found.name} is not what is computed anew",)
+        violations = (f"{text}: {found.name} differs from its recomputed value",)
     return Stored(found.figure, violations, frozenset(found.seen))
 
 
 class _Viewed:
-    """What a record stores at the places of its view."""
+    """Comparison of the results at the places of the view."""
 
     def __init__(self, run: FinishedRun, record: Record, view: View, source: Recomputed) -> None:
         self._run, self._record, self._view, self._source = run, record, view, source
         self._out = Compared()
 
     def compared(self) -> Compared:
-        """Return the comparison of all that is declared."""
+        """Return the comparison of all declared results."""
         self._held()
         self._coordinates()
         self._maps()
@@ -90,10 +90,10 @@ class _Viewed:
         self._extremes()
         return self._out
 
-    # -- what is stored ----------------------------------------------------------------------
+    # -- stored values -----------------------------------------------------------------------
 
     def _stored(self, name: str) -> Array | None:
-        """Return a field, that after the last pass where it has passes."""
+        """Return a field, after the last pass if it has the dimension of passes."""
         if name not in self._record.fields:
             return None
         dims, values = self._record.fields[name]
@@ -103,16 +103,16 @@ class _Viewed:
         return np.asarray(self._record.coordinates.get(name, np.zeros(0)), dtype=float)
 
     def _coordinates(self) -> None:
-        """Compare the places that the record tells with those that are declared."""
+        """Compare the coordinates in the record with the declared places."""
         for name, declared in self._view.coordinates.items():
-            told = self._record.coordinates.get(name, np.zeros(0))
+            recorded = self._record.coordinates.get(name, np.zeros(0))
             if declared.dtype.kind != "f":
-                same = told.shape == declared.shape and bool((told == declared).all())
+                same = recorded.shape == declared.shape and bool((recorded == declared).all())
                 self._out.add(name, float(same), 1.0, 1.0)
-            elif told.shape != declared.shape:
+            elif recorded.shape != declared.shape:
                 self._out.add(name, 0.0, 1.0, 1.0)
             else:
-                self._out.add(name, told, declared, float(np.abs(declared).max()))
+                self._out.add(name, recorded, declared, float(np.abs(declared).max()))
 
     def _held(self) -> None:
         """Compare displacements with those that supports and loads prescribe."""
@@ -128,7 +128,7 @@ class _Viewed:
 
     @cached_property
     def stress_scale(self) -> float:
-        """The largest stress under load, or one that is next to nothing [MPa]."""
+        """The largest stress under load, at least `LEAST_STRAIN` times Young's modulus [MPa]."""
         names = self._view.surfaces or dict.fromkeys(self._run.system.names, "")
         each = [self._source.fields(name, self._view.loaded) for name in names]
         most = max(float(np.nanmax(np.abs(fields.stress))) for fields in each)
@@ -179,7 +179,7 @@ class _Viewed:
         bodies = tuple(places.values())
 
         def sampled(of: Callable[[BodyFields], Array], stage: str) -> Array:
-            """Return values (..., n) of the first body that holds a place."""
+            """Return values (..., n), each of the first body that contains the place."""
             out = np.full(len(at), np.nan)
             unsure = np.zeros(len(at), dtype=bool)
             for name, where in places.items():
@@ -197,8 +197,8 @@ class _Viewed:
             for k, stage in enumerate(view.stages if name in flat else ()):
                 own = sampled(nodal, stage)
                 own = own if nodal is _stress else np.maximum(own, 0.0)
-                told = flat[name][k][..., at]
-                self._against(name, told, own, bodies, self.stress_scale, stage)
+                recorded = flat[name][k][..., at]
+                self._against(name, recorded, own, bodies, self.stress_scale, stage)
         strains = {"plastic_strain": (view.unloaded,), "map_plastic_strain": view.stages}
         for name, stages in strains.items():
             for k, stage in enumerate(stages if name in flat else ()):
@@ -225,7 +225,7 @@ class _Viewed:
         fields = self._source.fields(view.profile_body, view.unloaded)
         own = places.of(fields.stress)
         self._against("residual_profile", flat[:, at], own, (places,), self.stress_scale)
-        # what a steady pass leaves is interpolated as recovered
+        # the state behind a steady pass is interpolated from recovered values
         steady = self._run.source is not None
         own = np.maximum(places.of(fields.accumulated if steady else flowed(fields)), 0.0)
         scale = self._strain_scale(strain)
@@ -272,13 +272,13 @@ class _Viewed:
             self._out.add("contact_pressure", pressure[k], own.pressure, scale)
             self._out.add("contact_shear", shear[k], own.shear, scale)
             share = LIMIT / MEASURED if own.measured else 1.0
-            # far from contact a gap, and whether there is one, depends on how it is projected
+            # far from contact a gap, and whether it exists, depends on the projection
             near = np.isfinite(gap[k]) & (np.abs(own.gap) < _NEAR * own.way)
             faced = np.where(near | ~np.bool_(own.measured), own.gap, np.nan)
             self._out.add("contact_gap", gap[k], faced, own.way, share)
             if stage == self._view.loaded:
                 self._number("peak_contact_pressure", peak, peak)
-                # the edge is found by gaps
+                # the edge of contact is found from gaps
                 width = np.clip(self._record.scalars["contact_half_width"], least, most)
                 self._number("contact_half_width", width, most, share)
 
@@ -324,11 +324,11 @@ class _Viewed:
         self, name: str, body: int, own: Array, stress: Array, places: Array, axes: tuple[str, ...]
     ) -> None:
         """Compare extremes (n,), and the stress (n, n_nodes) at the places that are stored."""
-        told = self._stored(name)
+        recorded = self._stored(name)
         at = [self._stored(f"{name}_{axis}") for axis in axes]
-        if told is None or any(one is None for one in at):
+        if recorded is None or any(one is None for one in at):
             return
-        self._out.add(name, told[body], own, self.stress_scale)
+        self._out.add(name, recorded[body], own, self.stress_scale)
         where = np.stack([np.asarray(one)[body] for one in at])  # (n_axes, n)
         for component in np.flatnonzero(np.isfinite(where).all(axis=0)):
             off = np.abs(places - where[:, component, None]).max(axis=0)

@@ -1,7 +1,7 @@
-"""Contact measured on the bodies alone: true gaps, slips, and the forces the bodies feel.
+"""Contact measured on the bodies: gaps, slips, and the nodal forces of contact.
 
-Surfaces are taken in their deformed positions, and distances are measured point by point to the
-nearest place of the partner; no derivative row of the contact problem is used. Means are taken
+Surfaces are taken in their deformed positions, and distances are measured from points to the
+nearest place of the partner; derivative rows of the contact problem are not used. Means are taken
 under the hats of the slave's vertices, to which contact forces belong.
 """
 
@@ -34,15 +34,16 @@ if TYPE_CHECKING:
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 5
 _BLOCK = 1000
-"""Points treated at once, each with every edge."""
-_CORNER = float(np.radians(40.0))  # turn between edges that meet in a corner
+"""Number of points that are treated at once, each with every edge."""
+_CORNER = float(np.radians(40.0))  # angle between the normals of edges that form a corner
 _OPPOSED = 0.25  # least cosine of the angle between surfaces that face each other
 _STRAIGHT = 1e-6
-"""Turn of the normals [rad] that rounding may make."""
+"""Change of the normals [rad] up to which a surface counts as straight."""
 _SHARE = 0.05
-"""Share of the force of a pair, below which a patch of its contact does not count."""
+"""Ratio of the force of a patch of contact to that of its pair; below it the patch does not count.
+"""
 _BESIDE = 1e-9
-"""Distance / length of an edge, by which a line may miss the edge and still count as meeting it."""
+"""Ratio of a distance to the length of an edge, by which a line may miss the edge it intersects."""
 
 
 def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
@@ -66,7 +67,7 @@ def _rotation(angle: float) -> Array:
 
 
 def _turned(x: Array, centre: Array, angle: float, moved: tuple[float, float]) -> Array:
-    """Return where points (2, n) are after a rotation about a centre, which then moves [mm]."""
+    """Return points (2, n) after a rotation about a centre and a displacement of it [mm]."""
     from_centre = _rotation(angle) @ (x - centre[:, None])
     return np.asarray(from_centre + (centre + np.array(moved))[:, None])
 
@@ -79,15 +80,15 @@ class PairState:
     ----------
     area : (n,) integral of the hat of a slave vertex where the master faces it [mm2]
     gap : (n,) mean gap under the hat in the kinematics of the pair, NaN without a partner [mm]
-    true_gap : (n,) the same on the deformed bodies, from which small sliding may differ [mm]
+    true_gap : (n,) mean gap of the deformed bodies, from which small sliding may differ [mm]
     slip : (n,) mean slip of the increment [mm]
-    way : (n,) mean motion of the slave along the master since the bodies were at rest [mm]
+    way : (n,) mean motion of the slave along the master since the beginning [mm]
     strength : (n,) mean shear yield stress of the weaker body under the hat, at the temperature of
         the state; inf between elastic bodies [MPa]
     edge : (n,) mean length of the edges at a vertex [mm]
     point_gap : (n_points,) gap of the deformed bodies at points of the slave, inf where no master
         faces it [mm]
-    point_length : (n_points,) length of the slave that each point stands for [mm]
+    point_length : (n_points,) length of the slave that belongs to each point [mm]
     on_slave, on_master : nodal forces (n_nodes, 2) equivalent to the contact forces [N]
     """
 
@@ -128,16 +129,16 @@ class Surfaces:
         return _on(self.slave, xs), _on(self.master, xm)
 
     def coarseness(self, state: State, normal: Array) -> float:
-        """Return the longest edge that contact forces (n,) act on / the width of their contact.
+        """Return the longest edge with contact forces (n,), over the width of its contact.
 
-        The worst of all patches of contact between surfaces that are curved there, and that bear
-        more than a share of the force; 0 where there are none. At the axis, or where a support
-        stands for a plane of symmetry, the other half of a patch counts.
+        It is the worst of all patches of contact that are curved and have more than `_SHARE` of the
+        force; 0 if there are none. At the axis, or at a support on a plane of symmetry, the width
+        includes the other half of a patch.
         """
         xs, xm = self._at(state)
         closed, halved = normal > 0, self._halved()
         closed[[0, -1]] |= closed[[1, -2]] & halved  # next to the axis hats are small
-        closed[1:-1] |= closed[:-2] & closed[2:]  # one open vertex parts no contact
+        closed[1:-1] |= closed[:-2] & closed[2:]  # one open vertex does not divide a contact
         bounds = np.flatnonzero(np.diff(np.pad(closed.astype(int), 1)))
         worst = 0.0
         for first, end in zip(bounds[::2], bounds[1::2], strict=True):
@@ -150,7 +151,7 @@ class Surfaces:
             sides = ((self.pair.slave, self.slave, patch), (self.pair.master, self.master, near))
             if not any(_bent(chain, vertices) for _, chain, vertices in sides):
                 continue
-            longest = max(  # rigid surfaces are what they are
+            longest = max(  # the edges of rigid surfaces do not count
                 float(chain.spacing[vertices].max())
                 for (name, _), chain, vertices in sides
                 if name in self._system.names
@@ -161,9 +162,9 @@ class Surfaces:
         return worst
 
     def _halved(self) -> NDArray[np.bool_]:
-        """Return whether the slave ends at the axis or a plane of symmetry, at either end (2,).
+        """Return whether the slave ends at the axis or a plane of symmetry, for both ends (2,).
 
-        There a support holds it along its surface, and not across.
+        At a plane of symmetry a support holds it along its surface, and not across.
         """
         name, _ = self.pair.slave
         if name not in self._system.names:
@@ -185,7 +186,8 @@ class Surfaces:
     ) -> Array:
         """Return the mean shear yield stress (n,) of the weaker body under the hats [MPa].
 
-        ``mean`` is that under the hats of values at points, ``on_slave`` gives these.
+        ``mean`` takes the mean under the hats of values at points, ``on_slave`` gives the values of
+        a field of the slave at points.
         """
         weaker = np.full(len(self.slave.edges) + 1, np.inf)
         for (name, _), chain, at_points in (
@@ -204,7 +206,7 @@ class Surfaces:
         return weaker
 
     def touching(self, state: State, start: State, normal: Array, tangential: Array) -> PairState:
-        """Return the pair at ``state``, reached from ``start``, under given contact forces (n,)."""
+        """Return the pair in ``state``, after ``start``, with the given contact forces (n,) [N]."""
         slave, master = self.slave, self.master
         (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
         small = not self.finite
@@ -266,10 +268,10 @@ class Surfaces:
 def _points(
     slave: Surface, xs: Array, master: Surface, xm: Array
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return edge, place on it and weight of points (n,) that integrate over the slave.
+    """Return edge, coordinate on it and weight of the integration points (n,) on the slave.
 
-    The edges are cut opposite the master's vertices, where the integrand has kinks. Where the
-    surfaces touch, the normals of the master, used here, are also those of the slave.
+    The edges are cut opposite the master's vertices, at the kinks of the integrand. The normals of
+    the master are used; at surfaces that touch they are also those of the slave.
     """
     last = len(master.edges) - 1
     corners = np.append(np.arange(len(master.edges)), last)
@@ -301,7 +303,7 @@ def _spread(force: Array, nodes: NDArray[np.int64], shape: Array, count: int) ->
 
 
 def _bent(surface: Surface, vertices: NDArray[np.int64]) -> bool:
-    """Whether a surface as it was made is curved next to vertices; a corner is no curve."""
+    """Whether the undeformed surface is curved next to vertices; a corner does not count."""
     first, last = _at_ends(surface.X, surface)
     within = np.pad(np.linalg.norm(last - first, axis=0), 1)
     turn = np.linalg.norm(first[:, 1:] - last[:, :-1], axis=0)
@@ -313,7 +315,7 @@ def _bent(surface: Surface, vertices: NDArray[np.int64]) -> bool:
 def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) -> Array:
     """Return unit normals (2, n), interpolated between the ends of the edges.
 
-    Edges that meet have their mean in common, but at corners of the surface as it was made.
+    Neighbouring edges share their mean normal, except at corners of the undeformed surface.
     """
     first, last = _at_ends(x, surface)
     into, out_of = _at_ends(surface.X, surface)
@@ -335,10 +337,10 @@ def _at_ends(x: Array, surface: Surface) -> tuple[Array, Array]:
 
 
 class _Partner:
-    """The places where lines through points (2, n) along ``way`` meet a surface from outside.
+    """Intersections of lines through points (2, n) along ``way`` with the outside of a surface.
 
-    Of several places on a line the nearest counts, if it is at most ``reach`` [mm] behind the
-    point. ``faces`` (n,) is 1 where there is such a place, else 0.
+    Of several intersections on a line the nearest counts, if it is at most ``reach`` [mm] behind
+    the point. ``faces`` (n,) is 1 if there is one, else 0.
     """
 
     def __init__(self, x: Array, surface: Surface, points: Array, way: Array, reach: float) -> None:
@@ -347,7 +349,7 @@ class _Partner:
         some = [slice(k, k + _BLOCK) for k in range(0, points.shape[1], _BLOCK)]
         met = [_met(corners, points[:, at], way[:, at], reach) for at in some]
         self.edge, start, self.faces = (np.concatenate(part) for part in zip(*met, strict=True))
-        # a line that meets the chord of one edge may meet the curve of the next
+        # a line that intersects the chord of one edge may intersect the curve of the next
         eta = _foot(x[:, surface.edges[self.edge]], points, way, start)
         onward = np.where(eta > 1.0, 1, np.where(eta < -1.0, -1, 0))
         own = np.clip(self.edge + onward, 0, len(surface.edges) - 1)
@@ -362,7 +364,7 @@ class _Partner:
         return np.asarray((field[:, self.nodes] * self.shape).sum(axis=-1))
 
     def distance(self, points: Array) -> Array:
-        """Return how far ahead of the points the places are (n,) [mm]."""
+        """Return the signed distance (n,) from the points to the intersections [mm]."""
         return np.asarray(((self.point - points) * self.way).sum(axis=0))
 
 
@@ -373,7 +375,7 @@ def _cross(a: Array, b: Array) -> Array:
 def _met(
     corners: Array, points: Array, way: Array, reach: float
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return which chord (n,) lines meet from outside, where on it, and 1 where there is one."""
+    """Return the chord (n,) that lines intersect from outside, the coordinate on it, and 1 or 0."""
     side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
     chord = np.diff(corners)
     beside = _BESIDE * np.linalg.norm(chord, axis=0)
@@ -391,7 +393,10 @@ def _met(
 
 
 def _foot(xe: Array, points: Array, way: Array, eta: Array) -> Array:
-    """Return where lines meet edges (2, n, k), continued, by Newton's method from ``eta`` (n,)."""
+    """Return the coordinates of intersections of lines with edges (2, n, k), by Newton's method.
+
+    ``eta`` (n,) are the starting values; edges are continued beyond their ends.
+    """
     count = xe.shape[-1]
     for _ in range(_NEWTON_STEPS):
         away = (xe * shape_functions(eta, count)).sum(axis=-1) - points

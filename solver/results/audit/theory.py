@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 LARGE_STRAIN = 0.10
-"""Equivalent plastic strain that small-strain theory bears. At it the strain measures that agree
-for small strain, the engineering and the logarithmic one, differ by 5 %."""
+"""Largest equivalent plastic strain for small-strain theory. At it engineering and logarithmic
+strain, which agree for small strain, differ by 5 %."""
 
 
 class Strained(NamedTuple):
@@ -32,7 +32,7 @@ class Strained(NamedTuple):
 
     @property
     def outside(self) -> tuple[str, ...]:
-        """What leaves small-strain theory."""
+        """A message if the strain is outside small-strain theory."""
         if self.value <= LARGE_STRAIN:
             return ()
         return (
@@ -45,7 +45,7 @@ class Strained(NamedTuple):
 def largest_strain(
     bodies: Iterable[tuple[str, Array, Array]], singular: Sequence[SingularPoint] = ()
 ) -> Strained:
-    """Return the largest strain that no singular point reaches.
+    """Return the largest strain outside the radii of singular points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What acts on the slave of a contact pair, from contact forces and the shapes of the surfaces."""
+"""Pressure, shear and gap of a contact pair, from contact forces and the surfaces' shapes."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ if TYPE_CHECKING:
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _LEVEL = 1e-6
-"""Ratio of the fall of the squared pressure over an edge to its largest, below which it does not
-fall."""
+"""Ratio of the decrease of squared pressure over an edge to its maximum; less counts as zero."""
 _WHOLE = 1e-6
-"""Share of the hat of a vertex that may not face the master, where the vertex faces it."""
+"""Share of a vertex's hat that may lie beyond the master although the vertex faces it."""
 
 
 class Tractions:
@@ -52,13 +51,13 @@ class Tractions:
 
     @property
     def way(self) -> float:
-        """How far the slave has moved at most, its gap included: the scale of gaps [mm]."""
+        """Largest motion or gap of the slave: the scale of gaps [mm]."""
         moved = float(np.abs(self._moved - self._chain.X).max())
         return max(moved, float(np.nanmax(np.abs(self.touching.gap), initial=0.0)))
 
     @property
     def X(self) -> Array:
-        """Places of the vertices (2, n) [mm]."""
+        """Positions of the vertices (2, n) [mm]."""
         return np.asarray(self._chain.X[:, self._chain.vertices])
 
     @property
@@ -68,40 +67,40 @@ class Tractions:
 
     @property
     def closed(self) -> NDArray[np.bool_]:
-        """Where the bodies press."""
+        """Whether vertices (n,) carry pressure."""
         return np.asarray(self._contact.normal > 0)
 
     @property
     def repeated(self) -> bool:
-        """Whether the surface is that of a periodic body, with copies at its ends."""
+        """Whether the body is periodic: the surface then has copies at its ends."""
         return len(np.unique(self._chain.nodes)) < len(self._chain.nodes)
 
     @property
     def measured(self) -> bool:
-        """Whether gaps and motions are means over other projections than those of the solver."""
+        """Whether gaps and motions are means with another projection than the solver's."""
         return self._surfaces.finite or self._surfaces.curved
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
-        """Where a vertex and its neighbours face the master with the whole of their hats, or not.
+        """Whether the hats of a vertex and its neighbours face the master completely or not at all.
 
-        The area of part of a hat depends on how surfaces are projected.
+        The area of a part of a hat depends on the projection.
         """
         share = self.touching.area / self._area
         whole = (share > 1 - _WHOLE) | (share < _WHOLE)
         return whole & np.append(whole[1:], True) & np.append(True, whole[:-1])
 
     def _depth(self, x: Array) -> Array:
-        """Return thickness, or the circumference [mm] at places x (2, ...)."""
+        """Return the depth at positions x (2, ...) [mm]: thickness, or 2 pi r."""
         if self._model.bodies[0].kinematics == "axisymmetric":
             return np.asarray(2 * np.pi * x[0])
         name = self._surfaces.pair.slave[0]
         return np.full(x.shape[1:], self._model.body(name).thickness)
 
     def _hats(self, x: Array, *, straight: bool = False) -> Array:
-        """Return the integrals (n, n) of products of two hats, the nodes at x (2, n_nodes).
+        """Return the integrals (n, n) of products of two hats, for nodes at x (2, n_nodes) [mm2].
 
-        Their sum over one index is the area of a hat [mm2]. ``straight`` takes the chords.
+        Their sum over one index is the area of a hat. ``straight`` uses the chords of the edges.
         """
         edges = self._chain.edges[:, :2] if straight else self._chain.edges
         k, at = edges.shape[1], x[:, edges]
@@ -124,7 +123,7 @@ class Tractions:
     def over_area(self, force: Array, *, moved: bool) -> Array:
         """Return means under the hats (n,) of a force per area [MPa] for forces (n,) [N].
 
-        ``moved`` takes the area where the bodies are, if they slide far.
+        ``moved`` uses the area in the deformed positions, if sliding is finite.
         """
         hats = self._hats(self._chain.X, straight=True)
         total = hats.sum(axis=1)
@@ -145,10 +144,10 @@ class Tractions:
         return self.over_area(self._contact.tangential, moved=moved)
 
     def patches(self, x: Array) -> list[tuple[float, float]]:
-        """Return from where to where the bodies touch along x (n,), growing or falling [mm].
+        """Return start and end of each contact along x (n,), which increases or decreases [mm].
 
-        The power 2/3 of the gap grows linearly from a smooth edge: its line through the second
-        and third open vertex is followed back, no farther than to the next vertex.
+        Near a smooth edge gap^(2/3) is linear in the distance. The line through the second and
+        third open vertex is extrapolated to zero, at most to the next vertex.
         """
         opened = np.cbrt(np.where(self.closed, np.nan, self.gap)) ** 2
         ends = []
@@ -170,5 +169,5 @@ class Tractions:
 
     @property
     def length(self) -> float:
-        """Length along which the bodies touch [mm]."""
+        """Length of the contact [mm]."""
         return sum(stop - start for start, stop in self.patches(self.s))

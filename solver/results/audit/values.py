@@ -1,7 +1,7 @@
-"""Fields of a body at its nodes and at places, without the operators that results are taken with.
+"""Fields of a body at its nodes and at places, independent of the operators of the results.
 
-`StateFields` makes them from displacements, internal variables and declared loads; `PassFields`
-from the layers that a steady pass meets and leaves. `Located` finds where in a body places lie.
+`StateFields` computes them from displacements, internal variables and declared loads, `PassFields`
+from the layers before and behind a steady pass. `Located` finds the elements that contain places.
 """
 
 from __future__ import annotations
@@ -25,14 +25,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _SLACK = 0.05
-"""Side of a box around an element, by which a curved edge may leave the box of its nodes."""
+"""Ratio to the side of an element's bounding box by which curved edges may extend beyond it."""
 _STEPS, _EXACT = 8, 1e-12
 _INSIDE, _OUTSIDE = 1e-8, 1e-6
-"""Reference coordinate beyond an element, up to which a place is in it, and above which it is not.
-Between them either is right."""
+"""Distances in reference coordinates beyond an element: up to the first a place is inside, above
+the second it is outside. Between them both answers are accepted."""
 _SAME_DEPTH = 1e-6
-"""Ratio of the difference of depth to the depth of the first row, up to which points are in one
-row."""
+"""Ratio of a difference of depth to the depth of the first row; up to it points are in one row."""
 
 
 def equivalent(stress: Array) -> Array:
@@ -43,7 +42,7 @@ def equivalent(stress: Array) -> Array:
 
 
 def flowed(fields: BodyFields) -> Array:
-    """Return the plastic strain at nodes (n_nodes,), not below zero."""
+    """Return the accumulated plastic strain at nodes (n_nodes,), at least zero."""
     return np.maximum(fields.accumulated, 0.0)
 
 
@@ -92,10 +91,10 @@ class StateFields:
 
 
 class PassFields:
-    """`BodyFields` of a half-plane that a steady pass leaves, or of its window under the load.
+    """`BodyFields` of the half-plane behind a steady pass, or of its window under the load.
 
-    The state that a pass leaves is a function of depth alone: Hooke's law for strains along x and
-    z that are zero. Nodes of the surface have values of their own.
+    The state behind a pass is a function of depth alone: Hooke's law with zero strains along x and
+    z. Nodes of the surface have separate values.
     """
 
     def __init__(self, half_plane: TrackBody, found: Pass, *, loaded: bool) -> None:
@@ -106,7 +105,7 @@ class PassFields:
         self._nu, self._double_shear = elasticity.poisson_ratio, 2 * elasticity.shear_modulus
 
     def _stress(self, strain: Array, flow: Array) -> Array:
-        """Return components (..., 4) of stress for Mandel strains (..., 4), as the load sees it."""
+        """Return stress components (..., 4) for Mandel strains (..., 4), in the load's frame."""
         elastic = strain - flow
         trace = self._double_shear * self._nu / (1 - 2 * self._nu) * elastic[..., :3].sum(axis=-1)
         out = self._double_shear * elastic
@@ -115,7 +114,7 @@ class PassFields:
         return np.asarray(out)
 
     def _layered(self, flow: Array) -> Array:
-        """Return the strain (n, 4) of layers with this plastic strain (n, 4) that nothing loads."""
+        """Return the strain (n, 4) of unloaded layers with this plastic strain (n, 4)."""
         strain = np.zeros_like(flow)
         strain[:, 1] = flow[:, 1] + self._nu / (1 - self._nu) * (flow[:, 0] + flow[:, 2])
         strain[:, 3] = flow[:, 3]
@@ -123,9 +122,9 @@ class PassFields:
 
     @cached_property
     def _columns(self) -> tuple[Array, Array, Array]:
-        """Stress (n_rows + 1, n_columns, 4) and plastic strain of the surface and of each row.
+        """Positions x (n_columns,), stress (n_rows + 1, n_columns, 4) and plastic strain of rows.
 
-        Before them the places along x (n_columns,). What is left has one column.
+        The first row is the surface. The state behind the pass has one column.
         """
         found = self._found
         if not self._loaded:
@@ -196,12 +195,12 @@ class PassFields:
 
     @property
     def displacement(self) -> Array:
-        """Not known here."""
+        """Not available: NaN."""
         return np.full((2, self.plain.part.X.shape[1]), np.nan)
 
     @property
     def at_points(self) -> tuple[Array, Array, Array]:
-        """Places, von Mises stress and plastic strain of points, those of the surface after."""
+        """Positions, von Mises stress and plastic strain of points, then of the surface."""
         stress, total = self._points
         X = np.concatenate([self.plain.points, self.plain.part.X[:, self._top]], axis=1)
         count = len(self._top)
@@ -210,11 +209,11 @@ class PassFields:
 
 
 class Located:
-    """Where places (2, n) lie in a body, before it deforms.
+    """The elements of an undeformed body that contain places (2, n).
 
     Attributes
     ----------
-    inside, outside : (n,) which are in the body, and which are not; neither on its boundary
+    inside, outside : (n,) whether places are in or outside the body; both False at its boundary
     """
 
     def __init__(self, plain: PlainBody, X: Array) -> None:
@@ -250,7 +249,7 @@ class Located:
         self._shape = np.array(each).reshape(len(dofs), -1)
 
     def of(self, nodal: Array) -> Array:
-        """Return the values (..., n) of nodal fields (..., n_nodes) there, NaN elsewhere."""
+        """Return nodal fields (..., n_nodes) at the places (..., n); NaN outside the body."""
         out = np.full((*nodal.shape[:-1], self._count), np.nan)
         out[..., self._at] = (nodal[..., self._nodes] * self._shape).sum(axis=-2)
         return out

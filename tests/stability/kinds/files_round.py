@@ -208,7 +208,7 @@ def refined(number: int, rng: Rng) -> Draw:
 
 
 def fretting(number: int, rng: Rng) -> Draw:
-    """A cylinder pressed, pushed to and fro by less than friction bears, in more increments."""
+    """A cylinder pressed, pushed to and fro by less than friction carries, in more increments."""
     p = _pressed(number, rng, fine=(0.2, 0.35), friction=(0.2, 0.5), rigid=True, round_axis=False)
     share = float(pick(rng, 0.3, 0.7, 0.9))
     Q = share * p.friction * p.force

@@ -427,7 +427,7 @@ def test_a_pair_that_never_touches_is_told(scene: FileScene) -> None:
     ]
     record = run(built(tables))
     assert record.status is Status.OK, record.message
-    assert record.message.startswith("upper.bottom and lower.top touch at the end of no stage")
+    assert record.message.startswith("upper.bottom and lower.top do not touch at the end of any")
     assert "touch" not in run(scene).message
 
 
@@ -505,7 +505,7 @@ def test_a_block_pushed_along_by_more_than_friction_bears_is_told_so(share: floa
         assert record.status is Status.OK, record.message
     else:
         assert record.status is Status.NOT_CONVERGED
-        assert record.message.endswith("push it along by less than friction bears")
+        assert record.message.endswith("push it along by less than friction carries")
 
 
 @pytest.mark.solves
