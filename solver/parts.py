@@ -1,4 +1,4 @@
-"""Parts that studies and scene files name by a word: hardening rules, friction laws, loads.
+"""Parts that studies and scene files name by a word, such as hardening rules and loads.
 
 A part is a frozen dataclass whose fields are its parameters; it says its word where it is defined.
 What studies and scene files accept, and what the documentation lists, is made of these
@@ -102,7 +102,8 @@ class Parts(Generic[T]):
     def fields(self, cls: C) -> C:
         """Add the word, which the class declares as text, and all parameters to a class's fields.
 
-        It stands below ``dataclass``, which makes fields of them.
+        It stands below ``dataclass``, which makes fields of them. ``PARTS`` of the class tells all
+        kinds of parts that it has fields of.
 
         Raises
         ------
@@ -114,6 +115,7 @@ class Parts(Generic[T]):
         if _RUNNING:
             raise ImportError("it imports scenes, which are made of its parts")
         cls.__annotations__[self.kind] = Literal[tuple(self)]
+        cast("Any", cls).PARTS = (*getattr(cls, "PARTS", ()), self)
         for name, (hint, field) in self.parameters().items():
             if name in getattr(cls, "__dataclass_fields__", {}):
                 raise ModelError(self.kind, name, "is another parameter already: name it otherwise")

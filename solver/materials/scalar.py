@@ -27,15 +27,15 @@ def falling_root(
     """Return where functions fall through zero (n,).
 
     Newton's method. Where a step leaves the bracket of values known to be too small and too large,
-    or swings from one side of the zero to the other and hardly nearer, the bracket is halved
-    instead. What is not found is NaN.
+    the bracket is halved instead. What is not found is NaN.
 
     Parameters
     ----------
     excess : values (n,) -> (functions (n,), their derivatives), not negative at ``low``, falling
     low, high : (n,) values that are not too large, and values that are too large
     scale : (n,) size of the terms of the functions, which are solved to the rounding of these
-    start : (n,) first values, ``low`` if not given
+    start : (n,) first values, ``low`` if not given; from values inside the bracket steps may swing
+        about the zero and come hardly nearer: there it is halved too
     """
     x = low if start is None else start
     found, least, last = x, np.full_like(high, np.inf), np.zeros_like(high)
@@ -48,8 +48,10 @@ def falling_root(
             return found
         low, high = np.where(off > 0, x, low), np.where(off > 0, high, x)
         step = x - off / slope
-        swings = (off * last < 0) & (np.abs(off) > 0.5 * np.abs(last))
-        x = np.where((step > low) & (step < high) & ~swings, step, 0.5 * (low + high))
+        inside = (step > low) & (step < high)
+        if start is not None:
+            inside &= ~((off * last < 0) & (np.abs(off) > 0.5 * np.abs(last)))
+        x = np.where(inside, step, 0.5 * (low + high))
         x, last = np.where(small, found, x), off
     closed = high - low <= _ROUNDING * high
     return np.where(small | closed, found, np.nan)
