@@ -1,4 +1,4 @@
-"""Parts that studies and scene files name by a word: hardening rules, friction laws, loads.
+"""Parts that studies and scene files name by a word, such as hardening rules and loads.
 
 A part is a frozen dataclass whose fields are its parameters; a decorator on the class gives its
 word. Studies, scene files and the documentation take their lists of words and parameters from
@@ -102,7 +102,8 @@ class Parts(Generic[T]):
     def fields(self, cls: C) -> C:
         """Decorate a class: annotate its word with all words, and add all parameters as fields.
 
-        Write it below ``@dataclass``, which turns the annotations into fields.
+        Write it below ``@dataclass``, which turns the annotations into fields. The attribute
+        ``PARTS`` of the class lists all kinds of parts whose parameters it has.
 
         Raises
         ------
@@ -114,6 +115,7 @@ class Parts(Generic[T]):
         if _RUNNING:
             raise ImportError("it imports scenes, whose parameters include those of its parts")
         cls.__annotations__[self.kind] = Literal[tuple(self)]
+        cast("Any", cls).PARTS = (*getattr(cls, "PARTS", ()), self)
         for name, (hint, field) in self.parameters().items():
             if name in getattr(cls, "__dataclass_fields__", {}):
                 raise ModelError(self.kind, name, "is another parameter already: name it otherwise")

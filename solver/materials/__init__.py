@@ -3,9 +3,9 @@
 `Law` is the contract. `Material` is the law of the scenes: von Mises, linear hardening. `Chaboche`
 hardens along a `Curve`, such as `Voce` or `Table`, and by `BackStress`es that fade, such as
 `ArmstrongFrederick`; `Layered` by layers that yield one after the other; `TrescaMaterial` yields by
-the largest shear stress. `PlaneStress` makes
-any law one for plane stress, `Heated` lowers the stiffness and strength of any law; both are
-`wrapped.Wrapped`, which passes on what a wrapper does not change.
+the largest shear stress, `SmoothMaterial` on any `SmoothSurface`. `PlaneStress` makes any law one
+for plane stress, `Heated` lowers the stiffness and strength of any law; both are `wrapped.Wrapped`,
+which passes on what a wrapper does not change.
 """
 
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
@@ -18,6 +18,8 @@ from solver.materials.law import Law
 from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
 from solver.materials.plane_stress import PlaneStress
+from solver.materials.smooth import SmoothMaterial
+from solver.materials.smooth_surface import Profile, SmoothSurface
 from solver.materials.state import PlasticState, Response
 from solver.materials.tresca import TrescaMaterial
 from solver.materials.yield_surface import Tresca, VonMises, YieldSurface
@@ -36,7 +38,10 @@ __all__ = [
     "Material",
     "PlaneStress",
     "PlasticState",
+    "Profile",
     "Response",
+    "SmoothMaterial",
+    "SmoothSurface",
     "Table",
     "Tresca",
     "TrescaMaterial",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from solver.materials.radial_return import SQRT23
-from solver.materials.scalar import multiplier
+from solver.materials.scalar import falling_root
 from solver.tensors import identity, von_mises
 
 if TYPE_CHECKING:
@@ -73,12 +73,13 @@ def fading_return(
         slope -= 1.5 * (xi * turn).sum(axis=0) / q
         return q - curve.flow_stress(p) - stiff * growth, -slope
 
-    first, _ = excess(np.zeros(s.shape[1]))
+    nothing = np.zeros(s.shape[1])
+    first, _ = excess(nothing)
     # what heat has left of a back stress beyond C / gamma fades in favour of the excess
     for X, (modulus, recall) in zip(back, constants, strict=True):
         if recall:
             first = first + np.maximum(von_mises(X) - modulus / recall, 0.0)
-    growth = multiplier(excess, first / (3 * G) * (1 + 1e-9), von_mises(s))
+    growth = falling_root(excess, nothing, first / (3 * G) * (1 + 1e-9), von_mises(s))
     _, xi, turn = relative(growth)
     size = np.sqrt((xi**2).sum(axis=0))
     u, slope = xi / size, -excess(growth)[1]

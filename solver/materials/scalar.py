@@ -1,4 +1,4 @@
-"""One equation at each point, solved for the plastic multiplier."""
+"""One equation at each point, solved for one unknown."""
 
 from __future__ import annotations
 
@@ -17,22 +17,28 @@ _ROUNDING = 4 * float(np.finfo(float).eps)
 _MAX_ITERATIONS = 60
 
 
-def multiplier(excess: Callable[[Array], tuple[Array, Array]], most: Array, scale: Array) -> Array:
-    """Return the multipliers (n,) for which no stress is beyond the yield surface.
+def falling_root(
+    excess: Callable[[Array], tuple[Array, Array]],
+    low: Array,
+    high: Array,
+    scale: Array,
+    start: Array | None = None,
+) -> Array:
+    """Return where functions fall through zero (n,).
 
-    Newton's method from zero. Where a step leaves the bracket of multipliers known to be too small
-    and too large, the bracket is halved instead. What is not found is NaN.
+    Newton's method. Where a step leaves the bracket of values known to be too small and too large,
+    the bracket is halved instead. What is not found is NaN.
 
     Parameters
     ----------
-    excess : multipliers (n,) -> (stress (n,) beyond the yield surface [MPa], its derivative): it is
-        not negative at zero, and falls
-    most : (n,) multipliers that are too large
-    scale : (n,) size of the terms of the excess [MPa]; it is solved to their rounding
+    excess : values (n,) -> (functions (n,), their derivatives), not negative at ``low``, falling
+    low, high : (n,) values that are not too large, and values that are too large
+    scale : (n,) size of the terms of the functions, which are solved to the rounding of these
+    start : (n,) first values, ``low`` if not given; from values inside the bracket steps may swing
+        about the zero and come hardly nearer: there it is halved too
     """
-    low, high = np.zeros_like(most), most
-    found, least = np.zeros_like(most), np.full_like(most, np.inf)
-    x = low
+    x = low if start is None else start
+    found, least, last = x, np.full_like(high, np.inf), np.zeros_like(high)
     for _ in range(_MAX_ITERATIONS):
         off, slope = excess(x)
         better = np.abs(off) < least
@@ -42,7 +48,10 @@ def multiplier(excess: Callable[[Array], tuple[Array, Array]], most: Array, scal
             return found
         low, high = np.where(off > 0, x, low), np.where(off > 0, high, x)
         step = x - off / slope
-        x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-        x = np.where(small, found, x)
+        inside = (step > low) & (step < high)
+        if start is not None:
+            inside &= ~((off * last < 0) & (np.abs(off) > 0.5 * np.abs(last)))
+        x = np.where(inside, step, 0.5 * (low + high))
+        x, last = np.where(small, found, x), off
     closed = high - low <= _ROUNDING * high
     return np.where(small | closed, found, np.nan)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -68,14 +68,19 @@ class Tresca:
     the same, any flow between the normals of the two faces is associated.
     """
 
+    over_mises: ClassVar[float] = 2 / math.sqrt(3)
+
     def shear(self, tension: Tension) -> Tension:
         """Return k = tension / 2 [MPa]."""
         return tension / 2
 
+    def of_principal(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return s1 - s3 (n,) of principal stresses (3, n), the largest first [MPa]."""
+        return np.asarray(values[0] - values[2])
+
     def equivalent(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return s1 - s3 (n_points,) of Mandel stress (n_components, n_points) [MPa]."""
-        values, _ = principal(stress)
-        return np.asarray(values[0] - values[2])
+        return self.of_principal(principal(stress)[0])
 
     def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return e1 e1 - e3 e3 (n_components, n_points), on an edge that of one of its faces."""

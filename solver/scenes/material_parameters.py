@@ -5,26 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
-from solver.materials.hardening_rules import HARDENING, GrowingRule, LinearRule, NoHardening
+from solver.materials.hardening_rules import HARDENING, LinearRule, NoHardening
 from solver.materials.law import Law
 from solver.materials.material import Material
-from solver.materials.tresca import TrescaMaterial
+from solver.materials.yield_conditions import YIELD_CONDITIONS
 from solver.model.friction import FRICTION, FrictionLaw
 from solver.model.model import ContactPair
 from solver.parameters import Accuracy, Poisson, Stress, check, described
-
-YieldCondition = Literal["mises", "tresca"]
-_GROWING = tuple(word for word, rule in HARDENING.all().items() if issubclass(rule, GrowingRule))
-"""Rules that go with Tresca's condition."""
+from solver.parts import Parts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElasticParameters:
     """The elastic material every scene asks for, and how accurate the answer is to be."""
+
+    PARTS: ClassVar[tuple[Parts[Any], ...]] = ()
 
     accuracy: Accuracy = described(
         "standard", "sets mesh and increments together, where they are not given"
@@ -38,6 +37,12 @@ class ElasticParameters:
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
 
+    @property
+    def idle(self) -> Mapping[str, str]:
+        """Parameters that no number depends on, each with the one whose word decides that."""
+        each = ((parts, getattr(self, parts.kind)) for parts in self.PARTS)
+        return {name: parts.kind for parts, word in each for name in parts.unused(word)}
+
     def usual(self) -> Mapping[str, float]:
         """Return the values of the parameters that ``accuracy`` sets."""
         return {}
@@ -48,11 +53,18 @@ class ElasticParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@YIELD_CONDITIONS.fields
+class YieldParameters(ElasticParameters):
+    """At which stress a material yields, with the parameters of all conditions."""
+
+    yield_condition: str = described("mises", "condition of first yield, and of flow")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 @HARDENING.fields
-class HardeningParameters(ElasticParameters):
+class HardeningParameters(YieldParameters):
     """How a material yields and hardens, with the parameters of all hardening rules."""
 
-    yield_condition: YieldCondition = described("mises", "condition of first yield, and of flow")
     hardening: str = described("none", "hardening rule of the yielding bodies")
 
 
@@ -66,11 +78,6 @@ class MaterialParameters(HardeningParameters):
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ElasticParameters.__post_init__(self)
         self.material()  # refuses what does not go together
-
-    @property
-    def idle(self) -> frozenset[str]:
-        """Parameters that no number depends on with this hardening rule."""
-        return HARDENING.unused(self.hardening)
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:
         """Return the law of the material, with ``stiffness`` times Young's modulus.
@@ -88,14 +95,13 @@ class MaterialParameters(HardeningParameters):
         if elastic:
             linear = rule if isinstance(rule, LinearRule) else NoHardening()
             return linear.law(elasticity, math.inf)
-        if self.yield_condition == "mises":
-            return rule.law(elasticity, self.yield_stress)
-        if not isinstance(rule, GrowingRule):
-            allowed = f"must be one of {', '.join(_GROWING)} where yield_condition is tresca"
-            raise ModelError("hardening", self.hardening, allowed)
-        return TrescaMaterial(
-            elasticity=elasticity, curve=rule.flow_curve(elasticity, self.yield_stress)
-        )
+        condition = YIELD_CONDITIONS.made(self.yield_condition, self)
+        if not isinstance(rule, condition.rules):
+            words = [word for word, kind in HARDENING.all().items()
+                     if issubclass(kind, condition.rules)]  # fmt: skip
+            known = f"one of {', '.join(words)} where yield_condition is {self.yield_condition}"
+            raise ModelError("hardening", self.hardening, f"must be {known}")
+        return condition.law(elasticity, self.yield_stress, rule)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,11 +110,6 @@ class ContactParameters(MaterialParameters):
     """Elastic-plastic material, and a law of friction with the parameters of all laws."""
 
     friction_law: str = described("coulomb", "law of friction")
-
-    @property
-    def idle(self) -> frozenset[str]:
-        """Parameters that no number depends on with these rules."""
-        return FRICTION.unused(self.friction_law) | HARDENING.unused(self.hardening)
 
     @property
     def friction_part(self) -> FrictionLaw:

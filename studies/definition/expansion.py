@@ -89,11 +89,12 @@ class Expansion:
         idle = {name for name in idle if len(self._axes[name]) > 1}
         for index in self._indices():
             try:
-                idle &= getattr(self._parameters(index), "idle", frozenset())
+                found = getattr(self._parameters(index), "idle", {})
             except ModelError as error:
                 raise self._located(error, index) from error
+            idle &= found.keys()
         for name in idle:
-            allowed = "changes nothing in any run of this study: choose another hardening"
+            allowed = f"changes nothing in any run of this study: choose another {found[name]}"
             raise StudyError(f"sweep.{name}", self._axes[name], allowed)
 
     def run_ids(self) -> Iterator[str]:

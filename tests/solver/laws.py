@@ -18,11 +18,14 @@ from solver.materials import (
     PlaneStress,
     PlasticState,
     Response,
+    SmoothMaterial,
+    SmoothSurface,
     Table,
     TrescaMaterial,
     Voce,
 )
 from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
+from tests.solver.yield_surfaces import Hosford, Odd, Quick
 
 HARDENING = ["none", "isotropic", "kinematic", "mixed"]
 
@@ -48,6 +51,13 @@ BACK_STRESSES = {
     ),
     "ohno wang": (OhnoWang(60_000.0, 100.0), OhnoWang(4000.0, 200.0)),
 }
+SURFACES = {
+    "hosford 2": Hosford(2.0),
+    "hosford 8": Hosford(8.0),
+    "hosford 20": Hosford(20.0),
+    "hosford 8, quick": Quick(8.0),
+    "odd": Odd(),
+}
 LAYERED = Layered.of_curve(
     STEEL, strain=(350.0 / 2e5, 0.003, 0.01), stress=(350.0, 430.0, 500.0), slope=2000.0
 )
@@ -64,6 +74,11 @@ def chaboche(back_stresses: str, curve: str = "voce") -> Chaboche:
     return Chaboche(
         elasticity=STEEL, curve=CURVES[curve], back_stresses=BACK_STRESSES[back_stresses]
     )
+
+
+def smooth(surface: SmoothSurface, curve: str = "voce") -> SmoothMaterial:
+    """Return a law with this surface and this curve."""
+    return SmoothMaterial(elasticity=STEEL, curve=CURVES[curve], surface=surface)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +151,9 @@ LAWS: dict[str, tuple[Law, int]] = {
         for n in (4, 6)
     },
     "tresca, wrapped": (PlaneStress(TrescaMaterial(elasticity=STEEL, curve=SOFT)), 4),
+    **{f"{s} {n}": (smooth(SURFACES[s]), n) for s in SURFACES for n in (4, 6)},
+    **{f"hosford 8, {c}": (smooth(Hosford(8.0), c), 6) for c in CURVES if c != "voce"},
+    **{f"{s}, wrapped": (PlaneStress(smooth(SURFACES[s], "none")), 4) for s in SURFACES},
     **{f"curve {c}": (Chaboche(elasticity=STEEL, curve=CURVES[c]), 6) for c in CURVES},
     **{f"back stresses {b} {n}": (chaboche(b), n) for b in BACK_STRESSES for n in (4, 6)},
     **{f"{b}, wrapped": (PlaneStress(chaboche(b)), 4) for b in BACK_STRESSES if b != "prager"},

@@ -17,11 +17,13 @@ from solver.materials import (
     Law,
     Layered,
     PlaneStress,
+    SmoothMaterial,
     TrescaMaterial,
     Voce,
 )
 from solver.mesh import grid
 from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
+from tests.solver.yield_surfaces import Hosford
 
 E, RE, ALPHA = 2e5, 400.0, 1.2e-5
 PAIRS = ((1.0, 1.0), (0.7, 0.7), (0.8, 0.5), (0.6, 0.9))
@@ -56,6 +58,9 @@ LAWS: dict[str, Any] = {
     "plane stress": lambda e, r: PlaneStress(linear(e, r, "mixed")),
     "projected": lambda e, r: linear(e, r, "mixed").in_plane_stress(),
     "tresca": lambda e, r: TrescaMaterial(elasticity=elastic(e), curve=curve(e, r)),
+    "hosford": lambda e, r: SmoothMaterial(
+        elasticity=elastic(e), curve=curve(e, r), surface=Hosford(8.0)
+    ),
     "fading": fading,
     "rules of one's own": own,
     "layers": lambda e, r: Layered(

@@ -31,7 +31,8 @@ from solver.materials.tresca import TrescaMaterial
 from solver.materials.yield_surface import Tresca, VonMises
 from solver.mesh import grid
 from solver.tensors import identity
-from tests.solver.laws import CURVES, LAYERED, SOFT, STEEL, chaboche, steel
+from tests.solver.laws import CURVES, LAYERED, SOFT, STEEL, SURFACES, chaboche, steel
+from tests.solver.yield_surfaces import Hosford
 
 RE, E, G = 350.0, 2e5, STEEL.shear_modulus
 
@@ -467,7 +468,7 @@ def test_an_increment_given_up_below_the_limit_proves_none():
         assert type(caught.value) is NotConverged
 
 
-@pytest.mark.parametrize("surface", [VonMises(), Tresca()])
+@pytest.mark.parametrize("surface", [VonMises(), Tresca(), *SURFACES.values(), Hosford(100.0)])
 def test_no_stress_inside_does_more_work_than_the_power_of_its_surface(surface):
     """And the stress of flow along the strain does as much."""
     rng = np.random.default_rng(1864)

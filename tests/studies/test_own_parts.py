@@ -52,6 +52,18 @@ scene = "bar.toml"
 [sweep]
 rule = ["swift", "threshold"]
 """
+HELD = (
+    BAR.replace("plane_stress", "plane_strain")
+    .replace('default = "none", choices = ["none", "swift", "threshold"]', "default = 8.0")
+    .replace('hardening = "$rule"', 'yield_condition = "hosford"')
+    .replace("swift_exponent = 0.3", 'hosford_exponent = "$rule"')
+    .replace('kind = "pressure"', 'kind = "displacement"')
+    .replace("value = -420.0", "x = 0.08")
+    .replace("step = 0.01", "step = 0.1")
+    .replace('of = "plastic_strain"', 'of = "stress.xx"')
+)
+"""The bar held across its plane and stretched by 2 %: it flows in pure shear at last."""
+EXPONENTS = (2.0, 8.0, 20.0)
 SWIFT = 0.002 * ((420.0 / 350.0) ** (1 / 0.3) - 1)
 """Plastic strain at which 350 MPa (1 + p / 0.002)^0.3 is 420 MPa."""
 WORDS = "none, isotropic, kinematic, mixed, voce, table, chaboche, layered"
@@ -64,7 +76,7 @@ print(next(iter(study.cases())).id)
 
 def called(folder: Path, parts: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run Python with these files of parts, in a folder with the examples."""
-    for name in ("own_curve.py", "own_back_stress.py"):
+    for name in ("own_curve.py", "own_back_stress.py", "own_yield_surface.py"):
         (folder / name).write_text((ROOT / "examples" / name).read_text())
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     return subprocess.run(
@@ -94,6 +106,66 @@ def test_a_study_of_a_scene_file_is_computed_with_words_of_ones_own(tmp_path: Pa
     assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
     known = " or ".join([", ".join(f"'{word}'" for word in WORDS.split(", ")), "'swift'"])
     assert f"hardening = 'threshold': must be {known} (at rule = threshold)" in refused.stderr
+
+
+@pytest.mark.processes
+def test_a_yield_surface_of_ones_own_is_swept_in_a_scene_file(tmp_path: Path) -> None:
+    (tmp_path / "bar.toml").write_text(HELD)
+    study = STUDY.replace('["swift", "threshold"]', str([*EXPONENTS]))
+    (tmp_path / "study.toml").write_text(study)
+    command = ["-m", "residua", "run", "study.toml", "--out", "out", "--workers", "1"]
+    done = called(tmp_path, "own_yield_surface.py", *command)
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in done.stdout.splitlines()]
+    stress = [float(row[2]) for row in rows if row[:1] in [[f"{a:g}"] for a in EXPONENTS]]
+    # no strain across: the third stress tends to the mean, and the bar bears twice the shear stress
+    assert stress == pytest.approx(
+        [2 * 350.0 * (2 / (2 + 2**a)) ** (1 / a) for a in EXPONENTS], abs=0.06
+    )  # four digits are printed
+
+
+SURFACE = """
+from solver import SCENES, ModelError
+from solver.scenes.punch import PunchParameters
+from solver.scenes.rolling_parameters import RollingParameters
+from studies import Study
+
+print(type(PunchParameters(yield_condition="hosford").material()).__name__)
+print(PunchParameters().idle["hosford_exponent"])
+print("hosford_exponent" in PunchParameters(yield_condition="hosford").idle)
+p = RollingParameters(
+    element_size=3.0, growth=1.5, load="hertz", passes=2, yield_condition="hosford",
+    direction="back_and_forth",
+)
+(record,) = SCENES["rolling"].path(p, [2], lambda share: None)
+print(record.status.solved, record.scalars["max_plastic_strain"] > 1e-3)
+print(max(record.scalars[f"audit_{each}"] for each in ("law", "history", "yield")) < 1e-9)
+content = {"name": "a", "scene": "punch", "parameters": {"yield_condition": "hosford"}}
+print(len(list(Study.from_dict(content | {"sweep": {"hosford_exponent": [2.0, 8.0]}}).cases())))
+for refused in (
+    lambda: PunchParameters(yield_condition="round"),
+    lambda: PunchParameters(yield_condition="hosford", hosford_exponent=1.0),
+    lambda: PunchParameters(yield_condition="hosford", hardening="kinematic"),
+    lambda: Study.from_dict({"name": "a", "scene": "punch", "sweep": {"hosford_exponent": [2, 8]}}),
+):
+    try:
+        print(refused())
+    except ValueError as error:
+        print(error)
+"""
+
+
+@pytest.mark.processes
+def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(tmp_path: Path) -> None:
+    done = called(tmp_path, "own_yield_surface.py", "-c", SURFACE)
+    assert done.returncode == 0, done.stderr
+    *found, word, exponent, rule, idle = done.stdout.splitlines()
+    assert found == ["SmoothMaterial", "yield_condition", "False", "True True", "True", "2"]
+    assert word == "yield_condition = 'round': must be one of mises, tresca, hosford"
+    assert exponent == "hosford_exponent = 1.0: must be at least 2 and at most 100"
+    rules = "none, isotropic, voce, table where yield_condition is hosford"
+    assert rule == f"hardening = 'kinematic': must be one of {rules}"
+    assert idle.endswith("changes nothing in any run of this study: choose another yield_condition")
 
 
 @pytest.mark.processes

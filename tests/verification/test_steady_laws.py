@@ -23,6 +23,7 @@ from solver.materials import (
     Chaboche,
     Elasticity,
     Layered,
+    SmoothMaterial,
     TrescaMaterial,
     Voce,
 )
@@ -35,6 +36,7 @@ from solver.steady.fields import under_load
 from solver.steady.flow import RowFlow
 from solver.steady.stepped import SteppedFlow
 from solver.steady.sweep import CompiledFlow
+from tests.solver.yield_surfaces import Hosford
 from tests.verification.steady_increment import SteadyIncrement
 
 YIELD, RATIO = 502.0, 0.024
@@ -69,6 +71,9 @@ LAWS = {
     "fading": chaboche(*FADING, saturation=80.0),
     "layered": Layered.of_curve(ELASTIC, (YIELD / 2e5, 0.005, 0.02), (YIELD, 560.0, 650.0)),
     "tresca": TrescaMaterial(elasticity=ELASTIC, curve=Voce(yield_stress=YIELD, modulus=MODULUS)),
+    "hosford": SmoothMaterial(
+        elasticity=ELASTIC, curve=Voce(yield_stress=YIELD, modulus=MODULUS), surface=Hosford(8.0)
+    ),
 }
 
 

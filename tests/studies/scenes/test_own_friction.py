@@ -29,8 +29,8 @@ _, shear = record.fields["contact_shear"]
 _, pressure = record.fields["contact_pressure"]
 print(record.status.name, float(np.abs(shear).max()) <= 8.0 < 0.2 * float(pressure.max()))
 p = PunchParameters(friction_law="saturating", friction=0.4)
-print(p.tau_max, sorted(p.idle & {"friction", "cohesion", "shear_limit"}))
-print(PunchParameters().idle & {"tau_max"})
+print(p.tau_max, sorted(p.idle.keys() & {"friction", "cohesion", "shear_limit"}))
+print(PunchParameters().idle["tau_max"])
 for refused in (
     lambda: PunchParameters(friction_law="none"),
     lambda: PunchParameters(tau_max=0.0),
@@ -70,7 +70,7 @@ def test_a_law_of_ones_own_is_known_by_its_word() -> None:
     assert law == "Saturating(friction=0.2, tau_max=8.0)"
     assert record == "OK True"
     assert scene == "50.0 ['cohesion', 'shear_limit']"
-    assert idle == "frozenset({'tau_max'})"
+    assert idle == "friction_law"
     assert [text.split(":")[0] for text in refused] == [
         "friction_law = 'none'",
         "tau_max = 0.0",

@@ -1,0 +1,45 @@
+"""Laws whose yield surface grows along a curve, stays where it is, and is isotropic."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.materials.curves import Curve
+    from solver.materials.state import PlasticState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GrowingLaw(Law):
+    """An isotropic elastic material with isotropic hardening.
+
+    Attributes
+    ----------
+    elasticity : Hooke's law
+    curve : how its yield surface grows; `Voce` without saturation and modulus does not harden
+    """
+
+    elasticity: Elasticity
+    curve: Curve
+
+    @property
+    def hardens(self) -> bool:
+        """Whether stress grows with plastic strain without bound."""
+        return math.isinf(self.curve.limit)
+
+    @property
+    def ultimate_shear_stress(self) -> float:
+        """The shear stress of the stress that the curve tends to [MPa]."""
+        return self.surface.shear(self.curve.limit)
+
+    def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
+        """Return the stress of the curve (n_points,) [MPa]."""
+        return self.curve.flow_stress(state.accumulated)

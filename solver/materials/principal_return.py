@@ -1,0 +1,127 @@
+"""The return of an isotropic material in principal stresses, whatever its yield surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from solver.materials.principal import PAIRS, dyad, principal
+from solver.materials.scalar import falling_root
+from solver.materials.state import PlasticState, Response
+from solver.tensors import von_mises
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from solver.materials.curves import Curve
+    from solver.materials.elasticity import Elasticity
+
+    Array = NDArray[np.float64]
+
+_ALIKE = 1e-10
+
+
+class IsotropicSurface(Protocol):
+    """A yield surface that depends on principal stresses alone."""
+
+    @property
+    def over_mises(self) -> float:
+        """Its equivalent stress is at most so many times that of von Mises."""
+
+    def of_principal(self, values: Array) -> Array:
+        """Return the equivalent stress (n,) of principal stresses (3, n), the largest first."""
+
+
+class Returned(NamedTuple):
+    """Principal plastic strains (3, n), multiplier (n,), d stress / d trial stress (3, 3, n)."""
+
+    flow: Array
+    growth: Array
+    derivative: Array
+
+
+def principal_return(
+    strain: Array,
+    state: PlasticState,
+    elasticity: Elasticity,
+    curve: Curve,
+    surface: IsotropicSurface,
+    returned: Callable[[Array, Array], Returned],
+) -> Response:
+    """Return stress and consistent tangent where all strain components are given.
+
+    1. trial: elastic strain with the plastic strain frozen, its principal stresses s1 >= s2 >= s3
+    2. elastic where their equivalent stress is not above R(p)
+    3. elsewhere ``returned`` gives the principal stresses that are left, in the same order
+    4. principal directions are those of the trial stress. Tangent: the derivative of the principal
+       stresses, and (s_i - s_j) / (trial_i - trial_j) for what turns the directions
+
+    Parameters
+    ----------
+    strain : (n_components, n_points) total Mandel strain
+    state : internal variables of the last converged state, left unchanged
+    returned : principal trial stresses (3, n) beyond the surface, accumulated plastic strain (n,)
+        -> what flows
+
+    References
+    ----------
+    E.A. de Souza Neto, D. Peric, D.R.J. Owen, Computational Methods for Plasticity (2008),
+    section 8.1 (return), appendix A (isotropic functions of a tensor).
+    """
+    n_components, n_points = strain.shape
+    C = elasticity.stiffness(n_components)
+    stress = C @ (strain - state.plastic_strain)
+    tangent = np.repeat(C[:, :, None], n_points, axis=2)
+    yielding = np.zeros(n_points, dtype=bool)
+    most = surface.over_mises * von_mises(stress)
+    at = np.flatnonzero(most > curve.flow_stress(state.accumulated))
+    values, directions = principal(stress[:, at])
+    beyond = surface.of_principal(values) > curve.flow_stress(state.accumulated[at])
+    at, values, directions = at[beyond], values[:, beyond], directions[:, :, beyond]
+    if not len(at):
+        return Response(stress, tangent, state, yielding)
+
+    yielding[at] = True
+    G = elasticity.shear_modulus
+    found = returned(values, state.accumulated[at])
+    plastic_strain, accumulated = state.plastic_strain.copy(), state.accumulated.copy()
+    accumulated[at] += found.growth
+    turn = np.zeros((n_components, n_components, len(at)))
+    own = [dyad(directions, i, i, n_components) for i in range(3)]
+    for i in range(3):
+        plastic_strain[:, at] += found.flow[i] * own[i]
+        stress[:, at] -= 2 * G * found.flow[i] * own[i]
+        for j in range(3):
+            turn += found.derivative[i, j] * own[i][:, None] * own[j][None]
+    after = values - 2 * G * found.flow
+    for i, j in PAIRS:
+        apart = values[i] - values[j]
+        alike = apart <= _ALIKE * (values[0] - values[2])
+        ratio = (after[i] - after[j]) / np.where(alike, 1.0, apart)
+        limit = found.derivative[i, i] - found.derivative[i, j]
+        mixed = dyad(directions, i, j, n_components)
+        turn += np.where(alike, limit, ratio) * mixed[:, None] * mixed[None]
+    tangent[:, :, at] = np.einsum("abn,bc->acn", turn, C)
+    return Response(stress, tangent, PlasticState(plastic_strain, accumulated), yielding)
+
+
+def grown(stiff: float | Array, trial: Array, before: Array, curve: Curve) -> tuple[Array, Array]:
+    """Return the multipliers dp (n,) of ``stiff dp + R(p + dp) = trial``, and the slopes of R.
+
+    Parameters
+    ----------
+    stiff : what stress falls by with the multiplier [MPa]
+    trial : (n,) stress without plastic flow, not below R(p) [MPa]
+    before : (n,) p, the accumulated plastic strain
+    """
+
+    def excess(growth: Array) -> tuple[Array, Array]:
+        p = before + growth
+        return trial - stiff * growth - curve.flow_stress(p), -stiff - curve.slope(p)
+
+    most = np.maximum(trial - curve.flow_stress(before), 0.0) / stiff
+    growth = falling_root(excess, np.zeros_like(most), most * (1 + 1e-9), np.abs(trial))
+    return growth, curve.slope(before + growth)

@@ -1,0 +1,213 @@
+"""Yield surfaces of one's own: one function of the principal stresses, and what follows from it.
+
+The yield surface of an isotropic material that does not care for mean stress is a cylinder along
+the hydrostatic axis. Its section is symmetric about the axes of the principal stresses, so that one
+sixth of it says all: how the equivalent stress of a deviator of size one depends on its Lode angle.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.materials.principal import dyad, principal
+from solver.materials.scalar import falling_root
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from solver.materials.yield_surface import Tension
+
+    Array = NDArray[np.float64]
+
+SIXTH = math.pi / 3
+"""Lode angle of uniaxial compression; that of tension is 0, that of pure shear half of it."""
+_MARGIN = 0.25
+"""How far beyond the sixth an angle is looked for: its ends are then no ends of a bracket."""
+_IMAGINARY = 1e-30
+_STEP = 3e-6
+"""Step of the central difference of slopes that are exact: rounding and truncation are 1e-10."""
+_NOISE = 10.0
+"""A slope has the rounding of about so many operations."""
+_STATIONARY = 1e4
+"""Power hardly changes with the angle, which so many times the rounding leaves exact enough."""
+_FLAT = 1e-12
+"""Least curvature that a flat face is taken to have."""
+
+
+class Profile(NamedTuple):
+    """Equivalent stress over the Lode angle of a deviator of size one, each (n,).
+
+    ``size`` f, ``slope`` f' and ``bend`` f''. The section is convex where f + f'' is not negative.
+    """
+
+    size: Array
+    slope: Array
+    bend: Array
+
+
+def polar(values: Array) -> tuple[Array, Array]:
+    """Return size |s| (n,) and Lode angle (n,) of the deviators of principal stresses (3, n).
+
+    Where these are not finite the size is not either, and the angle is 0.
+    """
+    s1, s2, s3 = values
+    x, y = (2 * s1 - s2 - s3) / math.sqrt(6), (s2 - s3) / math.sqrt(2)
+    size = np.hypot(x, y)
+    return size, np.where(np.isfinite(size), np.arctan2(y, x), 0.0)
+
+
+def base(angle: Array) -> tuple[Array, Array]:
+    """Return the unit deviators (3, n) of Lode angles (n,), and their derivatives (3, n)."""
+    turned = angle - 2 * SIXTH * np.arange(3)[:, None]
+    return math.sqrt(2 / 3) * np.cos(turned), -math.sqrt(2 / 3) * np.sin(turned)
+
+
+def falling_angle(
+    excess: Callable[[Array], tuple[Array, Array]], start: Array, scale: Array
+) -> Array:
+    """Return the Lode angles (n,) where functions of size ``scale`` fall through zero."""
+    low, high = np.full_like(start, -_MARGIN), np.full_like(start, SIXTH + _MARGIN)
+    return falling_root(excess, low, high, _NOISE * scale, start)
+
+
+def _folded(angle: Array) -> tuple[Array, Array]:
+    """Return angles (n,) mirrored into the sixth, and the sign that slopes have there."""
+    inside = np.abs(angle)
+    beyond = inside > SIXTH
+    sign = np.where((angle < 0) ^ beyond, -1.0, 1.0)
+    return np.where(beyond, 2 * SIXTH - inside, inside), sign
+
+
+def _stresses(angle: Any) -> Any:
+    """Return the deviators (3, n) of size one; no rounding changes the order of their values."""
+    first, second = math.sqrt(2) * np.sin(SIXTH - angle), math.sqrt(2) * np.sin(angle)
+    s3 = -(first + 2 * second) / 3
+    return np.stack([s3 + second + first, s3 + second, s3])
+
+
+class SmoothSurface(ABC):
+    """A smooth convex yield surface; subclasses are frozen dataclasses of their parameters."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def tension(self, s: Array) -> Array:
+        """Return the tensile stress (n,) that principal stresses amount to [MPa].
+
+        It is convex, of degree one (twice the stresses, twice the result), does not depend on the
+        mean stress, and has no corner where two stresses are the same. Its slope is taken with
+        complex numbers: differences of the stresses need no ``abs``, which spoils it.
+
+        Parameters
+        ----------
+        s : (3, n) principal stresses s[0] >= s[1] >= s[2], real or complex [MPa]
+        """
+
+    def profile(self, angle: Array) -> Profile:
+        """Return size, slope and bend at Lode angles (n,) from 0, tension, to pi / 3, compression.
+
+        The slope is the imaginary part of `tension` after a step into the complex plane, which is
+        exact, and the bend its central difference. A surface that is to be fast gives its own.
+        """
+        inside, sign = _folded(np.stack([angle - _STEP, angle, angle + _STEP]))
+        found = self.tension(_stresses(inside.ravel() + 1j * _IMAGINARY)).reshape(inside.shape)
+        below, slope, above = sign * found.imag / _IMAGINARY
+        return Profile(found.real[1], slope, (above - below) / (2 * _STEP))
+
+    # -- what follows --------------------------------------------------------------------------
+
+    @property
+    def over_mises(self) -> float:
+        """Its equivalent stress is at most so many times that of von Mises.
+
+        A convex section that goes through tension and compression lies outside the hexagon whose
+        corners these are.
+        """
+        tension, compression = self._size(np.array([0.0, SIXTH]))
+        return 2 / math.sqrt(3) * max(1.0, compression / tension)
+
+    def shear(self, tension: Tension) -> Tension:
+        """Return the pure shear stress that is equivalent to a tensile stress [MPa]."""
+        ratio = math.sqrt(2) * float(self._size(np.array([SIXTH / 2]))[0])
+        return tension / ratio
+
+    def of_principal(self, values: Array) -> Array:
+        """Return the equivalent stress (n,) of principal stresses (3, n), the largest first."""
+        size, angle = polar(values)
+        return size * self._size(angle)
+
+    def equivalent(self, stress: Array) -> Array:
+        """Return the equivalent tensile stress (n_points,) of Mandel stress [MPa]."""
+        return self.of_principal(principal(stress)[0])
+
+    def normal(self, stress: Array) -> Array:
+        """Return the derivative (n_components, n_points); zero where there is no deviator."""
+        values, directions = principal(stress)
+        size, angle = polar(values)
+        flow = np.sign(size) * self.gradient(angle)
+        each = (flow[i] * dyad(directions, i, i, len(stress)) for i in range(3))
+        return np.asarray(sum(each))
+
+    def power(self, strain: Array) -> Array:
+        """Return the most work (n_points,) on the deviator of Mandel strain; see `YieldSurface`.
+
+        That is done by the stress at whose angle the normal of the section points along the strain.
+        """
+        size, angle = polar(principal(strain)[0])
+
+        def aside(x: Array) -> tuple[Array, Array]:
+            f, slope, bend = self.at(x)
+            along, across = np.cos(angle - x), np.sin(angle - x)
+            return across * f - along * slope, -along * np.maximum(f + bend, _FLAT)
+
+        x = falling_angle(aside, angle, np.full_like(angle, _STATIONARY))
+        return np.asarray(size * np.cos(angle - x) / self.at(x).size)
+
+    def at(self, angle: Array) -> Profile:
+        """Return the profile at any angles (n,): mirrored about tension and about compression."""
+        inside, sign = _folded(angle)
+        size, slope, bend = self.profile(inside)
+        bend = np.maximum(bend, -size)  # by rounding a flat face is not concave
+        return Profile(size, sign * slope, bend)
+
+    def gradient(self, angle: Array) -> Array:
+        """Return the derivative (3, n) of the equivalent stress by the principal stresses."""
+        size, slope, _ = self.at(angle)
+        out, along = base(angle)
+        return size * out + slope * along
+
+    def _size(self, angle: Array) -> Array:
+        return self.tension(_stresses(angle))
+
+    # -- whether it is one ---------------------------------------------------------------------
+
+    def check(self) -> None:
+        """Raise `ModelError` where it is no smooth convex surface of the tensile stress."""
+        angle, step = np.linspace(0.0, SIXTH, 121), 1e-5
+        s, one = _stresses(angle), np.array([[1.0], [0.0], [0.0]])
+        with np.errstate(all="ignore"):
+            size, pull = self.tension(s), self.tension(one)
+            larger, moved = self.tension(8.0 * s), self.tension(s + 0.5)
+            f, slope, bend = self.profile(angle)
+            below, above = self.at(angle - step), self.at(angle + step)
+            steep = np.abs(slope) + np.abs(bend) + f
+            conditions = {
+                "the stress itself in tension": (pull - 1.0, 1e-9),
+                "so many times as large as stress": (larger / size - 8.0, 1e-6),
+                "the same at any mean stress": (moved / size - 1.0, 1e-9),
+                "without a corner where two stresses are the same": (slope[[0, -1]], 1e-6),
+                "the same in its profile": (f / size - 1.0, 1e-9),
+                "computed with complex numbers, without abs": (
+                    ((above.size - below.size) / (2 * step) - slope) / steep, 1e-4),
+                "convex": (np.minimum(f + bend, 0.0) / steep, 1e-6),
+            }  # fmt: skip
+        for name, (off, limit) in conditions.items():
+            if not np.abs(off).max() <= limit:
+                raise ModelError("surface", self, f"must have a tension that is {name}")

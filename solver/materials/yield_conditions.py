@@ -1,0 +1,89 @@
+"""Yield conditions by the word that scenes and scene files name them with.
+
+A condition is a frozen dataclass whose fields are its parameters. With a hardening rule it gives
+the law of a material.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from solver.errors import ModelError
+from solver.materials.hardening_rules import GrowingRule, HardeningRule
+from solver.materials.smooth import SmoothMaterial
+from solver.materials.smooth_surface import SmoothSurface
+from solver.materials.tresca import TrescaMaterial
+from solver.parts import Parts
+
+if TYPE_CHECKING:
+    from solver.materials.elasticity import Elasticity
+    from solver.materials.law import Law
+
+
+class YieldCondition(ABC):
+    """At which stress a material yields, and in which direction.
+
+    Attributes
+    ----------
+    rules : hardening rules that go with it
+    """
+
+    __slots__ = ()
+    rules: ClassVar[type[Any]] = GrowingRule
+
+    @abstractmethod
+    def law(self, elasticity: Elasticity, yield_stress: float, rule: Any) -> Law:
+        """Return the law of a material that hardens by a rule, one of `rules`.
+
+        Raises
+        ------
+        ModelError
+            naming the parameter that is wrong
+        """
+
+
+YIELD_CONDITIONS: Parts[YieldCondition] = Parts("yield_condition")
+"""The conditions by word. The order is that of their parameters in files and tables."""
+
+
+class SmoothCondition(SmoothSurface, YieldCondition):
+    """A smooth convex surface, which subclasses give as a function of principal stresses."""
+
+    __slots__ = ()
+
+    def law(self, elasticity: Elasticity, yield_stress: float, rule: Any) -> Law:
+        """Return the law of this surface with the curve of the rule."""
+        curve = rule.flow_curve(elasticity, yield_stress)
+        try:
+            return SmoothMaterial(elasticity=elasticity, curve=curve, surface=self)
+        except ModelError as error:
+            raise ModelError("yield_condition", self, error.allowed) from None
+
+
+# -- the conditions of the package ---------------------------------------------------------------
+
+
+@YIELD_CONDITIONS.word("mises")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MisesCondition(YieldCondition):
+    """The size of the deviator decides; it goes with every rule."""
+
+    rules: ClassVar[type[Any]] = HardeningRule
+
+    def law(self, elasticity: Elasticity, yield_stress: float, rule: Any) -> Law:
+        """Return the law of the rule."""
+        return rule.law(elasticity, yield_stress)
+
+
+@YIELD_CONDITIONS.word("tresca")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrescaCondition(YieldCondition):
+    """The largest shear stress decides."""
+
+    def law(self, elasticity: Elasticity, yield_stress: float, rule: Any) -> Law:
+        """Return Tresca's law with the curve of the rule."""
+        return TrescaMaterial(
+            elasticity=elasticity, curve=rule.flow_curve(elasticity, yield_stress)
+        )
