@@ -124,7 +124,7 @@ def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
         return dataset[name] > dataset[_AWAY]
     places = [axis for axis in AXES if f"singular_{axis}" in dataset]
     for axes in (places, ["s"]):
-        if all(f"{name}_{axis}" in dataset for axis in axes):
+        if axes and all(f"{name}_{axis}" in dataset for axis in axes):
             off = [dataset[f"{name}_{axis}"] - dataset[f"singular_{axis}"] for axis in axes]
             far = sum((each**2 for each in off[1:]), off[0] ** 2) ** 0.5
             near = (far <= dataset["singular_radius"]).any("singular")
