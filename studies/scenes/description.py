@@ -28,8 +28,14 @@ PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
 LARGEST = 1e100
 """Largest number that a parameter may have by default."""
 
+WHEN = "when"
+"""Entry of a table that is left out where it is false."""
+
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
+
+_LEFT_OUT = object()
+"""What stands for a table whose condition is false."""
 
 Mistakes = dict[Where, StudyError | None]
 """What is wrong by its place; None where the cause is told elsewhere."""
@@ -214,10 +220,9 @@ class Description:
             elif where not in mistakes and not _can_be(value):
                 mistakes[where] = StudyError(dotted(where), text, "must be a number")
             known[name] = None if where in mistakes else value
-        tree: dict[str, Any] = {
-            key: value if key in PLAIN else _replaced((key,), value, known, mistakes)
-            for key, value in self.content.items()
-        }
+        plain = {key: value for key, value in self.content.items() if key in PLAIN}
+        rest = {key: value for key, value in self.content.items() if key not in PLAIN}
+        tree: dict[str, Any] = plain | _replaced((), rest, known, mistakes)
         if ACCURACY in tree:
             tree[ACCURACY] = self._levels(mistakes)
         return _Evaluated(tree, mistakes)
@@ -245,17 +250,44 @@ def _bytes(path: Path) -> bytes:
 
 
 def _replaced(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
-    """Return a part of the tree with numbers and words in place of expressions."""
+    """Return a part of the tree with numbers and words in place of expressions.
+
+    Tables that are left out are not in it, and lists are numbered without them.
+    """
     if isinstance(value, Mapping):
-        return {
-            str(key): each
-            if key == "description" and len(where) == 2 and where[0] in DESCRIBED
-            else _replaced((*where, str(key)), each, known, mistakes)
-            for key, each in value.items()
-        }
+        tree = {}
+        for key, each in value.items():
+            at = (*where, str(key))
+            if key == "description" and len(where) == 2 and where[0] in DESCRIBED:
+                tree[str(key)] = each
+            elif (there := _there(at, each, known, mistakes)) is not _LEFT_OUT:
+                tree[str(key)] = _replaced(at, there, known, mistakes)
+        return tree
     if isinstance(value, list | tuple):
-        return [_replaced((*where, k), each, known, mistakes) for k, each in enumerate(value)]
+        found: list[Any] = []
+        for each in value:
+            at = (*where, len(found))
+            if (there := _there(at, each, known, mistakes)) is not _LEFT_OUT:
+                found.append(_replaced(at, there, known, mistakes))
+        return found
     return _value(where, value, known, mistakes)
+
+
+def _there(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
+    """Return an entry without its condition; `_LEFT_OUT` where this is false.
+
+    A table that names what does not exist stays, so that this is told whatever its condition.
+    """
+    if not isinstance(value, Mapping) or isinstance(value.get(WHEN), Mapping | None):
+        return value
+    told = value[WHEN]
+    holds = _value((*where, WHEN), told, known, mistakes)
+    rest = {key: each for key, each in value.items() if key != WHEN}
+    if (*where, WHEN) not in mistakes and not isinstance(holds, bool):
+        allowed = "must be true or false, such as $depth > 0 or $kind == 'round'"
+        mistakes[(*where, WHEN)] = StudyError(dotted((*where, WHEN)), told, allowed)
+    lost = holds is False and all(names(text) <= known.keys() for _, text in _expressions(rest))
+    return _LEFT_OUT if lost else rest
 
 
 def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:

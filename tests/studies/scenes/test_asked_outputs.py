@@ -115,7 +115,7 @@ def test_a_check_refuses_parameters_that_do_not_go_together() -> None:
 def test_comparisons_are_true_or_false() -> None:
     assert evaluated("$a + 1 >= 2*$b", {"a": 1, "b": 1}) is True
     assert evaluated("$a < $b", {"a": 1, "b": 1}) is False
-    for text in ("$a < $b < 2", "$a == $b", "1 + ($a < $b)"):
+    for text in ("$a < $b < 2", "1 + ($a < $b)"):
         with pytest.raises(ExpressionError):
             evaluated(text, {"a": 1, "b": 1})
 
