@@ -47,6 +47,8 @@ def check(parameters: Any) -> None:
             continue
         if kinds is tuple or (value is None and name in _left_out(parameters.__class__)):
             continue
+        if kinds is str and not choices and isinstance(value, str):  # a name
+            continue
         if kinds is str:
             raise ModelError(name, value, "must be one of " + ", ".join(choices))
         if kinds is bool:

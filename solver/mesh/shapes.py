@@ -292,9 +292,13 @@ def ball(
     across = lines if above else -lines[::-1]
     few((len(along) - 1) * (len(across) - 1))
     bent = mapped(grid(along, across), lambda X: _onto_disc(X, radius))
+    return renamed(bent, ball_sides(above=above)).translated(at)
+
+
+def ball_sides(*, above: bool) -> dict[str, str]:
+    """Return the boundaries of a ball: name -> side of the grid that is bent into it."""
     surface, cap = ("bottom", "top") if above else ("top", "bottom")
-    names = {"surface": surface, "cap": cap, "left": "left", "right": "right"}
-    return renamed(bent, names).translated(at)
+    return {"surface": surface, "cap": cap, "left": "left", "right": "right"}
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
@@ -318,18 +322,6 @@ def _onto_disc(x: Array, radius: float) -> Array:
     z = x[0] + 1j * side * x[1]
     w = z / (1 - 0.5j * z / radius)
     return np.stack([w.real, side * w.imag])
-
-
-def cap_area(radius: float) -> float:
-    """Return the area around the axis of the surface where the cap is left out [mm2]."""
-    extent = _EXTENT * radius
-    way, weight = np.polynomial.legendre.leggauss(60)
-    along, weight = extent * (way + 1) / 2, extent * weight / 2
-    area = 0.0
-    for z in (along + 1j * extent, extent + 1j * along):
-        bent = 1 - 0.5j * z / radius
-        area += float(weight @ (2 * np.pi * (z / bent).real / np.abs(bent) ** 2))
-    return area
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any, TypeGuard
 
 LONGEST = 200
@@ -24,6 +25,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
     "exp": (math.exp, 1),
     "log": (math.log, 1),
     "abs": (abs, 1),
+    "round": (round, 1),
     "sin": (math.sin, 1),
     "cos": (math.cos, 1),
     "tan": (math.tan, 1),
@@ -105,6 +107,7 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     return value
 
 
+@lru_cache(maxsize=1024)
 def _read(text: str) -> ast.expr:
     bare = _WORD.sub(lambda word: " " * len(word[0]), text)
     if found := _FOREIGN.search(bare):
