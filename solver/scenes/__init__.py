@@ -15,10 +15,7 @@ from solver.scenes.elastic_punch import ELASTIC_PUNCH
 from solver.scenes.punch import PUNCH
 from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
-from solver.scenes.shaft_hub import SHAFT_HUB
 
-SCENES: dict[str, Scene] = {
-    scene.name: scene for scene in (PUNCH, ELASTIC_PUNCH, SHAFT_HUB, ROLLING)
-}
+SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ELASTIC_PUNCH, ROLLING)}
 
 __all__ = ["SCENES", "Effort", "Monitor", "Scene"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release, load_cycles
-from solver.mesh import within
+from solver.mesh import within, without
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FRICTION
 from solver.model.loads import LOADS
@@ -313,9 +313,14 @@ def _made(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mes
 
 
 def _placed(mesh: Mesh, table: tables.BodyTable) -> Mesh:
-    """Return a mesh where its body stands, with the boundaries of its table."""
+    """Return a mesh where its body stands, with the cuts and the boundaries of its table."""
     if any(table.move):
         mesh = mesh.translated(table.move)
+    for name, cut in table.cuts.items():
+        try:
+            mesh = without(mesh, name, cut.x, cut.y)
+        except ModelError as error:
+            raise ModelError(f"cuts.{error.field}", error.value, error.allowed) from None
     own = {
         new: within(mesh, new, each.of, each.x, each.y).boundaries[new]
         for new, each in table.boundaries.items()

@@ -131,10 +131,13 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             yield StudyError(f"{where}.part", body.part, "goes with mesh")
         if body.mesh is not None and meshes is not None and body.mesh not in meshes:
             yield StudyError(f"{where}.mesh", body.mesh, "there is no such file with the scene")
-        for other, span in ((o, s) for o, b in body.boundaries.items() for s in (b.x, b.y)):
+        boxes: dict[str, tables.BoundaryTable | tables.CutTable] = {}
+        boxes |= {f"boundaries.{other}": box for other, box in body.boundaries.items()}
+        boxes |= {f"cuts.{other}": cut for other, cut in body.cuts.items()}
+        for other, span in ((o, s) for o, box in boxes.items() for s in (box.x, box.y)):
             if span is not None and not span[0] < span[1]:
                 allowed = "must be two increasing numbers"
-                yield StudyError(f"{where}.boundaries.{other}", list(span), allowed)
+                yield StudyError(f"{where}.{other}", list(span), allowed)
     for name, rigid in scene.rigid.items():
         for axis in ("x", "y", "rotation"):
             motion = getattr(rigid, axis)

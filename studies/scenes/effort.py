@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -13,7 +13,7 @@ from solver.scenes.effort import Effort
 from studies.errors import StudyError
 from studies.scenes import tables
 from studies.scenes.building import friction_of, load_of, mesh_of_body
-from studies.scenes.lattice import BodySize, size_of_lines, size_of_mesh
+from studies.scenes.lattice import BodySize, is_lattice, size_of_lines, size_of_mesh
 
 if TYPE_CHECKING:
     from studies.scenes.description import Description
@@ -55,6 +55,16 @@ def effort_of(
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
 
 
+def too_large(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield what is wrong with shapes whose meshes need not be made to see it: their size."""
+    for name, body in scene.bodies.items():
+        if is_lattice(body):
+            try:
+                _size_of(description, name, body)
+            except StudyError as error:
+                yield error
+
+
 def in_one_increment(scene: tables.SceneFile) -> bool:
     """Whether one increment solves a run: nothing yields, and all is proportional to the load.
 
@@ -91,11 +101,14 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> Bod
     key = body.model_dump_json(exclude={"supports", "material"})
     if key not in known:
         try:
-            known[key] = size_of_lines(body) or size_of_mesh(
-                mesh_of_body(body, description.meshes), body.element
+            known[key] = (
+                size_of_lines(body)
+                if is_lattice(body)
+                else size_of_mesh(mesh_of_body(body, description.meshes), body.element)
             )
         except ModelError as error:
-            where = f"bodies.{name}" if body.shape is None else f"bodies.{name}.shape"
+            beside = body.shape is None or error.field.startswith(("boundaries.", "cuts."))
+            where = f"bodies.{name}" if beside else f"bodies.{name}.shape"
             raise StudyError(f"{where}.{error.field}", error.value, error.allowed) from None
         while len(known) > _MOST:
             del known[next(iter(known))]

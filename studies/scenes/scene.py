@@ -27,7 +27,7 @@ from studies.scenes import tables
 from studies.scenes.building import Builder, friction_of, law_of
 from studies.scenes.checking import clashes, lacking, unmet
 from studies.scenes.description import Description
-from studies.scenes.effort import effort_of, in_one_increment
+from studies.scenes.effort import effort_of, in_one_increment, too_large
 from studies.scenes.examining import examined
 from studies.scenes.results import numbers_of, output_of, places_of, view_of
 from studies.scenes.tables import ACCURACY
@@ -249,7 +249,8 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
         try:
             found = _tables(description, self)
             mistakes = [*unmet(found, _values(self)), *clashes(found, None), *lacking(found)]
-            mistakes += () if mistakes else _unlawful(description, found)
+            if not mistakes:
+                mistakes = [*_unlawful(description, found), *too_large(description, found)]
         except SceneError as error:
             mistakes = list(error.mistakes)
         for first in mistakes[:1]:

@@ -192,7 +192,7 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
         naming the entry of the shape that is wrong
     """
     if isinstance(shape, GridTable):
-        lines = _grid_lines(shape)
+        lines = lines_of(shape)
         few((len(lines.x) - 1) * (len(lines.y) - 1))
         return grid(lines.x, lines.y, cells)
     given = {name: getattr(shape, name) for name in type(shape).model_fields if name != "kind"}
@@ -214,21 +214,14 @@ class GridLines(NamedTuple):
     x: Array
     y: Array
     names: Mapping[str, str]
-    bent: bool = False
 
 
-def lines_of(shape: Any) -> GridLines | None:
-    """Return the lines of a shape that is one grid; None where only its mesh tells them."""
-    if isinstance(shape, GridTable):
-        return _grid_lines(shape)
+def lines_of(shape: Any) -> GridLines:
+    """Return the lines of a shape that is one grid, bent or not: a `GridTable` or `RoundTable`."""
     if isinstance(shape, RoundTable):
         across = ball_lines(shape.radius, shape.fine, shape.size, shape.growth)
         along = across if shape.symmetric else np.concatenate([-across[:0:-1], across])
-        return GridLines(along, across, ball_sides(above=True), bent=True)
-    return None
-
-
-def _grid_lines(shape: GridTable) -> GridLines:
+        return GridLines(along, across, ball_sides(above=True))
     x, y = (
         _graded(name, marks, [mark.at for mark in marks], shape.growth)
         for name, marks in (("x", shape.x), ("y", shape.y))

@@ -41,6 +41,16 @@ class BoundaryTable(SceneTable):
     y: Span | None = None
 
 
+class CutTable(SceneTable):
+    """A rectangle that is cut out of a body: a notch in its side, or a hole.
+
+    Its sides are lines of the mesh; the boundary that it opens has its name.
+    """
+
+    x: Span
+    y: Span
+
+
 class BodyTable(SceneTable):
     """A body: a shape, or a mesh file and the part of it that the body is."""
 
@@ -50,6 +60,7 @@ class BodyTable(SceneTable):
     part: str | None = None
     element: str | None = None
     move: Place = (0.0, 0.0)
+    cuts: dict[Label, CutTable] = Field(default_factory=dict)
     boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)
 

@@ -27,8 +27,6 @@ CASES: list[tuple[str, dict[str, Any]]] = [
     ("elastic_punch", PLAIN),
     ("elastic_punch", PLAIN | {"element": "quad9", "punch_groove": 0.3, "friction": 0.1}),
     ("elastic_punch", PLAIN | {"element": "tri3", "half_plane_groove": 0.5, "xi": 0.9}),
-    ("shaft_hub", {"accuracy": "draft"}),
-    ("shaft_hub", {"accuracy": "draft", "loading": "pressure", "shaft_groove": 0.3, "xi": 0.5}),
     ("rolling", ROUGH),
     ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}),
     ("rolling", ROUGH | {"periodic": True, "track": 100.0}),

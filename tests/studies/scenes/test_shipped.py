@@ -41,6 +41,9 @@ def test_its_bodies_can_be_built(name: str) -> None:
         ("rigid_punch", {"half_plane_size": 30.0, "growth": 1.4}),
         ("ball", {}),
         ("ball", {"yielding": "ball", "radius": 3.0}),
+        ("shaft_hub", {}),
+        ("shaft_hub", {"loading": "pressure", "shaft_groove": 0.3, "xi": 0.5}),
+        ("shaft_hub", {"shaft_groove": 0.3, "hub_groove": 0.2, "eta": 2.0}),
     ],
 )
 def test_the_work_of_a_run_is_told_as_it_is(name: str, changes: dict[str, Any]) -> None:
