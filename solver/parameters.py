@@ -24,7 +24,7 @@ def described(default: Any, description: str) -> Any:
 def by_accuracy(description: str) -> Any:
     """Return the field of a number that ``accuracy`` sets where none is given.
 
-    Its default is None; `ElasticParameters.usual` says the number, and no object is built without.
+    Its default is None; the `usual` of its class says the number, and no object is built without.
     """
     return described(None, f"{description}; left out, `accuracy` sets it")
 

@@ -284,9 +284,6 @@ def ball(
     fine : distance within which they have it [mm]
     growth : ratio of neighbouring sides beyond
     """
-    _positive(radius=radius, size=size)
-    if not size <= fine <= _FINE * radius:
-        raise ModelError("fine", fine, f"must be from {size:g} to {_FINE * radius:g}")
     lines = ball_lines(radius, fine, size, growth)
     along = lines if symmetric else np.concatenate([-lines[:0:-1], lines])
     across = lines if above else -lines[::-1]
@@ -302,12 +299,14 @@ def ball_sides(*, above: bool) -> dict[str, str]:
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
-    """Return the lines from 0 on of the grid that is bent into a ball [mm]."""
-    return fine_lines(_EXTENT * radius, fine, size, growth)
+    """Return the lines from 0 on of the grid that is bent into a ball [mm].
 
-
-def fine_lines(extent: float, fine: float, size: float, growth: float) -> Array:
-    """Return lines from 0 to ``extent``: of one ``size`` as far as ``fine``, then growing [mm]."""
+    They are ``size`` apart as far as ``fine``, then their distances grow.
+    """
+    _positive(radius=radius, size=size)
+    if not size <= fine <= _FINE * radius:
+        raise ModelError("fine", fine, f"must be from {size:g} to {_FINE * radius:g}")
+    extent = _EXTENT * radius
     even = np.linspace(0.0, fine, max(1, round(fine / size)) + 1)
     return continued(even, extent - fine, size, growth, extent / 4)
 

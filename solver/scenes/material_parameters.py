@@ -11,7 +11,6 @@ from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import HARDENING, GrowingRule, LinearRule, NoHardening
 from solver.materials.law import Law
-from solver.materials.material import Material
 from solver.materials.tresca import TrescaMaterial
 from solver.model.friction import FRICTION, FrictionLaw
 from solver.model.model import ContactPair
@@ -23,14 +22,20 @@ _GROWING = tuple(word for word, rule in HARDENING.all().items() if issubclass(ru
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElasticParameters:
-    """The elastic material every scene asks for, and how accurate the answer is to be."""
+@HARDENING.fields
+class HardeningParameters:
+    """How accurate the answer is to be, and a material with the parameters of all hardening rules.
+
+    It has no yield stress yet, which follows the parameters of the rules.
+    """
 
     accuracy: Accuracy = described(
         "standard", "sets mesh and increments together, where they are not given"
     )
     youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
     poisson_ratio: Poisson = described(0.3, "Poisson ratio")
+    yield_condition: YieldCondition = described("mises", "condition of first yield, and of flow")
+    hardening: str = described("none", "hardening rule of the yielding bodies")
 
     def __post_init__(self) -> None:
         check(self)
@@ -42,19 +47,6 @@ class ElasticParameters:
         """Return the values of the parameters that ``accuracy`` sets."""
         return {}
 
-    def elastic_material(self) -> Material:
-        """Return a material that never yields."""
-        return Material(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-@HARDENING.fields
-class HardeningParameters(ElasticParameters):
-    """How a material yields and hardens, with the parameters of all hardening rules."""
-
-    yield_condition: YieldCondition = described("mises", "condition of first yield, and of flow")
-    hardening: str = described("none", "hardening rule of the yielding bodies")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaterialParameters(HardeningParameters):
@@ -64,7 +56,7 @@ class MaterialParameters(HardeningParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        ElasticParameters.__post_init__(self)
+        HardeningParameters.__post_init__(self)
         self.material()  # refuses what does not go together
 
     @property

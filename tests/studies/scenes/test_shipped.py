@@ -41,6 +41,9 @@ def test_its_bodies_can_be_built(name: str) -> None:
         ("rigid_punch", {"half_plane_size": 30.0, "growth": 1.4}),
         ("ball", {}),
         ("ball", {"yielding": "ball", "radius": 3.0}),
+        ("elastic_punch", {}),
+        ("elastic_punch", {"element": "quad9", "punch_groove": 0.3, "friction": 0.1}),
+        ("elastic_punch", {"element": "tri3", "half_plane_groove": 0.5, "xi": 0.9}),
         ("shaft_hub", {}),
         ("shaft_hub", {"loading": "pressure", "shaft_groove": 0.3, "xi": 0.5}),
         ("shaft_hub", {"shaft_groove": 0.3, "hub_groove": 0.2, "eta": 2.0}),
@@ -61,6 +64,7 @@ def test_the_work_of_a_run_is_told_as_it_is(name: str, changes: dict[str, Any]) 
     ("name", "changes", "values"),
     [
         ("rigid_punch", {"friction": 0.3}, [10.0, 200.0]),
+        ("elastic_punch", {"friction": 0.3, "growth": 2.0}, [10.0, 200.0]),
         ("ball", {"load_ratio": 2.0}, [1, 2]),
     ],
 )
