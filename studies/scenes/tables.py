@@ -212,8 +212,7 @@ class StageTable(SceneTable):
 class LoadingTable(SceneTable):
     """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away.
 
-    Without a step they grow in one increment. With ``cycles`` that is done as many times; where
-    contact opens or slips, each time and each way is then a motion of its own.
+    Without a step they grow in one increment. With ``cycles`` all of this is done as many times.
     """
 
     factor: Annotated[float, Interval(gt=0.0, le=1e7)]
