@@ -24,8 +24,8 @@ def described(default: Any, description: str) -> Any:
 def by_accuracy(description: str) -> Any:
     """Return the field of a number that ``accuracy`` sets if the user gives none.
 
-    Its default is None; when the object is built, the number of `ElasticParameters.usual` takes
-    its place.
+    Its default is None; when the object is built, the number of `usual` of its class takes its
+    place.
     """
     return described(None, f"{description}; left out, `accuracy` sets it")
 
@@ -47,6 +47,8 @@ def check(parameters: Any) -> None:
         if isinstance(value, str) and value in choices:
             continue
         if kinds is tuple or (value is None and name in _left_out(parameters.__class__)):
+            continue
+        if kinds is str and not choices and isinstance(value, str):  # a name
             continue
         if kinds is str:
             raise ModelError(name, value, "must be one of " + ", ".join(choices))

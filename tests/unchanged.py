@@ -97,7 +97,6 @@ def runs() -> dict[str, tuple[str, dict[str, Any]]]:
         own = {"hardening": law}
         add("data/scenes/fretting.toml", law, element=0.1, yield_stress=500.0, **own)
         add("data/scenes/pin.toml", law, load_ratio=1.0, friction=0.2, clearance=0.05, **own)
-    add("tests/studies/scenes/ball.toml", "ball")
     add("tests/studies/scenes/punch.toml", "punch")
     for turn in (0.001, 0.01):
         add("tests/studies/scenes/everything.toml", f"turn {turn}", turn=turn)

@@ -188,6 +188,16 @@ def walked(programs: Sequence[Program]) -> int:
     return sum(program.count for program in programs) - sum(before)
 
 
+def load_cycles(load: float, step: float, unload_steps: int, cycles: int) -> Program:
+    """Return the program that puts a load factor on and takes it away, as many times as asked.
+
+    Each way is a motion of its own, and each lap ends with the bodies apart.
+    """
+    loaded = Stage(name="loaded", target=load, step=step)
+    unloaded = Stage(name="unloaded", target=0.0, steps=unload_steps, apart=True, turns=True)
+    return Program(laps=(Lap((loaded, unloaded)),) * cycles)
+
+
 def load_and_release(load: float, step: float, unload_steps: int) -> Program:
     """Return the program that raises the load factor to ``load``, then unloads and separates."""
     loaded = Stage(name="loaded", target=load, step=step)

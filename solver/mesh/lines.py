@@ -108,7 +108,11 @@ def closer(start: float, stop: float, num: int, near: float, size: float) -> Arr
 
 
 def refined(
-    points: Sequence[float], sizes: Sequence[float], ratio: float, largest: Sequence[float]
+    points: Sequence[float],
+    sizes: Sequence[float],
+    ratio: float,
+    largest: Sequence[float],
+    parts: Sequence[int | None] = (),
 ) -> Array:
     """Return node positions through ``points``; elements grow away from each point by ``ratio``.
 
@@ -120,12 +124,18 @@ def refined(
     sizes : (n,) largest element beside each point; inf sets no limit [mm]
     ratio : ratio of neighbouring element sides, above 1
     largest : (n - 1,) largest element between neighbours [mm]
+    parts : (n - 1,) number of equal elements between neighbours in place of those that grow; None
+        where they grow, and empty where they do everywhere
     """
     if not ratio > 1:
         raise ModelError("ratio", ratio, "must be above 1")
     pieces = [np.array([points[0]], dtype=float)]
-    spans = zip(pairwise(points), pairwise(sizes), largest, strict=True)
-    for (start, end), (first, last), most in spans:
+    counts = parts or [None] * len(largest)
+    spans = zip(pairwise(points), pairwise(sizes), largest, counts, strict=True)
+    for (start, end), (first, last), most, count in spans:
+        if count is not None:
+            pieces.append(np.linspace(start, end, count + 1)[1:])
+            continue
         length = end - start
         ahead = _meeting(length, first, last, ratio)
         if ahead > 0:

@@ -281,26 +281,29 @@ def ball(
     fine : distance from ``at`` up to which elements have this side [mm]
     growth : ratio of neighbouring sides beyond
     """
-    _positive(radius=radius, size=size)
-    if not size <= fine <= _FINE * radius:
-        raise ModelError("fine", fine, f"must be from {size:g} to {_FINE * radius:g}")
     lines = ball_lines(radius, fine, size, growth)
     along = lines if symmetric else np.concatenate([-lines[:0:-1], lines])
     across = lines if above else -lines[::-1]
     few((len(along) - 1) * (len(across) - 1))
     bent = mapped(grid(along, across), lambda X: _onto_disc(X, radius))
+    return renamed(bent, ball_sides(above=above)).translated(at)
+
+
+def ball_sides(*, above: bool) -> dict[str, str]:
+    """Return the boundaries of a ball: name -> side of the grid that is bent into it."""
     surface, cap = ("bottom", "top") if above else ("top", "bottom")
-    names = {"surface": surface, "cap": cap, "left": "left", "right": "right"}
-    return renamed(bent, names).translated(at)
+    return {"surface": surface, "cap": cap, "left": "left", "right": "right"}
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
-    """Return the positive grid lines of the grid that is mapped onto a ball [mm]."""
-    return fine_lines(_EXTENT * radius, fine, size, growth)
+    """Return the lines from 0 on of the grid that is bent into a ball [mm].
 
-
-def fine_lines(extent: float, fine: float, size: float, growth: float) -> Array:
-    """Return lines from 0 to ``extent``: elements of ``size`` up to ``fine``, then growing [mm]."""
+    They are ``size`` apart as far as ``fine``, then their distances grow.
+    """
+    _positive(radius=radius, size=size)
+    if not size <= fine <= _FINE * radius:
+        raise ModelError("fine", fine, f"must be from {size:g} to {_FINE * radius:g}")
+    extent = _EXTENT * radius
     even = np.linspace(0.0, fine, max(1, round(fine / size)) + 1)
     return continued(even, extent - fine, size, growth, extent / 4)
 
@@ -315,18 +318,6 @@ def _onto_disc(x: Array, radius: float) -> Array:
     z = x[0] + 1j * side * x[1]
     w = z / (1 - 0.5j * z / radius)
     return np.stack([w.real, side * w.imag])
-
-
-def cap_area(radius: float) -> float:
-    """Return the surface area, around the axis, at which the cap of a ball is cut off [mm2]."""
-    extent = _EXTENT * radius
-    way, weight = np.polynomial.legendre.leggauss(60)
-    along, weight = extent * (way + 1) / 2, extent * weight / 2
-    area = 0.0
-    for z in (along + 1j * extent, extent + 1j * along):
-        bent = 1 - 0.5j * z / radius
-        area += float(weight @ (2 * np.pi * (z / bent).real / np.abs(bent) ** 2))
-    return area
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,6 +88,15 @@ class Corner:
             APPARENT_POWER: apparent,
         }
 
+    def warnings(self, run: FinishedRun) -> tuple[str, ...]:
+        """Return a warning where the corner has lifted off."""
+        width, _ = run.tractions.extent(run.loaded)
+        if width >= self.half_width * (1 - 1e-9):
+            return ()
+        return (
+            f"the corner has lifted off: contact ends at {width:.4g} mm, without a singularity",
+        )
+
     def _next_feature(self, points: ContactResult, r: np.ndarray) -> float:
         """Return the distance / half-width from the corner of what else shapes the field."""
         other = points.sticking != points.sticking[-1]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from solver.results.outputs import output
 from solver.results.quantities import Quantity, along_axes, declare, declare_along
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 _OVER = ("body", "component")
 _ROUNDING, _SAME = 1e-9, 1e-6
-"""Stress / yield stress that is rounding, and has no place; relative difference of rounding."""
+"""Stress / least yield stress that is rounding, and has no place; relative difference of it."""
 
 
 class Extreme(NamedTuple):
@@ -64,13 +65,16 @@ SMALLEST = Extreme(
 )  # fmt: skip
 
 
+@output("residual_extremes", "surfaces", "release")
 def residual_extremes(run: FinishedRun) -> Values:
     """Return the extreme residual stresses at the nodes of each body and of its contact surface.
 
     Of nodes with the same stress, as on a track that a pass leaves alike along x, the one nearest
     to the middle of the contact is taken; where there is no stress, none.
     """
-    none = _ROUNDING * run.parameters.yield_stress
+    laws = [run.system.full(name).body.material for name in run.system.names]
+    least = [min(law.yield_stress, law.elasticity.youngs_modulus) for law in laws]
+    none = _ROUNDING * min(least)
     found: defaultdict[Quantity, list[Array]] = defaultdict(list)
     for name, boundary in run.view.surfaces.items():
         body = run.system.full(name)

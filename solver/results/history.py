@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.contact.system import System
     from solver.fem.frame import RigidMotion
+    from solver.results.quantities import Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +32,14 @@ class Observed:
         rigid body all forces but contact, given ones and those that its motion needs, and their
         moment about its centre [N mm]
     contact : of each pair, the sums of normal and of tangential forces on the slave [N]
+    watched : numbers that outputs watch, over the dimension ``increment``
     """
 
     time: float
     motions: Mapping[str, RigidMotion]
     reactions: Mapping[str, tuple[float, float, float]]
     contact: Sequence[tuple[float, float]]
+    watched: Mapping[Quantity, float] = field(default_factory=dict)
 
 
 def observe(system: System, converged: Converged) -> Observed:

@@ -44,7 +44,9 @@ TANGENTIAL_FORCE = declare(
 def over_increments(
     history: Sequence[Observed], times: Sequence[float], parts: Sequence[str], pairs: Sequence[str]
 ) -> Values:
-    """Return reactions, motions and contact forces at the ends of the program's increments.
+    """Return what is kept of the ends of the program's increments.
+
+    These are reactions, motions, contact forces, and the numbers that outputs watch.
 
     Parameters
     ----------
@@ -74,7 +76,8 @@ def over_increments(
             NORMAL_FORCE: forces[..., 0].T,
             TANGENTIAL_FORCE: -forces[..., 1].T,
         }
-    return out
+    watched = history[0].watched
+    return out | {q: np.array([o.watched[q] if o else np.nan for o in kept]) for q in watched}
 
 
 def _in_order(history: Sequence[Observed], times: Sequence[float]) -> list[Observed | None]:

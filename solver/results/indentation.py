@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import MISSING, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.parameters import Length, check, described
 from solver.results.contact_result import contact_patches
-from solver.results.increments import INCREMENT
+from solver.results.outputs import output
 from solver.results.quantities import declare
 
 if TYPE_CHECKING:
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
 
     from solver.results.fields import Bodies, Solved
     from solver.results.run import FinishedRun, Values
-    from solver.results.samples import Samples
 
     Array = NDArray[np.float64]
 
@@ -42,81 +43,70 @@ INCREMENT_APPROACH = declare(
 INCREMENT_RADIUS = declare(
     "increment_radius", "radius of the contact after each increment", "mm", dims=_EACH
 )
+_ON_AXIS = 1e-9
+"""Distance from the axis / radius that is rounding."""
 
 
-class Followed(NamedTuple):
-    """A state of a ball: force [N], approach and contact radius [mm]."""
+@output("indentation", "contact", "s", "profile", "surfaces", "release")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Indentation:
+    """Force, approach, mean pressure under load, and how the surface of the profile's body moves.
 
-    force: float
-    approach: float
-    radius: float
+    The ball touches the origin, and its axis is x = 0. Force, approach and radius of the contact
+    are those of every increment too.
+    """
 
+    body: str = described(MISSING, "name of the ball")
+    radius: Length = described(MISSING, "radius of the ball")
 
-def follow(samples: Samples, converged: Any) -> Followed:
-    """Return what is kept of an increment."""
-    system: Any = samples.system
-    contact = converged.state.contacts[0]
-    force = float(contact.normal.sum())
-    chain = system.interfaces[0].slave_surface
-    x = chain.X[0, chain.vertices]
-    order = np.argsort(x)
-    patches = contact_patches(x[order], contact.gap[order], contact.normal[order] > 0)
-    return Followed(force, _approach(system, converged), patches[-1][1] if patches else 0.0)
+    def __post_init__(self) -> None:
+        check(self)
 
+    def watch(self, system: Any, converged: Any) -> Values:
+        """Return what is kept of an increment."""
+        contact = converged.state.contacts[0]
+        chain = system.interfaces[0].slave_surface
+        x = chain.X[0, chain.vertices]
+        order = np.argsort(x)
+        patches = contact_patches(x[order], contact.gap[order], contact.normal[order] > 0)
+        return {
+            INCREMENT_FORCE: float(contact.normal.sum()),
+            INCREMENT_APPROACH: self._approach(system, converged),
+            INCREMENT_RADIUS: patches[-1][1] if patches else 0.0,
+        }
 
-def _approach(system: Bodies, converged: Solved) -> float:
-    """Return by how much the centre of the ball has come nearer to what it is pressed on [mm]."""
-    body = system.full("ball")
-    axis = body.boundary_nodes("left")
-    axis = axis[np.argsort(body.X[1, axis])]
-    moved = system.displacement("ball", converged.state)[2 * axis + 1]
-    y = body.X[1, axis]
-    radius = _ball_radius(body.X)
-    centre = radius if y.max() > 0 else -radius
-    return float(-np.sign(centre) * np.interp(centre, y, moved))
+    def __call__(self, run: FinishedRun) -> Values:
+        """Return the quantities of a run."""
+        force, approach, radius = self.watch(run.system, run.loaded).values()
+        mean = force / (np.pi * radius**2) if radius else np.nan
+        s, left = run.view.s, self._moved(run, run.unloaded)
+        highest = int(left.argmax())
+        return {
+            FORCE: force,
+            APPROACH: approach,
+            MEAN_CONTACT_PRESSURE: mean,
+            SURFACE_DISPLACEMENT: np.stack([self._moved(run, run.loaded), left]),
+            CRATER_DEPTH: -float(left[0]),
+            PILE_UP: float(left[highest]),
+            PILE_UP_RADIUS: float(s[highest]) if left[highest] > 0 else np.nan,
+        }
 
-
-def _ball_radius(X: Array) -> float:
-    """Return the radius of a ball that touches the origin, from its nodes (2, n)."""
-    far = np.argmax(X[0])
-    return float((X[:, far] ** 2).sum() / (2 * abs(X[1, far])))
-
-
-def indentation(run: FinishedRun) -> Values:
-    """Return force, approach and mean pressure under load."""
-    force, approach, radius = follow(run.samples, run.loaded)
-    mean = force / (np.pi * radius**2) if radius else np.nan
-    return {FORCE: force, APPROACH: approach, MEAN_CONTACT_PRESSURE: mean}
-
-
-def crater(run: FinishedRun) -> Values:
-    """Return how the surface of the body that yields has moved, and what is left of it."""
-    s, name = run.view.s, run.view.profile_body
-    body = run.system.full(name)
-    nodes = body.boundary_nodes(run.view.surfaces[name])
-    nodes = nodes[np.argsort(body.X[0, nodes])]
-
-    def moved(converged: Solved) -> Array:
+    def _moved(self, run: FinishedRun, converged: Solved) -> Array:
+        """Return how the surface of the profile's body has moved along y, over s [mm]."""
+        name = run.view.profile_body
+        body = run.system.full(name)
+        nodes = body.boundary_nodes(run.view.surfaces[name])
+        nodes = nodes[np.argsort(body.X[0, nodes])]
         u = run.system.displacement(name, converged.state)[2 * nodes + 1]
-        centre = _approach(run.system, converged) if name == "ball" else 0.0
-        return np.asarray(np.interp(s, body.X[0, nodes], u) - centre)
+        centre = self._approach(run.system, converged) if name == self.body else 0.0
+        return np.asarray(np.interp(run.view.s, body.X[0, nodes], u) - centre)
 
-    left = moved(run.unloaded)
-    highest = int(left.argmax())
-    return {
-        SURFACE_DISPLACEMENT: np.stack([moved(run.loaded), left]),
-        CRATER_DEPTH: -float(left[0]),
-        PILE_UP: float(left[highest]),
-        PILE_UP_RADIUS: float(s[highest]) if left[highest] > 0 else np.nan,
-    }
-
-
-def history(run: FinishedRun) -> Values:
-    """Return force, approach and contact radius of every increment."""
-    force, approach, radius = np.array(run.outcome.history).T
-    return {
-        INCREMENT: np.arange(len(force)),
-        INCREMENT_FORCE: force,
-        INCREMENT_APPROACH: approach,
-        INCREMENT_RADIUS: radius,
-    }
+    def _approach(self, system: Bodies, converged: Solved) -> float:
+        """Return by how much the centre of the ball has come nearer to what it is pressed on."""
+        X = system.full(self.body).X
+        axis = np.flatnonzero(np.abs(X[0]) <= _ON_AXIS * self.radius)
+        axis = axis[np.argsort(X[1, axis])]
+        moved = system.displacement(self.body, converged.state)[2 * axis + 1]
+        y = X[1, axis]
+        centre = self.radius if y.max() > 0 else -self.radius
+        return float(-np.sign(centre) * np.interp(centre, y, moved))

@@ -44,6 +44,9 @@ SURFACE_MISES = declare(
     "surface_mises", "von Mises stress at the surface of the lower body", "MPa",
     dims=("stage", "s"),
 )  # fmt: skip
+HOOP_STRESS = declare(
+    "hoop_stress", "hoop stress along the contact under load", "MPa", dims=("body", "s")
+)
 
 
 @output("maps", "map")
@@ -99,3 +102,10 @@ def surfaces(run: FinishedRun) -> Values:
         SURFACE_RESIDUAL: np.stack([samples.on_surface("stress", b, run.unloaded) for b in bodies]),
         SURFACE_MISES: np.stack([samples.surface_mises(at, x) for at, x in run.stages]),
     }
+
+
+@output("hoop_stress", "s", "surfaces")
+def hoop_stress(run: FinishedRun) -> Values:
+    """Return the hoop stress along the contact surfaces, on either side."""
+    sides = [run.samples.on_surface("stress", body, run.loaded)[2] for body in run.view.surfaces]
+    return {HOOP_STRESS: np.stack(sides)}

@@ -1,7 +1,10 @@
 """Outputs that scene files ask for by a word.
 
 An output says its word where it is defined, and what a scene must have for it. It is a function of
-a run, or a frozen dataclass that is called with a run and whose fields are its parameters.
+a run, or a frozen dataclass that is called with a run and whose fields are its parameters; a field
+``body`` is the name of a body. Such a class may have ``watch(system, converged)``, which gives
+numbers of every increment (quantities over the dimension ``increment``), and ``warnings(run)``,
+which gives texts for the user.
 """
 
 from __future__ import annotations

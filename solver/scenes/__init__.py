@@ -6,18 +6,17 @@ scene's ``branch`` parameter share the increments they have in common.
 
 from __future__ import annotations
 
+import solver.results.corner
+import solver.results.increments
+import solver.results.indentation
 import solver.results.places
-import solver.results.pressure_error  # noqa: F401  (declare what scenes of files store)
-from solver.scenes.ball import BALL
+import solver.results.pressure_error
+import solver.results.stick  # noqa: F401  (declare what scenes of files store)
 from solver.scenes.effort import Effort
-from solver.scenes.elastic_punch import ELASTIC_PUNCH
 from solver.scenes.punch import PUNCH
 from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
-from solver.scenes.shaft_hub import SHAFT_HUB
 
-SCENES: dict[str, Scene] = {
-    scene.name: scene for scene in (PUNCH, ELASTIC_PUNCH, SHAFT_HUB, BALL, ROLLING)
-}
+SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING)}
 
 __all__ = ["SCENES", "Effort", "Monitor", "Scene"]

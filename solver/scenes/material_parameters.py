@@ -11,7 +11,6 @@ from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import HARDENING, LinearRule, NoHardening
 from solver.materials.law import Law
-from solver.materials.material import Material
 from solver.materials.yield_conditions import YIELD_CONDITIONS
 from solver.model.friction import FRICTION, FrictionLaw
 from solver.model.model import ContactPair
@@ -20,8 +19,12 @@ from solver.parts import Parts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElasticParameters:
-    """The elastic material every scene asks for, and how accurate the answer is to be."""
+@YIELD_CONDITIONS.fields
+class YieldParameters:
+    """Accuracy, elasticity, and at which stress a material yields, by any condition.
+
+    It has no yield stress yet, which follows the parameters of conditions and hardening rules.
+    """
 
     PARTS: ClassVar[tuple[Parts[Any], ...]] = ()
 
@@ -30,6 +33,7 @@ class ElasticParameters:
     )
     youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
     poisson_ratio: Poisson = described(0.3, "Poisson ratio")
+    yield_condition: str = described("mises", "condition of first yield, and of flow")
 
     def __post_init__(self) -> None:
         check(self)
@@ -46,18 +50,6 @@ class ElasticParameters:
     def usual(self) -> Mapping[str, float]:
         """Return the values of the parameters that ``accuracy`` sets."""
         return {}
-
-    def elastic_material(self) -> Material:
-        """Return a material that never yields."""
-        return Material(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-@YIELD_CONDITIONS.fields
-class YieldParameters(ElasticParameters):
-    """At which stress a material yields, with the parameters of all conditions."""
-
-    yield_condition: str = described("mises", "condition of first yield, and of flow")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +68,7 @@ class MaterialParameters(HardeningParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        ElasticParameters.__post_init__(self)
+        YieldParameters.__post_init__(self)
         self.material()  # refuses what does not go together
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:

@@ -13,25 +13,23 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.1.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Interval, Unit
 
+from solver.errors import ModelError
 from solver.loading.program import Program, load_and_release, walked
+from solver.mesh import grid, refined
 from solver.mesh.lines import cells
+from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.singular import SingularPoint
-from solver.parameters import (
-    Accuracy,
-    Length,
-    Ratio,
-    by_accuracy,
-    described,
-)
+from solver.parameters import Accuracy, Length, Ratio, by_accuracy, described
 from solver.results.contact import contact
 from solver.results.extremes import residual_extremes
 from solver.results.figures import cost, extremes
@@ -40,8 +38,7 @@ from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
 from solver.results.view import View
-from solver.scenes.effort import Effort
-from solver.scenes.flat_punch import FlatPunch, Growth, HalfPlaneSize, PunchHeight, SmallestElement
+from solver.scenes.effort import Effort, Lattice, lattice
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
 
@@ -56,9 +53,19 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "fine": {"smallest_element": 1e-4, "growth": 1.2, "load_step": 0.025},
 }
 """What an accuracy sets; errors: docs/accuracy.md."""
-_LARGEST = 0.08  # of a, under the punch
+_LARGEST, _PUNCH_LARGEST = 0.08, 0.25  # of a: elements under the punch, and up the punch
+_MOST_ELEMENTS = 60_000
 _NEAREST = 0.005  # of a: the distance from the corner at which the first published number is read
 _MEETING = 1.5  # sides of an element: how far those reach that meet in the corner, sqrt(2)
+
+
+class Lines(NamedTuple):
+    """Lines of the meshes [mm]: x under the punch and beyond it, y up the punch and down below."""
+
+    under: NDArray[np.float64]
+    beyond: NDArray[np.float64]
+    up: NDArray[np.float64]
+    down: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,14 +77,22 @@ class PunchParameters(ContactParameters):
         "plane_stress", "two-dimensional state; axisymmetric is a flat-ended cylinder"
     )
     half_width: Length = described(50.0, "half-width a of the punch")
-    punch_height: PunchHeight = described(2.0, "height of the punch / a")
-    half_plane_size: HalfPlaneSize = described(40.0, "width and depth of the half-plane / a")
+    punch_height: Annotated[float, Interval(ge=0.5, le=20.0), Unit("1")] = described(
+        2.0, "height of the punch / a"
+    )
+    half_plane_size: Annotated[float, Interval(ge=2.0, le=1000.0), Unit("1")] = described(
+        40.0, "width and depth of the half-plane / a"
+    )
     punch_stiffness: Annotated[float, Interval(ge=1e-4, le=1e4), Unit("1")] = described(
         1.0, "Young's modulus of the punch / that of the half-plane"
     )
     elastic_punch: bool = described(False, "whether the punch never yields")
-    smallest_element: SmallestElement = by_accuracy("smallest element side, at the corner / a")
-    growth: Growth = by_accuracy("ratio of neighbouring element sides away from the corner")
+    smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = by_accuracy(
+        "smallest element side, at the corner / a"
+    )
+    growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = by_accuracy(
+        "ratio of neighbouring element sides away from the corner"
+    )
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
         "quad8", "element of both bodies"
     )
@@ -89,20 +104,27 @@ class PunchParameters(ContactParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ContactParameters.__post_init__(self)
-        self.geometry.check_elements(self.smallest_element)
+        elements = sum(each.elements for each in self.lattices("quad8"))
+        if elements > _MOST_ELEMENTS:
+            raise ModelError(
+                "smallest_element", self.smallest_element,
+                f"makes {elements} elements with growth {self.growth:g}; at most "
+                f"{_MOST_ELEMENTS} are allowed: raise growth or smallest_element",
+            )  # fmt: skip
 
     @property
-    def geometry(self) -> FlatPunch:
-        """Dimensions and elements of punch and half-plane [mm]."""
+    def lines(self) -> Lines:
+        """Lines of the meshes: through the corner, and ever closer towards it."""
         a = self.half_width
-        return FlatPunch(
-            half_width=a,
-            height=self.punch_height * a,
-            size=self.half_plane_size * a,
-            smallest=self.smallest_element * a,
-            growth=self.growth,
-            largest=_LARGEST * a,
-        )
+        return _lines(
+            a, self.punch_height * a, self.half_plane_size * a, self.smallest_element * a,
+            self.growth,
+        )  # fmt: skip
+
+    def lattices(self, element: str) -> tuple[Lattice, Lattice]:
+        """Return what the grids of punch and half-plane have."""
+        under, beyond, up, down = (len(each) - 1 for each in self.lines)
+        return lattice(under, up, element), lattice(under + beyond, down, element)
 
     @property
     def corner(self) -> SingularPoint:
@@ -119,17 +141,46 @@ class PunchParameters(ContactParameters):
         return _USUAL[self.accuracy]
 
 
-def model(parameters: PunchParameters) -> Model:
-    """Return the half model: bodies, supports, pressure and contact."""
-    bodies = parameters.geometry.bodies(
-        punch=parameters.material(parameters.punch_stiffness, elastic=parameters.elastic_punch),
-        half_plane=parameters.material(),
-        kinematics=parameters.state,
-        element=parameters.element,
-        pressure=parameters.yield_stress,
+@lru_cache(maxsize=256)
+def _lines(a: float, height: float, size: float, smallest: float, growth: float) -> Lines:
+    away = (smallest, math.inf)
+    return Lines(
+        under=refined((0.0, a), away[::-1], growth, [_LARGEST * a]),
+        beyond=refined((a, size), away, growth, [size / 4]),
+        up=refined((0.0, height), away, growth, [_PUNCH_LARGEST * a]),
+        down=-refined((0.0, size), away, growth, [size / 4])[::-1],
     )
-    contact = parameters.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
-    return Model(bodies=bodies, contacts=(contact,), singular=(parameters.corner,))
+
+
+def model(parameters: PunchParameters) -> Model:
+    """Return the half model: bodies, supports, pressure and contact.
+
+    The middle is held along x, the bottom of the half-plane along y; the punch is held by contact
+    alone.
+    """
+    from solver.mesh.elements import element_type  # only who computes needs the solver
+
+    p, (under, beyond, up, down) = parameters, parameters.lines
+    cells = element_type(p.element).cells
+    punch = Body(
+        name="punch",
+        mesh=grid(under, up, cells),
+        material=p.material(p.punch_stiffness, elastic=p.elastic_punch),
+        kinematics=p.state,
+        element=p.element,
+        supports={"left": "x"},
+        pressure={"top": p.yield_stress},
+    )
+    half_plane = Body(
+        name="half_plane",
+        mesh=grid(np.concatenate([under, beyond[1:]]), down, cells),
+        material=p.material(),
+        kinematics=p.state,
+        element=p.element,
+        supports={"left": "x", "bottom": "y"},
+    )
+    contact = p.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
+    return Model(bodies=(punch, half_plane), contacts=(contact,), singular=(p.corner,))
 
 
 def program(parameters: PunchParameters) -> Program:
@@ -140,7 +191,7 @@ def program(parameters: PunchParameters) -> Program:
 def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
     """Return the work of loading up to each load ratio in turn, and of releasing each."""
     element = parameters.element
-    punch, plane = parameters.geometry.lattices(element)
+    punch, plane = parameters.lattices(element)
     # an elastic punch is reduced to its contact surface; x is held on the line of symmetry
     own = 2 * punch.along - 1 if parameters.elastic_punch else 2 * punch.nodes - punch.up
     increments = _increments(tuple(load_ratios), parameters.load_step, parameters.unload_steps)

@@ -58,7 +58,8 @@ class Scene:
     method : (parameters) -> how runs that differ in ``branch`` are computed; `by_increments`
         where there is none
     trace : (samples, states of a lap) -> what is kept of each lap
-    watch : (samples, converged increment) -> what is kept of it in ``outcome.history``
+    watch : (parameters, samples, converged increment) -> what is kept of it in
+        ``outcome.history``
     refinement : (parameters) -> how increments are halved, or None to take those of the program
     effort : (parameters, values of ``branch``) -> the work of walking this path, told in
         microseconds, without a mesh; without it a study is estimated by its runs alone
@@ -82,7 +83,7 @@ class Scene:
     places: Callable[[Any], NamedPlaces] | None = None
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
-    watch: Callable[[Samples, Any], Any] | None = None
+    watch: Callable[[Any, Samples, Any], Any] | None = None
     refinement: Callable[[Any], StepRefinement | None] | None = None
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
     warnings: Callable[[FinishedRun], tuple[str, ...]] | None = None
@@ -194,7 +195,7 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
         trace=partial(scene.trace, samples) if scene.trace else None,
         refinement=scene.refinement(last) if scene.refinement else None,
         report=_counted(programs, monitor),
-        watch=partial(scene.watch, samples) if scene.watch else None,
+        watch=partial(scene.watch, last, samples) if scene.watch else None,
     )
     view = samples.view
     for run, outcome in zip(runs, walker.walk(programs), strict=True):

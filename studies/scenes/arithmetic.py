@@ -1,8 +1,10 @@
 """Arithmetic in scene files: ``"2*$radius"`` is a number once the parameters are known.
 
-An expression has numbers, parameters (``$name``), ``pi``, ``+ - * / ^``, parentheses and the
-functions of `FUNCTIONS`. Two of them compared, ``"$gap < 2*$radius"``, are true or false. Python's
-own parser reads it; nothing else of Python is evaluated.
+An expression has numbers, words (``'ball'``), parameters (``$name``), ``pi``, ``+ - * / ^``,
+parentheses and the functions of `FUNCTIONS`. Two numbers compared, ``"$gap < 2*$radius"``, or two
+words, ``"$yielding == 'ball'"``, are true or false; such conditions are joined by ``and``, ``or``
+and ``not``, and ``if(condition, one, other)`` chooses between two values. Python's own parser reads
+it; nothing else of Python is evaluated.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import lru_cache
+from typing import Any, TypeGuard
 
 LONGEST = 200
 """Characters an expression may have."""
@@ -22,6 +25,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
     "exp": (math.exp, 1),
     "log": (math.log, 1),
     "abs": (abs, 1),
+    "round": (round, 1),
     "sin": (math.sin, 1),
     "cos": (math.cos, 1),
     "tan": (math.tan, 1),
@@ -42,16 +46,21 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
-_COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = {
+_COMPARISONS: Mapping[type[ast.AST], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
 }
+_EQUALITY = (ast.Eq, ast.NotEq)
 _PARAMETER = re.compile(r"\$([A-Za-z_]\w*)", re.ASCII)
-_MARK = "parameter__"
-"""What stands for ``$`` where Python reads the text."""
-_FOREIGN = re.compile(rf"\*\*|//|{_MARK}|[^\w\s$.,()*/^+<>=-]", re.ASCII)
+_WORD = re.compile(r"'[A-Za-z0-9_ .-]*'", re.ASCII)
+_CHOICE = re.compile(r"\bif\s*\(", re.ASCII)
+_MARK, _IF = "parameter__", "if__"
+"""What stands for ``$`` and for ``if`` where Python reads the text."""
+_FOREIGN = re.compile(rf"\*\*|//|{_MARK}|{_IF}|[^\w\s$.,()*/^+<>=!-]", re.ASCII)
 
 
 class ExpressionError(ValueError):
@@ -72,7 +81,7 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     """Return the value of an expression.
 
     A text that is one parameter and nothing else, such as ``"$hardening"``, has its value, which
-    may be a word or a truth value; a comparison is true or false; all others are arithmetic.
+    may be a word or a truth value; all others are numbers, words, or true or false.
 
     Parameters
     ----------
@@ -81,71 +90,126 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     Raises
     ------
     ExpressionError
-        where the text is no arithmetic, names an unknown parameter, or is no finite number
+        where the text cannot be read, names an unknown parameter, or is no finite number
     """
     if len(text) > LONGEST:
         raise ExpressionError(f"must be at most {LONGEST} characters long")
     if whole := _PARAMETER.fullmatch(text):
         return _known(whole[1], values)
     try:
-        read = _read(text)
-        if isinstance(read, ast.Compare):
-            return _compared(read, values)
-        number = _value(read, values)
-        if not math.isfinite(number):
+        value = _value(_read(text), values)
+        if _is_number(value) and not math.isfinite(value):
             raise ExpressionError("must be a finite number")
     except ExpressionError:
         raise
     except (ArithmeticError, ValueError) as error:
         raise ExpressionError(f"has no value: {error}") from None
-    return number
+    return value
 
 
+@lru_cache(maxsize=1024)
 def _read(text: str) -> ast.expr:
-    if found := _FOREIGN.search(text):
+    bare = _WORD.sub(lambda word: " " * len(word[0]), text)
+    if found := _FOREIGN.search(bare):
         raise ExpressionError(f"cannot be read from {text[found.start() :]!r} on")
     python = _PARAMETER.sub(rf" {_MARK}\1 ", text).replace("^", "**")
+    python = _CHOICE.sub(f"{_IF}(", python)
     try:
         return ast.parse(" ".join(python.split()), mode="eval").body
     except SyntaxError:
-        allowed = f"numbers, $parameters, pi, + - * / ^ ( ) and {', '.join(FUNCTIONS)}"
+        allowed = (
+            "numbers, 'words', $parameters, pi, + - * / ^ ( ), < <= > >= == !=, and, or, not, "
+            f"if(condition, one, other) and {', '.join(FUNCTIONS)}"
+        )
         raise ExpressionError(f"cannot be read as arithmetic: {allowed}") from None
 
 
+def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
+    """Return a number, a word, or whether a condition holds."""
+    match node:
+        case ast.Constant(value=str() as word):
+            return word
+        case ast.Name(id=name) if name.startswith(_MARK):
+            return _known(name.removeprefix(_MARK), values)
+        case ast.Compare():
+            return _compared(node, values)
+        case ast.BoolOp(op=ast.And(), values=each):
+            return all(_condition(one, values) for one in each)
+        case ast.BoolOp(values=each):
+            return any(_condition(one, values) for one in each)
+        case ast.UnaryOp(op=ast.Not(), operand=one):
+            return not _condition(one, values)
+        case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name == _IF:
+            if len(given) != 3:
+                raise ExpressionError(f"if takes a condition and two values, not {len(given)}")
+            test, one, other = given
+            return _value(one if _condition(test, values) else other, values)
+    return _number(node, values)
+
+
 def _compared(node: ast.Compare, values: Mapping[str, Any]) -> bool:
-    """Return whether a comparison of numbers holds."""
-    test = _COMPARISONS.get(type(node.ops[0]))
-    if len(node.ops) != 1 or test is None:
-        raise ExpressionError("must compare two numbers by one of <, <=, >, >=")
-    return test(_value(node.left, values), _value(node.comparators[0], values))
+    """Return whether a comparison of two numbers, or two words, holds."""
+    if len(node.ops) != 1 or type(node.ops[0]) not in _COMPARISONS:
+        raise ExpressionError(
+            "must compare two values by one of <, <=, >, >=, ==, !=; join more by and, or"
+        )
+    one, other = (_value(each, values) for each in (node.left, node.comparators[0]))
+    alike = isinstance(node.ops[0], _EQUALITY) and type(one) is type(other)
+    for each in () if alike else (one, other):
+        if not _is_number(each):
+            raise ExpressionError(f"cannot compare {_shown(one)} and {_shown(other)}")
+    return _COMPARISONS[type(node.ops[0])](one, other)
 
 
-def _value(node: ast.expr, values: Mapping[str, Any]) -> float:
+def _condition(node: ast.expr, values: Mapping[str, Any]) -> bool:
+    value = _value(node, values)
+    if not isinstance(value, bool):
+        raise ExpressionError(f"{_text(node)} is {_shown(value)}: must be true or false")
+    return value
+
+
+def _number(node: ast.expr, values: Mapping[str, Any]) -> float:
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return number
         case ast.Name(id="pi"):
             return math.pi
-        case ast.Name(id=name) if name.startswith(_MARK):
-            name = name.removeprefix(_MARK)
-            value = _known(name, values)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ExpressionError(f"${name} is {value!r}: only numbers can be computed with")
-            return value
         case ast.UnaryOp(op=sign, operand=one) if type(sign) in _OPERATORS:
-            return _OPERATORS[type(sign)](_value(one, values))
+            return _OPERATORS[type(sign)](_operand(one, values))
         case ast.BinOp(left=one, op=sign, right=other) if type(sign) in _OPERATORS:
-            return _OPERATORS[type(sign)](_value(one, values), _value(other, values))
+            return _OPERATORS[type(sign)](_operand(one, values), _operand(other, values))
         case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name in FUNCTIONS:
             function, count = FUNCTIONS[name]
             if len(given) != count:
                 raise ExpressionError(f"{name} takes {count} number(s), not {len(given)}")
-            return function(*(_value(each, values) for each in given))
+            return function(*(_operand(each, values) for each in given))
         case ast.Name(id=name) | ast.Call(func=ast.Name(id=name)):
-            known = ", ".join(("pi", *FUNCTIONS))
-            raise ExpressionError(f"{name} is unknown: write ${name} for a parameter; {known}")
-    text = ast.unparse(node).replace(_MARK, "$")
-    raise ExpressionError(f"{text} cannot be read as arithmetic")
+            known = ", ".join(("pi", "if", *FUNCTIONS))
+            raise ExpressionError(
+                f"{name} is unknown: write ${name} for a parameter, '{name}' for a word; {known}"
+            )
+    raise ExpressionError(f"{_text(node)} cannot be read as arithmetic")
+
+
+def _operand(node: ast.expr, values: Mapping[str, Any]) -> float:
+    """Return a value that is computed with."""
+    value = _value(node, values)
+    if _is_number(value):
+        return value
+    raise ExpressionError(f"{_text(node)} is {_shown(value)}: only numbers can be computed with")
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _shown(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _text(node: ast.expr) -> str:
+    """Return an expression as it is written in a file."""
+    return ast.unparse(node).replace(_MARK, "$").replace(_IF, "if")
 
 
 def _known(name: str, values: Mapping[str, Any]) -> Any:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from solver.errors import ModelError
-from solver.loading.program import Lap, Program, Stage, load_and_release
-from solver.mesh import within
+from solver.loading.program import Lap, Program, Stage, load_and_release, load_cycles
+from solver.mesh import within, without
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FRICTION
 from solver.model.loads import LOADS
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.model.body import Body
+    from solver.model.friction import FrictionLaw
     from solver.model.loads import Load
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import RigidBody
@@ -65,7 +67,10 @@ class Builder:
         from solver.model.singular import SingularPoint
 
         t = self.scene
-        laws = {name: self._law(name, table) for name, table in t.materials.items()}
+        laws = {
+            name: self.tried(f"materials.{name}", partial(law_of, table))
+            for name, table in t.materials.items()
+        }
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
@@ -98,13 +103,6 @@ class Builder:
         return any(not field.startswith(_BESIDE) for field in fields)
 
     # -- bodies ------------------------------------------------------------------------------
-
-    def _law(self, name: str, table: Any) -> Law | None:
-        given = table.model_dump(exclude_unset=True, exclude_none=True)
-        elastic = "yield_stress" not in given
-        return self.tried(
-            f"materials.{name}", lambda: MaterialParameters(**given).material(elastic=elastic)
-        )
 
     def _body(
         self, name: str, table: tables.BodyTable, laws: Mapping[str, Law | None]
@@ -212,7 +210,7 @@ class Builder:
             lambda: ContactPair(
                 slave=(slave[0], slave[1]),
                 master=(master[0], master[1]),
-                friction=FRICTION.made(table.friction_law, table),
+                friction=friction_of(table),
                 sliding=table.sliding,
                 gap=table.gap,
                 interference=table.interference,
@@ -242,7 +240,9 @@ class Builder:
         loading = self.scene.loading
         if loading is not None:
             step = loading.step or loading.factor
-            return load_and_release(loading.factor, step, loading.release_increments)
+            if loading.cycles is None:
+                return load_and_release(loading.factor, step, loading.release_increments)
+            return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
         stages = tuple(
             Stage(
                 name=stage.name,
@@ -264,6 +264,23 @@ def _place(names: list[str]) -> Any:
         return f"{time - k:.4g} of stage {names[k]}"
 
     return words
+
+
+def law_of(table: Any) -> Law:
+    """Return the law of a material.
+
+    Raises
+    ------
+    ModelError
+        naming the entry, if those of its rule are wrong or do not go with its yield condition
+    """
+    given = table.given()
+    return MaterialParameters(**given).material(elastic="yield_stress" not in given)
+
+
+def friction_of(table: tables.PairTable) -> FrictionLaw:
+    """Return the law of friction of a contact pair."""
+    return FRICTION.made(table.friction_law, table)
 
 
 def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
@@ -296,9 +313,14 @@ def _made(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mes
 
 
 def _placed(mesh: Mesh, table: tables.BodyTable) -> Mesh:
-    """Return a mesh where its body stands, with the boundaries of its table."""
+    """Return a mesh where its body stands, with the cuts and the boundaries of its table."""
     if any(table.move):
         mesh = mesh.translated(table.move)
+    for name, cut in table.cuts.items():
+        try:
+            mesh = without(mesh, name, cut.x, cut.y)
+        except ModelError as error:
+            raise ModelError(f"cuts.{error.field}", error.value, error.allowed) from None
     own = {
         new: within(mesh, new, each.of, each.x, each.y).boundaries[new]
         for new, each in table.boundaries.items()

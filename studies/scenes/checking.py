@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from keyword import iskeyword
 from typing import Any, get_args
 
+import numpy as np
+
 from solver.errors import ModelError
 from solver.parameters import Accuracy
 from solver.results.outputs import Need, outputs
@@ -38,7 +40,7 @@ def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[S
     yield from _outputs(scene)
     yield from _names(scene)
     for k, check in enumerate(scene.checks):
-        yield from _one_of(f"checks[{k}].parameter", check.parameter, scene.declared)
+        yield from _one_of(f"checks[{k}].parameter", check.parameter, scene.names)
 
 
 def unmet(scene: tables.SceneFile, values: Mapping[str, Any]) -> Iterator[StudyError]:
@@ -129,10 +131,13 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             yield StudyError(f"{where}.part", body.part, "goes with mesh")
         if body.mesh is not None and meshes is not None and body.mesh not in meshes:
             yield StudyError(f"{where}.mesh", body.mesh, "there is no such file with the scene")
-        for other, span in ((o, s) for o, b in body.boundaries.items() for s in (b.x, b.y)):
+        boxes: dict[str, tables.BoundaryTable | tables.CutTable] = {}
+        boxes |= {f"boundaries.{other}": box for other, box in body.boundaries.items()}
+        boxes |= {f"cuts.{other}": cut for other, cut in body.cuts.items()}
+        for other, span in ((o, s) for o, box in boxes.items() for s in (box.x, box.y)):
             if span is not None and not span[0] < span[1]:
                 allowed = "must be two increasing numbers"
-                yield StudyError(f"{where}.boundaries.{other}", list(span), allowed)
+                yield StudyError(f"{where}.{other}", list(span), allowed)
     for name, rigid in scene.rigid.items():
         for axis in ("x", "y", "rotation"):
             motion = getattr(rigid, axis)
@@ -182,6 +187,10 @@ def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield from _one_of("results.profile.body", taken.profile.body, scene.bodies)
     for side in taken.surfaces:
         yield from _one_of("results.surfaces", side.partition(".")[0], scene.bodies)
+    for word in taken.words:
+        body = getattr(getattr(taken, word, None), "body", None)
+        if body is not None:
+            yield from _one_of(f"results.{word}.body", body, scene.bodies)
     if not math.isclose(math.hypot(*taken.axis.along), 1.0, rel_tol=1e-9):
         yield StudyError("results.axis.along", list(taken.axis.along), "must have the length 1")
     for name, line in scene.results.lines.items():
@@ -203,10 +212,7 @@ def lacking(scene: tables.SceneFile) -> Iterator[StudyError]:
         "map": (taken.map is not None, "results.map"),
         "profile": (taken.profile is not None, "results.profile"),
         "s": (taken.s is not None, "results.s"),
-        "surfaces": (
-            {side.partition(".")[0] for side in taken.surfaces} == scene.bodies.keys(),
-            "a surface of each body in results.surfaces",
-        ),
+        "surfaces": (bool(taken.surfaces), "results.surfaces"),
         "contact": (bool(scene.contacts), "contacts"),
         "release": (bool(scene.released), "a last stage that releases the bodies"),
     }
@@ -215,9 +221,27 @@ def lacking(scene: tables.SceneFile) -> Iterator[StudyError]:
                    if not is_there]  # fmt: skip
         if missing:
             yield StudyError("results.outputs", word, f"needs {', '.join(missing)}")
+    bodies = [side.partition(".")[0] for side in taken.surfaces]
+    if taken.profile and bodies:
+        yield from _one_of("results.profile.body", taken.profile.body, bodies)
 
 
-def _spaced(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
+def _spaced(where: str, axis: tables.Spaced) -> Iterator[StudyError]:
+    if isinstance(axis, tables.SpacedTable):
+        yield from _piece(where, axis)
+        return
+    wrong = [
+        mistake
+        for k, each in enumerate(axis)
+        if isinstance(each, tables.SpacedTable)
+        for mistake in _piece(f"{where}[{k}]", each)
+    ]
+    yield from wrong
+    if not wrong and not (np.diff(tables.positions(axis)) > 0).all():
+        yield StudyError(where, "several pieces", "must follow each other, in increasing places")
+
+
+def _piece(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
     start, stop = axis.start, axis.stop
     if not start < stop:
         yield StudyError(f"{where}.stop", stop, f"must be > start = {start:g}")
@@ -228,7 +252,8 @@ def _spaced(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
         yield StudyError(f"{where}.near", axis.near, f"must be from {start:g} to {stop:g}")
     else:
         try:
-            axis.positions()
+            if not axis.positions().size:
+                yield StudyError(f"{where}.within", axis.within, "must hold a point")
         except ModelError as error:
             yield StudyError(f"{where}.{error.field}", error.value, error.allowed)
 
@@ -269,7 +294,7 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
             own_name = "two have this name: each needs one of its own"
             allowed = "stands twice" if field.startswith("results.") else own_name
             yield StudyError(field, name, allowed)
-    taken = {*QUANTITIES, *RESERVED, *scene.declared}
+    taken = {*QUANTITIES, *RESERVED, *scene.names}
     for name in scene.outputs:
         own = {name, *(f"{name}_{axis}" for axis in AXES)}
         for each in sorted(own & taken):

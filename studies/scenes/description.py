@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Self
 
 from pydantic import ValidationError
 
+from solver.parts import Declared
 from studies.errors import SceneError, StudyError
 from studies.scenes import meshfile
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
@@ -19,7 +20,7 @@ from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
-from studies.scenes.tables import ACCURACY, ParameterTable, SceneFile
+from studies.scenes.tables import ACCURACY, OPEN, ParameterTable, SceneFile
 from studies.toml import toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
@@ -28,8 +29,14 @@ PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
 LARGEST = 1e100
 """Largest number that a parameter may have by default."""
 
+WHEN = "when"
+"""Entry of a table that is left out where it is false."""
+
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
+
+_LEFT_OUT = object()
+"""What stands for a table whose condition is false."""
 
 Mistakes = dict[Where, StudyError | None]
 """What is wrong by its place; None where the cause is told elsewhere."""
@@ -97,6 +104,10 @@ class Description:
                 meshes[name] = MeshFile(name, _bytes(path.parent / name))
         return cls(path.name, content, meshes, shipped)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what another process makes it of: not what was found of it here."""
+        return Description, (self.file, self.content, self.meshes, self.shipped)
+
     @cached_property
     def digest(self) -> str:
         """Content id of the file and its meshes, 32 hexadecimal digits; words do not count."""
@@ -125,6 +136,39 @@ class Description:
             return SceneFile.model_validate_json(_json(self._bare() | stub), strict=True).parameters
         except ValidationError as error:
             raise SceneError(self.file, [*mistakes_of(error, SceneFile).values()]) from None
+
+    @cached_property
+    def opened(self) -> Declared:
+        """The parameters that open tables bring, and that the file does not declare itself."""
+        given = self.content.get("parameters")
+        own = given.keys() if isinstance(given, Mapping) else ()
+        return {
+            name: each
+            for key, entries in OPEN.items()
+            for name, each in entries.items()
+            if name not in own and any(name not in table for table in _open(self.content.get(key)))
+        }
+
+    @cached_property
+    def written_out(self) -> Mapping[str, Any]:
+        """The content, open tables with all entries that are parameters."""
+        found = dict(self.content)
+        for key, entries in OPEN.items():
+            whole = {name: f"${name}" for name in entries}
+            given = found.get(key)
+            if isinstance(given, Mapping):
+                found[key] = {n: whole | {**t} if _is_open(t) else t for n, t in given.items()}
+            elif isinstance(given, list | tuple):
+                found[key] = [whole | {**t} if _is_open(t) else t for t in given]
+        return found
+
+    def parameter_of(self, where: str) -> str:
+        """Return the parameter that an entry of an open table is, or the entry."""
+        table, _, entry = where.rpartition(".")
+        name, _, which = table.replace("[", ".").rstrip("]").partition(".")
+        given: Any = self.content.get(name, {})
+        own: Any = given.get(which) if isinstance(given, Mapping) else given[int(which)]
+        return entry if _is_open(own) and entry not in own else where
 
     def tables(self, values: Mapping[str, Any]) -> SceneFile:
         """Return the tables for values of all parameters.
@@ -157,7 +201,7 @@ class Description:
     def used(self) -> set[str]:
         """Return the parameters that some entry names, through derived numbers too."""
         derived = self._derived
-        told = _without_words(self.content)
+        told = _without_words(self.written_out)
         rest = {key: value for key, value in told.items() if key not in PLAIN}
         found = set().union(*(names(text) for _, text in _expressions(rest)))
         for name in reversed(list(derived)):
@@ -176,7 +220,8 @@ class Description:
         if isinstance(usual, Mapping):
             set_by_it = {k: v for k, v in usual.items() if k in defaults and defaults[k] is None}
             defaults |= {ACCURACY: "standard"} | set_by_it
-        return {name: each if _can_be(each) else None for name, each in defaults.items()}
+        known = {name: each if _can_be(each) else None for name, each in defaults.items()}
+        return known | {name: field.default for name, (_, field) in self.opened.items()}
 
     def _levels(self, mistakes: Mistakes) -> Any:
         """Return the table of accuracies; texts in it are arithmetic without parameters."""
@@ -214,10 +259,9 @@ class Description:
             elif where not in mistakes and not _can_be(value):
                 mistakes[where] = StudyError(dotted(where), text, "must be a number")
             known[name] = None if where in mistakes else value
-        tree: dict[str, Any] = {
-            key: value if key in PLAIN else _replaced((key,), value, known, mistakes)
-            for key, value in self.content.items()
-        }
+        plain = {key: value for key, value in self.content.items() if key in PLAIN}
+        rest = {key: value for key, value in self.written_out.items() if key not in PLAIN}
+        tree: dict[str, Any] = plain | _replaced((), rest, known, mistakes)
         if ACCURACY in tree:
             tree[ACCURACY] = self._levels(mistakes)
         return _Evaluated(tree, mistakes)
@@ -235,6 +279,16 @@ def mesh_names(content: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(plain))
 
 
+def _open(tables: Any) -> list[Mapping[str, Any]]:
+    """Return the open ones of a collection of tables."""
+    each = tables.values() if isinstance(tables, Mapping) else tables
+    return [table for table in each if _is_open(table)] if isinstance(each, Iterable) else []
+
+
+def _is_open(table: Any) -> bool:
+    return isinstance(table, Mapping) and table.get("open") is True
+
+
 def _bytes(path: Path) -> bytes:
     try:
         if path.stat().st_size > meshfile.LARGEST:
@@ -245,17 +299,44 @@ def _bytes(path: Path) -> bytes:
 
 
 def _replaced(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
-    """Return a part of the tree with numbers and words in place of expressions."""
+    """Return a part of the tree with numbers and words in place of expressions.
+
+    Tables that are left out are not in it, and lists are numbered without them.
+    """
     if isinstance(value, Mapping):
-        return {
-            str(key): each
-            if key == "description" and len(where) == 2 and where[0] in DESCRIBED
-            else _replaced((*where, str(key)), each, known, mistakes)
-            for key, each in value.items()
-        }
+        tree = {}
+        for key, each in value.items():
+            at = (*where, str(key))
+            if key == "description" and len(where) == 2 and where[0] in DESCRIBED:
+                tree[str(key)] = each
+            elif (there := _there(at, each, known, mistakes)) is not _LEFT_OUT:
+                tree[str(key)] = _replaced(at, there, known, mistakes)
+        return tree
     if isinstance(value, list | tuple):
-        return [_replaced((*where, k), each, known, mistakes) for k, each in enumerate(value)]
+        found: list[Any] = []
+        for each in value:
+            at = (*where, len(found))
+            if (there := _there(at, each, known, mistakes)) is not _LEFT_OUT:
+                found.append(_replaced(at, there, known, mistakes))
+        return found
     return _value(where, value, known, mistakes)
+
+
+def _there(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
+    """Return an entry without its condition; `_LEFT_OUT` where this is false.
+
+    A table that names what does not exist stays, so that this is told whatever its condition.
+    """
+    if not isinstance(value, Mapping) or isinstance(value.get(WHEN), Mapping | None):
+        return value
+    told = value[WHEN]
+    holds = _value((*where, WHEN), told, known, mistakes)
+    rest = {key: each for key, each in value.items() if key != WHEN}
+    if (*where, WHEN) not in mistakes and not isinstance(holds, bool):
+        allowed = "must be true or false, such as $depth > 0 or $kind == 'round'"
+        mistakes[(*where, WHEN)] = StudyError(dotted((*where, WHEN)), told, allowed)
+    lost = holds is False and all(names(text) <= known.keys() for _, text in _expressions(rest))
+    return _LEFT_OUT if lost else rest
 
 
 def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:

@@ -1,37 +1,28 @@
-"""What a run of a scene file costs, told from its meshes."""
+"""What a run of a scene file costs, told from its tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from solver.errors import ModelError
-from solver.scenes.effort import Effort, per_place
+from solver.scenes.effort import Effort
 from studies.errors import StudyError
 from studies.scenes import tables
-from studies.scenes.building import load_of, mesh_of_body, usual_element
+from studies.scenes.building import friction_of, load_of, mesh_of_body
+from studies.scenes.lattice import BodySize, is_lattice, size_of_lines, size_of_mesh
 
 if TYPE_CHECKING:
-    from skfem import Mesh
-
     from studies.scenes.description import Description
-
-
-class _MeshSize(NamedTuple):
-    """Elements and nodes of a mesh, and edges of its boundaries."""
-
-    elements: int
-    nodes: int
-    edges: Mapping[str, int]
 
 
 def effort_of(
     description: Description, scene: tables.SceneFile, increments: Sequence[int]
 ) -> Effort:
-    """Return the work of walking a path; unknowns are those of all nodes, supported ones too.
+    """Return the work of walking a path.
 
     Parameters
     ----------
@@ -43,48 +34,82 @@ def effort_of(
     StudyError
         for a body that cannot be meshed with these values
     """
-    elements = unknowns = 0
+    elements, unknowns = 0, _free_motions(scene)
+    sides = [side.split(".") for pair in scene.contacts for side in (pair.slave, pair.master)]
     for name, body in scene.bodies.items():
         size = _size_of(description, name, body)
         elements += size.elements
-        sides = [side.split(".") for pair in scene.contacts for side in (pair.slave, pair.master)]
-        own = {side[1] for side in sides if side[0] == name}
-        material = scene.materials[body.material]
-        driven = any(_changes(load) for load in scene.loads if load.body == name)
-        if getattr(material, "yield_stress", None) is None and own and not driven:
-            # reduced to its contact surfaces
-            unknowns += 2 * sum(2 * size.edges.get(boundary, 0) + 1 for boundary in own)
-        else:
-            unknowns += 2 * size.nodes
+        own = {boundary for of, boundary in sides if of == name}
+        loads = [load_of(load) for load in scene.loads if load.body == name]
+        driven = any(each.components or each.softening(np.zeros((2, 1))) is not None
+                     for each in loads)  # fmt: skip
+        # an elastic body is reduced to its contact surfaces
+        reduced = size.on(own) if own and not driven and is_elastic(scene, body) else None
+        held = [(b, "xy".index(axis)) for b, axes in body.supports.items() for axis in axes]
+        held += [(b, axis) for each in loads for b in each.boundaries for axis in each.components]
+        for axis in (0, 1):
+            fixed = size.on(boundary for boundary, along in held if along == axis)
+            unknowns += size.nodes if reduced is None else size.count(reduced)
+            unknowns -= size.count(fixed if reduced is None else fixed & reduced)
     total = sum(increments)
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
 
 
-def _changes(table: tables.LoadTable) -> bool:
-    """Whether a load moves a boundary or softens the body, which then is not reduced."""
-    load = load_of(table)
-    return bool(load.components) or load.softening(np.zeros((2, 1))) is not None
+def too_large(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield what is wrong with shapes whose meshes need not be made to see it: their size."""
+    for name, body in scene.bodies.items():
+        if is_lattice(body):
+            try:
+                _size_of(description, name, body)
+            except StudyError as error:
+                yield error
 
 
-_SIZES: WeakKeyDictionary[Description, dict[str, _MeshSize]] = WeakKeyDictionary()
+def in_one_increment(scene: tables.SceneFile) -> bool:
+    """Whether one increment solves a run: nothing yields, and all is proportional to the load.
+
+    With friction that is so where surfaces touch all over before loading, as flat ones do.
+    """
+    if scene.loading is None or scene.loading.cycles is not None:
+        return False
+    laws = [(friction_of(pair), pair) for pair in scene.contacts]
+    flat = [pair.sliding == "small" and not pair.gap for law, pair in laws if law.rough]
+    proportional = all(law.proportional for law, _ in laws) and all(flat)
+    return proportional and all(is_elastic(scene, body) for body in scene.bodies.values())
+
+
+def is_elastic(scene: tables.SceneFile, body: tables.BodyTable) -> bool:
+    """Whether the material of a body has no yield stress."""
+    return getattr(scene.materials[body.material], "yield_stress", None) is None
+
+
+def _free_motions(scene: tables.SceneFile) -> int:
+    """Return the number of motions of rigid bodies that forces decide."""
+    motions = [each for body in scene.rigid.values() for each in (body.x, body.y, body.rotation)]
+    return sum(motion.pushed is not None for motion in motions)
+
+
+_SIZES: WeakKeyDictionary[Description, dict[str, BodySize]] = WeakKeyDictionary()
 """What was found of the bodies of each file that is in use, by their tables."""
+_MOST = 256
+"""Bodies of a file that are kept."""
 
 
-def _size_of(description: Description, name: str, body: tables.BodyTable) -> _MeshSize:
+def _size_of(description: Description, name: str, body: tables.BodyTable) -> BodySize:
     """Return the size of a body."""
     known = _SIZES.setdefault(description, {})
     key = body.model_dump_json(exclude={"supports", "material"})
     if key not in known:
         try:
-            known[key] = _size(body, mesh_of_body(body, description.meshes))
+            known[key] = (
+                size_of_lines(body)
+                if is_lattice(body)
+                else size_of_mesh(mesh_of_body(body, description.meshes), body.element)
+            )
         except ModelError as error:
-            where = f"bodies.{name}" if body.shape is None else f"bodies.{name}.shape"
+            beside = body.shape is None or error.field.startswith(("boundaries.", "cuts."))
+            where = f"bodies.{name}" if beside else f"bodies.{name}.shape"
             raise StudyError(f"{where}.{error.field}", error.value, error.allowed) from None
+        while len(known) > _MOST:
+            del known[next(iter(known))]
     return known[key]
-
-
-def _size(body: tables.BodyTable, mesh: Mesh) -> _MeshSize:
-    _, at_corner, on_edge, inside = per_place(body.element or usual_element(mesh))
-    nodes = at_corner * mesh.nvertices + on_edge * mesh.nfacets + inside * mesh.nelements
-    edges = {name: len(facets) for name, facets in (mesh.boundaries or {}).items()}
-    return _MeshSize(mesh.nelements, int(nodes), edges)

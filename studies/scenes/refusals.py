@@ -83,6 +83,10 @@ def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
         if part in mapping:
             node = {"$ref": mapping[part]}
             continue
+        branch = next((o for o in options if _is_branch(part, o)), None)
+        if branch is not None:
+            node = branch
+            continue
         if options and isinstance(part, str) and not any(_TABLES & o.keys() for o in options):
             continue  # the name of a branch: float, str
         node = next(iter(options), node)
@@ -97,6 +101,15 @@ def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
             below = next(iter(named.values()))  # a table with names of the user's own
             node = below if isinstance(below, Mapping) else {}
     return tuple(kept), entries
+
+
+def _is_branch(part: str | int, option: Mapping[str, Any]) -> bool:
+    """Whether a part of a place is the name of this branch of a union: a table, or a list."""
+    if isinstance(part, int):
+        return False
+    if option.get("type") == "array":
+        return part.startswith("tuple[")
+    return part == option.get("title") and "properties" in option
 
 
 def _resolved(schema: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:

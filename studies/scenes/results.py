@@ -28,15 +28,15 @@ def view_of(scene: tables.SceneFile) -> View:
     released, taken = scene.released, scene.results
     under_load = [name for name in names if name != released]
     grid, profile = taken.map, taken.profile
-    surfaces = dict(side.split(".") for side in taken.surfaces)
+    surfaces = dict(side.split(".") for side in taken.surfaces) or dict.fromkeys(scene.bodies, "")
     return View(
-        x=grid.x.positions() if grid else _NOWHERE,
-        y=grid.y.positions() if grid else _NOWHERE,
-        depth=profile.depth.positions() if profile else _NOWHERE,
+        x=tables.positions(grid.x) if grid else _NOWHERE,
+        y=tables.positions(grid.y) if grid else _NOWHERE,
+        depth=tables.positions(profile.depth) if profile else _NOWHERE,
         station=np.array(profile.stations) if profile else _NOWHERE,
-        s=taken.s.positions() if taken.s else _NOWHERE,
-        profile_body=profile.body if profile else next(iter(scene.bodies)),
-        surfaces={name: surfaces.get(name, "") for name in scene.bodies},
+        s=tables.positions(taken.s) if taken.s else _NOWHERE,
+        profile_body=profile.body if profile else next(iter(surfaces)),
+        surfaces=surfaces,
         stages=tuple(names),
         loaded=under_load[-1] if under_load else names[-1],
         unloaded=released,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, make_dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -17,17 +17,19 @@ from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
 from solver.results.record import Status
-from solver.results.run import FinishedRun, Values
+from solver.results.run import FinishedRun, Output, Values
 from solver.scenes.effort import Effort
+from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
-from studies.errors import SceneError
+from studies.errors import SceneError, StudyError
 from studies.scenes import tables
-from studies.scenes.building import Builder
+from studies.scenes.building import Builder, friction_of, law_of
 from studies.scenes.checking import clashes, lacking, unmet
 from studies.scenes.description import Description
-from studies.scenes.effort import effort_of
+from studies.scenes.effort import effort_of, in_one_increment, too_large
 from studies.scenes.examining import examined
 from studies.scenes.results import numbers_of, output_of, places_of, view_of
+from studies.scenes.tables import ACCURACY
 
 if TYPE_CHECKING:
     from solver.contact.state import Converged
@@ -102,8 +104,9 @@ def _made(description: Description, scene: tables.SceneFile) -> FileScene:
             partial(_at_places, description),
         ),
         costs=(cost,),
-        watch=_watched,
+        watch=partial(_watched, description),
         effort=partial(_effort, description),
+        warnings=partial(_warnings, description),
         advice={
             Status[key.upper()]: text for key, text in scene.advice.model_dump().items() if text
         },
@@ -143,6 +146,8 @@ def _program(description: Description, parameters: Any) -> Program:
 def _effort(description: Description, parameters: Any, values: Sequence[Any]) -> Effort:
     scene = _tables(description, parameters)
     branch = _branch(description)
+    if in_one_increment(scene):
+        return effort_of(description, scene, [1] * (len(values) if branch else 1))
     if not branch:
         return effort_of(description, scene, [_program(description, parameters).count])
     runs = [replace(parameters, **{branch: value}) for value in sorted(values)]
@@ -167,11 +172,29 @@ def _at_places(description: Description, run: FinishedRun) -> Values:
     return at_named_places(run, _places(description, run.parameters), times)
 
 
-def _watched(samples: Samples, converged: Converged) -> Any:
+def _watched(
+    description: Description, parameters: Any, samples: Samples, converged: Converged
+) -> Any:
     from solver.results.history import observe  # only who computes needs scipy
 
     system: Any = samples.system
-    return observe(system, converged)
+    watched = {
+        quantity: value
+        for each in _outputs(description, parameters)
+        if (watch := getattr(each, "watch", None))
+        for quantity, value in watch(system, converged).items()
+    }
+    return replace(observe(system, converged), watched=watched)
+
+
+def _warnings(description: Description, run: FinishedRun) -> tuple[str, ...]:
+    told = [getattr(each, "warnings", None) for each in _outputs(description, run.parameters)]
+    return tuple(text for warnings in told if warnings for text in warnings(run))
+
+
+def _outputs(description: Description, parameters: Any) -> list[Output]:
+    scene = _tables(description, parameters)
+    return [output_of(scene, word) for word in scene.results.words]
 
 
 # -- parameters ----------------------------------------------------------------------------------
@@ -191,20 +214,21 @@ def _values(parameters: Any) -> dict[str, Any]:
 
 
 def _branch(description: Description) -> str:
-    """Return the parameter that is the load factor, if there is one and all else is without it.
+    """Return the parameter that is the load factor or the number of cycles, or an empty text.
 
-    Outputs may have it: they are taken of each run.
+    It is one that all else is without. Outputs may have it: they are taken of each run.
     """
     loading = description.content.get("loading", {})
-    factor = loading.get("factor")
-    if not isinstance(factor, str) or factor.removeprefix("$") not in description.parameters:
-        return ""
-    name = factor.removeprefix("$")
     results = description.content.get("results", {})
     places = {key: each for key, each in results.items() if key not in outputs()}
-    rest = {**description.content, "loading": {**loading, "factor": 1.0}, "results": places}
-    others = Description(description.file, rest, description.meshes).used()
-    return "" if name in others else name
+    for entry in ("factor", "cycles"):
+        name = str(loading.get(entry)).removeprefix("$")
+        if loading.get(entry) != f"${name}" or name not in description.parameters:
+            continue
+        rest = {**description.content, "loading": {**loading, entry: 1}, "results": places}
+        if name not in Description(description.file, rest, description.meshes).used():
+            return name
+    return ""
 
 
 def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
@@ -224,6 +248,8 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
         try:
             found = _tables(description, self)
             mistakes = [*unmet(found, _values(self)), *clashes(found, None), *lacking(found)]
+            if not mistakes:
+                mistakes = [*_unlawful(description, found), *too_large(description, found)]
         except SceneError as error:
             mistakes = list(error.mistakes)
         for first in mistakes[:1]:
@@ -232,26 +258,56 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
     def reduced(self: Any) -> tuple[Any, ...]:
         return _again, (description, _values(self))
 
+    def idle(self: Any) -> Mapping[str, str]:
+        """Parameters that no number depends on, each with the one whose word decides that."""
+        every = [parts for parts in ContactParameters.PARTS if parts.kind in names]
+        unused = {name: p.kind for p in every for name in p.unused(getattr(self, p.kind))}
+        return {name: kind for name, kind in unused.items() if name in description.opened}
+
+    own: dict[str, tuple[Any, Any]] = {
+        name: (
+            _kind(each),
+            by_accuracy(each.description)
+            if levels and name in levels.standard
+            else described(_default(each), each.description),
+        )
+        for name, each in declared.items()
+    }
+    opened = {
+        name: (hint, described(item.default, item.metadata["description"]))
+        for name, (hint, item) in description.opened.items()
+    }
+    first = [name for name in (ACCURACY,) if name in own]
+    usual_order = [
+        n for entries in tables.OPEN.values() for n in entries if n in opened or n in own
+    ]
+    names = dict.fromkeys([*first, *(usual_order if opened else ()), *own])
     return make_dataclass(
         "Parameters",
-        [
-            (
-                name,
-                _kind(each),
-                by_accuracy(each.description)
-                if levels and name in levels.standard
-                else described(_default(each), each.description),
-            )
-            for name, each in declared.items()
-        ],
+        [(name, *(own.get(name) or opened[name])) for name in names],
         frozen=True,
         kw_only=True,
         namespace={
             "__post_init__": checked,
             "__reduce__": reduced,
             "__module__": __name__,
+            "idle": property(idle),
         },
     )
+
+
+def _unlawful(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield what laws of materials and of friction refuse, by its parameter where it is one."""
+    made: dict[str, Callable[[], Any]] = {
+        f"materials.{name}": partial(law_of, table) for name, table in scene.materials.items()
+    }
+    made |= {f"contacts[{k}]": partial(friction_of, t) for k, t in enumerate(scene.contacts)}
+    for where, make in made.items():
+        try:
+            make()
+        except ModelError as error:
+            field = description.parameter_of(f"{where}.{error.field}")
+            yield StudyError(field, error.value, error.allowed)
 
 
 def _again(description: Description, values: Mapping[str, Any]) -> Any:

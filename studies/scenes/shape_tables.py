@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Interval
@@ -13,7 +13,7 @@ from pydantic import Field
 
 from solver.errors import ModelError
 from solver.mesh import Near, ball, disc, fillet, grid, half_plane, pad, rectangle, refined, ring
-from solver.mesh.shapes import few
+from solver.mesh.shapes import ball_lines, ball_sides, few
 from solver.parameters import Length
 from studies.scenes.table import Count, Place, SceneTable, Span
 
@@ -127,11 +127,14 @@ class RoundTable(SceneTable):
 class _MarkTable(SceneTable):
     """An element side [mm] that lines have at a place; left out, it is that of the other places.
 
-    ``largest`` is the largest side between this place and the one before.
+    ``largest`` is the largest side between this place and the one before; with ``parts`` there are
+    that many equal sides between them.
     """
 
     size: Length | None = None
     largest: Length | None = None
+
+    parts: Count | None = None
 
 
 class LineMarkTable(_MarkTable):
@@ -189,12 +192,9 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
         naming the entry of the shape that is wrong
     """
     if isinstance(shape, GridTable):
-        x, y = (
-            _graded(name, marks, [mark.at for mark in marks], shape.growth)
-            for name, marks in (("x", shape.x), ("y", shape.y))
-        )
-        few((len(x) - 1) * (len(y) - 1))
-        return grid(x, y, cells)
+        lines = lines_of(shape)
+        few((len(lines.x) - 1) * (len(lines.y) - 1))
+        return grid(lines.x, lines.y, cells)
     given = {name: getattr(shape, name) for name in type(shape).model_fields if name != "kind"}
     if near := given.get("near"):
         given["near"] = [Near(**each.model_dump()) for each in near]
@@ -205,17 +205,42 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
     return _MESHED[shape.kind](**given)
 
 
+class GridLines(NamedTuple):
+    """Lines (n,) of the grid that a mesh is made of, which may be bent then [mm].
+
+    ``names`` are its boundaries: name -> side of the grid.
+    """
+
+    x: Array
+    y: Array
+    names: Mapping[str, str]
+
+
+def lines_of(shape: Any) -> GridLines:
+    """Return the lines of a shape that is one grid, bent or not: a `GridTable` or `RoundTable`."""
+    if isinstance(shape, RoundTable):
+        across = ball_lines(shape.radius, shape.fine, shape.size, shape.growth)
+        along = across if shape.symmetric else np.concatenate([-across[:0:-1], across])
+        return GridLines(along, across, ball_sides(above=True))
+    x, y = (
+        _graded(name, marks, [mark.at for mark in marks], shape.growth)
+        for name, marks in (("x", shape.x), ("y", shape.y))
+    )
+    return GridLines(x, y, {name: name for name in ("left", "right", "bottom", "top")})
+
+
 def _graded(field: str, marks: Sequence[_MarkTable], at: Sequence[float], growth: float) -> Array:
     """Return lines through places ``at`` (n,) with the sides of their marks [mm]."""
     if not all(before < after for before, after in pairwise(at)):
         raise ModelError(field, list(at), "must have increasing places [mm]")
-    if marks[0].largest is not None:
-        raise ModelError(field, marks[0].largest, "has no largest side before its first place")
+    if marks[0].largest is not None or marks[0].parts is not None:
+        given = marks[0].largest or marks[0].parts
+        raise ModelError(field, given, "has no side before its first place")
     sizes, largest = (
         [math.inf if side is None else side for side in sides]
         for sides in ((mark.size for mark in marks), (mark.largest for mark in marks[1:]))
     )
-    return refined(at, sizes, growth, largest)
+    return refined(at, sizes, growth, largest, [mark.parts for mark in marks[1:]])
 
 
 class LineTable(SceneTable):

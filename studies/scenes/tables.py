@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from types import NoneType, UnionType
 from typing import (
     TYPE_CHECKING,
@@ -14,7 +14,6 @@ from typing import (
     Union,
     get_args,
     get_origin,
-    get_type_hints,
 )
 
 import numpy as np
@@ -22,14 +21,14 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
+from solver.errors import ModelError
 from solver.mesh.lines import closer
-from solver.model.friction import FRICTION
 from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Length, Stress
-from solver.parts import declared
+from solver.parts import Declared, declared
 from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
-from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
 from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
 
@@ -44,6 +43,16 @@ class BoundaryTable(SceneTable):
     y: Span | None = None
 
 
+class CutTable(SceneTable):
+    """A rectangle that is cut out of a body: a notch in its side, or a hole.
+
+    Its sides are lines of the mesh; the boundary that it opens has its name.
+    """
+
+    x: Span
+    y: Span
+
+
 class BodyTable(SceneTable):
     """A body: a shape, or a mesh file and the part of it that the body is."""
 
@@ -53,21 +62,36 @@ class BodyTable(SceneTable):
     part: str | None = None
     element: str | None = None
     move: Place = (0.0, 0.0)
+    cuts: dict[Label, CutTable] = Field(default_factory=dict)
     boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)
 
 
-def _material() -> type[SceneTable]:
+_GIVEN = declared(ContactParameters)
+_LAW = [name for name in declared(MaterialParameters) if name != "accuracy"]
+OPEN: Mapping[str, Declared] = {
+    "materials": {name: _GIVEN[name] for name in _LAW},
+    "contacts": {n: each for n, each in _GIVEN.items() if n not in (*_LAW, "accuracy")},
+}
+"""Tables that may be open -> entries that are then parameters of the scene, where left out."""
+
+
+class OpenTable(SceneTable):
+    """A table whose entries are parameters of the scene, where it is open and leaves them out."""
+
+    open: bool = False
+
+    def given(self) -> dict[str, Any]:
+        """Return the entries that are given."""
+        return self.model_dump(exclude={"open"}, exclude_unset=True, exclude_none=True)
+
+
+def _material() -> type[OpenTable]:
     """Return the table of a material: the parameters of the scenes' materials."""
-    hints = get_type_hints(MaterialParameters, include_extras=True)
-    known = {
-        field.name: (hints[field.name], field.default)
-        for field in dataclasses.fields(MaterialParameters)
-        if field.name != "accuracy"
-    }
-    known |= {name: (hints[name], ...) for name in ("youngs_modulus", "poisson_ratio")}
+    known = {name: (hint, field.default) for name, (hint, field) in OPEN["materials"].items()}
+    known |= {name: (known[name][0], ...) for name in ("youngs_modulus", "poisson_ratio")}
     known["yield_stress"] = (Stress | None, None)
-    made: type[SceneTable] = create_model("Material", __base__=SceneTable, **known)  # type: ignore[call-overload]
+    made: type[OpenTable] = create_model("Material", __base__=OpenTable, **known)  # type: ignore[call-overload]
     made.__doc__ = "A material; one without a yield stress is elastic."
     return made
 
@@ -142,7 +166,7 @@ else:
     ]
 
 
-class PairTable(SceneTable):
+class PairTable(OpenTable):
     """Two surfaces that may touch; see `solver.ContactPair`. Its label is ``name``."""
 
     name: Label
@@ -152,14 +176,12 @@ class PairTable(SceneTable):
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
-    friction_law: str = "coulomb"
+    friction_law: str
 
 
 def _contact() -> type[PairTable]:
     """Return the table of a pair with the words and the parameters of the laws of friction."""
-    found = FRICTION.parameters().items()
-    known: dict[str, Any] = {name: (hint, field.default) for name, (hint, field) in found}
-    known["friction_law"] = (Literal[tuple(FRICTION)], "coulomb")
+    known: dict[str, Any] = {n: (hint, f.default) for n, (hint, f) in OPEN["contacts"].items()}
     made: type[PairTable] = create_model("ContactTable", __base__=PairTable, **known)
     return made
 
@@ -192,38 +214,68 @@ class StageTable(SceneTable):
 class LoadingTable(SceneTable):
     """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away.
 
-    Without a step they grow in one increment.
+    Without a step they grow in one increment. With ``cycles`` all of this is done as many times.
     """
 
     factor: Annotated[float, Interval(gt=0.0, le=1e7)]
     step: Annotated[float, Interval(gt=0.0, le=1e7)] | None = None
     release_increments: Count = 5
+    cycles: Count | None = None
 
 
 # -- where results are taken ---------------------------------------------------------------------
 
 
 class SpacedTable(SceneTable):
-    """Points from ``start`` to ``stop``: in equal steps, or ``size`` apart at ``near``."""
+    """Points from ``start`` to ``stop``, in equal steps.
+
+    They are ``size`` apart at ``near``, and farther apart away from it; or their distances from
+    ``away``, which lies before or behind them, are in a constant ratio. Of a table with ``within``
+    those between its two places are taken.
+    """
 
     start: float
     stop: float
     num: Annotated[int, Interval(ge=2, le=2000)]
     near: float | None = None
     size: Length | None = None
+    away: float | None = None
+    within: Span | None = None
 
     def positions(self) -> NDArray[np.float64]:
-        """Return the points (num,) [mm]."""
+        """Return the points (num,), or those of them that lie within [mm]."""
+        points = self._points()
+        if self.within is None:
+            return points
+        return points[(points > self.within[0]) & (points < self.within[1])]
+
+    def _points(self) -> NDArray[np.float64]:
+        if self.away is not None:
+            if self.near is not None or self.start <= self.away <= self.stop:
+                allowed = f"must be < {self.start:g} or > {self.stop:g}, and goes without near"
+                raise ModelError("away", self.away, allowed)
+            return self.away + np.geomspace(self.start - self.away, self.stop - self.away, self.num)
         if self.near is None or self.size is None:
             return np.linspace(self.start, self.stop, self.num)
         return closer(self.start, self.stop, self.num, self.near, self.size)
 
 
+Spaced = SpacedTable | Annotated[tuple[float | SpacedTable, ...], Field(min_length=1)]
+"""Points along a line: equally spaced or graded, or several such pieces and single points."""
+
+
+def positions(spaced: Spaced) -> NDArray[np.float64]:
+    """Return the points (n,) [mm]."""
+    pieces = spaced if isinstance(spaced, tuple) else (spaced,)
+    each = [p.positions() if isinstance(p, SpacedTable) else np.array([p]) for p in pieces]
+    return np.concatenate(each)
+
+
 class MapTable(SceneTable):
     """A grid on which stress and strain are stored."""
 
-    x: SpacedTable
-    y: SpacedTable
+    x: Spaced
+    y: Spaced
 
 
 class LineResultTable(SceneTable):
@@ -248,7 +300,7 @@ class ProfileTable(SceneTable):
     """Lines down into a body, at stations along the contact surface."""
 
     body: str
-    depth: SpacedTable
+    depth: Spaced
     stations: Annotated[tuple[float, ...], Field(min_length=1, max_length=1000)] = (0.0,)
 
 
@@ -262,6 +314,8 @@ class AxisTable(SceneTable):
 class PlacesTable(SceneTable):
     """Where results are stored; ``samples`` is their number along lines and contact surfaces.
 
+    With ``surfaces`` the bodies that these belong to have results on the map and along ``s``,
+    without it all bodies have.
     ``outputs`` are words of outputs without parameters; those with parameters have tables of their
     own. Left out, what a map can show is stored.
     """
@@ -270,7 +324,7 @@ class PlacesTable(SceneTable):
     map: MapTable | None = None
     lines: dict[Label, LineResultTable] = Field(default_factory=dict)
     points: dict[Label, PointResultTable] = Field(default_factory=dict)
-    s: SpacedTable | None = None
+    s: Spaced | None = None
     surfaces: tuple[Side, ...] = ()
     profile: ProfileTable | None = None
     axis: AxisTable = AxisTable()
@@ -418,6 +472,16 @@ class SceneFile(SceneTable):
             else each
             for name, each in self.parameters.items()
         }
+
+    @property
+    def names(self) -> set[str]:
+        """The names of all parameters, and of those that open tables may bring."""
+        tables: Mapping[str, Iterable[OpenTable]] = {
+            "materials": self.materials.values(),
+            "contacts": self.contacts,
+        }
+        opened = (n for key, each in tables.items() if any(t.open for t in each) for n in OPEN[key])
+        return {*self.declared, *opened}
 
     @property
     def released(self) -> str:

@@ -13,7 +13,6 @@ from solver.scenes import SCENES, Scene
 from solver.scenes.rolling_steady import rim_of, track_for
 
 COARSE = {"smallest_element": 0.02, "growth": 2.0}
-PLAIN: dict[str, Any] = {"accuracy": "draft", "growth": 2.0}
 ROUGH = {"element_size": 4.0, "growth": 1.5, "advance_step": 5.0, "track": 50.0}
 ENDLESS: dict[str, Any] = {"element_size": 2.5, "growth": 1.5}
 CASES: list[tuple[str, dict[str, Any]]] = [
@@ -24,13 +23,6 @@ CASES: list[tuple[str, dict[str, Any]]] = [
     ("punch", COARSE | {"element": "tri3", "punch_height": 4.0}),
     ("punch", COARSE | {"elastic_punch": True}),
     ("punch", {"smallest_element": 0.003, "growth": 1.6}),
-    ("elastic_punch", PLAIN),
-    ("ball", {"accuracy": "draft"}),
-    ("ball", {"accuracy": "draft", "yielding": "ball", "radius": 3.0}),
-    ("elastic_punch", PLAIN | {"element": "quad9", "punch_groove": 0.3, "friction": 0.1}),
-    ("elastic_punch", PLAIN | {"element": "tri3", "half_plane_groove": 0.5, "xi": 0.9}),
-    ("shaft_hub", {"accuracy": "draft"}),
-    ("shaft_hub", {"accuracy": "draft", "loading": "pressure", "shaft_groove": 0.3, "xi": 0.5}),
     ("rolling", ROUGH),
     ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}),
     ("rolling", ROUGH | {"periodic": True, "track": 100.0}),
@@ -73,8 +65,6 @@ def test_those_of_a_track_without_ends_are_told_too(changes: dict[str, Any]) -> 
     [
         ("punch", COARSE | {"yield_stress": 300.0}, [0.5]),
         ("punch", COARSE | {"friction": 0.2, "unload_steps": 3}, [0.9, 0.6]),
-        ("elastic_punch", PLAIN | {"friction": 0.3}, [10.0, 200.0]),
-        ("ball", {"accuracy": "draft", "load_ratio": 2.0}, [1, 2]),
         ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}, [1, 2]),
         ("rolling", ENDLESS, [2, 5]),
         ("rolling", ROUGH | {"load": "hertz", "press_steps": 3, "advance_step": 8.0}, [1]),
@@ -114,7 +104,7 @@ def test_passes_until_a_state_is_decided_are_few_at_least_and_all_at_most() -> N
 
 @pytest.mark.parametrize(
     ("name", "branch"),
-    [("punch", [0.3, 0.6]), ("elastic_punch", [1.0, 2.0]), ("rolling", [1, 2, 3])],
+    [("punch", [0.3, 0.6]), ("rolling", [1, 2, 3])],
 )
 def test_effort_takes_microseconds(name: str, branch: list[float]) -> None:
     """A hundred paths that differ in what decides the mesh, then as many that do not."""

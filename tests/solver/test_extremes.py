@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from solver.results.record import Record
-from solver.scenes import SCENES
 from solver.tensors import COMPONENTS
+from studies.scenes.registry import scene_named
 
 pytestmark = pytest.mark.solves
 
@@ -19,7 +19,7 @@ SIGNS = {"max": 1.0, "min": -1.0}
 @cache
 def computed(name: str) -> Record:
     """Return a run of a scene that leaves residual stress."""
-    scene = SCENES[name]
+    scene = scene_named(name)
     parameters = scene.parameters(accuracy="draft", hardening="isotropic")
     load = {"punch": 0.8571}.get(name, getattr(parameters, scene.branch))
     (found,) = scene.path(parameters, [load], lambda fraction: None)

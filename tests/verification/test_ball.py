@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from solver.results.record import Record, Status
-from solver.scenes import SCENES
+from studies.scenes.registry import scene_named
 from tests.reference.flattening import HertzBall, PlasticBall, first_yield
 
-BALL = SCENES["ball"]
+BALL = scene_named("ball")
 RE, E, NU, R = 410.0, 2.0e5, 0.3, 10.0
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Record, Status
+from studies.scenes.registry import scene_named
 from tests.reference.flattening import HertzBall
 from tests.verification.closed_forms import carter_creepage, plane_strain_modulus
 from tests.verification.scene_files import (
@@ -70,7 +71,7 @@ def pressed_pad(folder: Path, steps: int, sides: int) -> tuple[Record, Errors]:
 def ball(folder: Path, steps: int, sides: int) -> tuple[Record, Errors]:
     """An elastic ball on an elastic half-space: Hertz."""
     del folder
-    scene = SCENES["ball"]
+    scene = scene_named("ball")
     parameters = scene.parameters(
         accuracy="draft", load_ratio=1.4, load_step=0.25 * steps, element_size=sides / 12
     )

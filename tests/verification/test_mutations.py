@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from solver import SCENES, Record
+from solver import Record
 from solver.results.record import Status
 from solver.scenes.scene import Scene
 from studies import Store, Study
@@ -17,6 +17,7 @@ from studies.definition.cases import Case
 from studies.definition.identity import solver_hash
 from studies.errors import FileDiffers
 from studies.execution.task import PathTask, walk
+from studies.scenes.registry import scene_named
 from studies.storage import runfile
 from tests.verification import mutations, mutations_stored
 from tests.verification.mutations import PUNCH, ROLLING, Fault, Mutation
@@ -38,7 +39,7 @@ MUTATIONS = mutations.MUTATIONS | mutations_stored.MUTATIONS
 def run(label: str, **changes: Any) -> Record:
     """Return the record of a coarse run."""
     name, coarse, others = BASE.get(label, ("", {}, ()))
-    found: Scene = SCENES[name] if name else of_file()
+    found: Scene = scene_named(name) if name else of_file()
     parameters = found.parameters(**(coarse | changes))
     own = getattr(parameters, found.branch) if found.branch else 0.0
     return list(found.path(parameters, [*others, own], lambda done: None))[-1]

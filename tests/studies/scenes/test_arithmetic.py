@@ -34,6 +34,14 @@ VALUES = {"a": 3.0, "n": 4, "rule": "mixed", "on": True}
         ("2/2/2*$n", 2.0),
         ("10-4-3+$a", 6.0),
         (" $a\n +1", 4.0),
+        ("$rule == 'mixed'", True),
+        ("$rule != 'mixed'", False),
+        ("$a == 3 and not $n > 4", True),
+        ("$a > 3 or $on", True),
+        ("$on == ($n < 4)", False),
+        ("if($rule == 'mixed', $a, 1/0)", 3.0),
+        ("2*if($a > 3, 1, if($on, 2, 3))", 4),
+        ("if($a > 3, 'one', $rule)", "mixed"),
     ],
 )
 def test_an_expression_has_the_value_of_arithmetic(text: str, value: object) -> None:
@@ -45,7 +53,7 @@ def test_an_expression_has_the_value_of_arithmetic(text: str, value: object) -> 
     ("text", "reason"),
     [
         ("2*$b", r"\$b is no parameter; the scene has \$a, \$n, \$rule, \$on"),
-        ("$a +", r"arithmetic: numbers, \$parameters, pi"),
+        ("$a +", r"arithmetic: numbers, 'words', \$parameters, pi"),
         ("($a", "arithmetic"),
         ("$a)", "arithmetic"),
         ("2 $a", "arithmetic"),
@@ -58,6 +66,17 @@ def test_an_expression_has_the_value_of_arithmetic(text: str, value: object) -> 
         ("2*parameter__a+$a", "from 'parameter__a"),
         ("$rule * 2", "only numbers"),
         ("$on + 1", "only numbers"),
+        ("$rule < 'n'", "cannot compare 'mixed' and 'n'"),
+        ("$rule == 2", "cannot compare 'mixed' and 2"),
+        ("$on == 1", "cannot compare true and 1"),
+        ("$rule == mixed", "'mixed' for a word"),
+        ("$rule == 'mixed", 'from "\'mixed" on'),
+        ("$a and $on", r"\$a is 3.0: must be true or false"),
+        ("if($a, 1, 2)", r"\$a is 3.0: must be true or false"),
+        ("if($on, 1)", "a condition and two values, not 2"),
+        ("$a if $on else 2", "cannot be read"),
+        ("$a < 2 < 4", "must compare two values"),
+        ("$a = 2", "arithmetic"),
         ("$a / 0", "no value"),
         ("$a / ($a - 3)", "no value"),
         ("sqrt(-$a)", "no value"),
@@ -106,6 +125,12 @@ def test_text_of_any_kind_has_a_value_or_a_reason() -> None:
         "max",
         "pi",
         " ",
+        "if(",
+        "==",
+        "!",
+        "'a'",
+        " and ",
+        "not ",
     ]
     ended = {True: 0, False: 0}
     for _ in range(1000):
@@ -115,6 +140,6 @@ def test_text_of_any_kind_has_a_value_or_a_reason() -> None:
         except ExpressionError:
             ended[False] += 1
         else:
-            assert isinstance(value, int | float) and math.isfinite(value)
+            assert isinstance(value, str) or math.isfinite(value)
             ended[True] += 1
     assert min(ended.values()) > 20

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,15 +34,64 @@ def test_its_bodies_can_be_built(name: str) -> None:
     assert file_scene(Description.read(SHIPPED[name], shipped=True), built=True).name == name
 
 
-@pytest.mark.parametrize("changes", [{}, {"half_plane_size": 30.0, "growth": 1.4}])
-def test_the_work_of_the_rigid_punch_is_told_as_it_is(changes: dict[str, float]) -> None:
-    scene = scene_named("rigid_punch")
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("rigid_punch", {}),
+        ("rigid_punch", {"half_plane_size": 30.0, "growth": 1.4}),
+        ("ball", {}),
+        ("ball", {"yielding": "ball", "radius": 3.0}),
+        ("elastic_punch", {}),
+        ("elastic_punch", {"element": "quad9", "punch_groove": 0.3, "friction": 0.1}),
+        ("elastic_punch", {"element": "tri3", "half_plane_groove": 0.5, "xi": 0.9}),
+        ("shaft_hub", {}),
+        ("shaft_hub", {"loading": "pressure", "shaft_groove": 0.3, "xi": 0.5}),
+        ("shaft_hub", {"shaft_groove": 0.3, "hub_groove": 0.2, "eta": 2.0}),
+    ],
+)
+def test_the_work_of_a_run_is_told_as_it_is(name: str, changes: dict[str, Any]) -> None:
+    scene = scene_named(name)
     parameters = scene.parameters(accuracy="draft", **changes)
     system = System(scene.model(parameters))
     assert scene.effort is not None
-    told = scene.effort(parameters, [parameters.mean_pressure])
+    told = scene.effort(parameters, [getattr(parameters, scene.branch)])
     assert told.elements == sum(body.mesh.nelements for body in system.model.bodies)
     assert told.unknowns == system.n_unknowns
+
+
+@pytest.mark.solves
+@pytest.mark.parametrize(
+    ("name", "changes", "values"),
+    [
+        ("rigid_punch", {"friction": 0.3}, [10.0, 200.0]),
+        ("elastic_punch", {"friction": 0.3, "growth": 2.0}, [10.0, 200.0]),
+        ("ball", {"load_ratio": 2.0}, [1, 2]),
+    ],
+)
+def test_increments_are_those_that_are_walked(
+    name: str, changes: dict[str, Any], values: list[float]
+) -> None:
+    scene = scene_named(name)
+    parameters = scene.parameters(accuracy="draft", **changes)
+    calls: list[float] = []
+    (*_, last) = scene.path(parameters, values, calls.append)
+    assert scene.effort is not None
+    told = scene.effort(parameters, values)
+    assert last.status.name == "OK"
+    assert last.scalars["cut_increments"] == 0
+    assert last.scalars["degrees_of_freedom"] == told.unknowns
+    assert len(calls) == told.increments + 1  # the end is told too
+
+
+def test_a_hundred_paths_are_estimated_in_a_moment() -> None:
+    """No mesh is made: of a mesh for each this would take ten times as long."""
+    scene = scene_named("ball")
+    paths = [scene.parameters(radius=300.0 + k) for k in range(100)]
+    assert scene.effort is not None
+    started = time.process_time()
+    for each in paths:
+        scene.effort(each, [1, 2])
+    assert time.process_time() - started < 1.0
 
 
 def test_its_runs_follow_the_content_of_its_file(monkeypatch: pytest.MonkeyPatch) -> None:

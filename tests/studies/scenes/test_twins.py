@@ -1,4 +1,4 @@
-"""The punch and the ball as scene files have the numbers of the built-in scenes."""
+"""The punch as a scene file has the numbers of the built-in scene."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Record, Status
-from solver.mesh.shapes import cap_area
-from solver.scenes.ball import BallParameters
 from studies.scenes.scene import read_scene
 
 pytestmark = pytest.mark.solves
@@ -68,16 +66,3 @@ def test_the_punch_as_a_file_is_as_far_from_a_finer_one_as_the_built_in_scene(ru
     middle = np.interp(25.0, own.fields["contact_x"][1][0], own.fields["contact_pressure"][1][0, 0])
     same = np.interp(25.0, s, known.fields["contact_pressure"][1][0])
     assert middle == pytest.approx(same, abs=0.002 * peak)
-
-
-def test_the_ball_as_a_file() -> None:
-    known = twin("ball", 1, load_ratio=4.0, hardening="isotropic", accuracy="draft")
-    p = known.parameters
-    assert isinstance(p, BallParameters)
-    own = one("ball.toml", traction=-p.force / cap_area(p.radius), a=p.expected_radius)
-    for mine, its in (("strain", "max_plastic_strain"), ("peak", "peak_contact_pressure")):
-        assert own.scalars[mine] == pytest.approx(known.scalars[its], rel=0.01), mine
-    radius = known.scalars["contact_half_width"]
-    assert own.scalars["touching"] == pytest.approx(radius, rel=1e-9)
-    force = own.fields["contact_normal_force"][1][0]
-    assert force.max() == pytest.approx(p.force, rel=1e-3)
