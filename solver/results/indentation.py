@@ -1,4 +1,4 @@
-"""What a ball does: force, approach, and the crater that it leaves."""
+"""Indentation by a ball: force, approach, and the crater that remains."""
 
 from __future__ import annotations
 
@@ -21,13 +21,11 @@ if TYPE_CHECKING:
 
 FORCE = declare("force", "force on the ball under load", "N")
 APPROACH = declare("approach", "displacement of the ball's centre under load", "mm")
-MEAN_CONTACT_PRESSURE = declare(
-    "mean_contact_pressure", "force / area of the contact under load", "MPa"
-)
+MEAN_CONTACT_PRESSURE = declare("mean_contact_pressure", "force per contact area under load", "MPa")
 CRATER_DEPTH = declare(
-    "crater_depth", "depth that is left where the contact was, at its middle", "mm"
+    "crater_depth", "depth of the crater after unloading, at the middle of the contact", "mm"
 )
-PILE_UP = declare("pile_up", "height of the pile-up that is left around the contact", "mm")
+PILE_UP = declare("pile_up", "height of the pile-up around the contact after unloading", "mm")
 PILE_UP_RADIUS = declare("pile_up_radius", "radius at which the pile-up is highest", "mm")
 SURFACE_DISPLACEMENT = declare(
     "surface_displacement",
@@ -45,7 +43,7 @@ INCREMENT_RADIUS = declare(
 
 
 class Followed(NamedTuple):
-    """A state of a ball: force [N], approach and contact radius [mm]."""
+    """A state of a ball: force [N], approach [mm] and contact radius [mm]."""
 
     force: float
     approach: float
@@ -53,7 +51,7 @@ class Followed(NamedTuple):
 
 
 def follow(samples: Samples, converged: Any) -> Followed:
-    """Return what is kept of an increment."""
+    """Return the stored numbers of an increment."""
     system: Any = samples.system
     contact = converged.state.contacts[0]
     force = float(contact.normal.sum())
@@ -65,7 +63,7 @@ def follow(samples: Samples, converged: Any) -> Followed:
 
 
 def _approach(system: Bodies, converged: Solved) -> float:
-    """Return by how much the centre of the ball has come nearer to what it is pressed on [mm]."""
+    """Return the displacement of the ball's centre towards the other body [mm]."""
     body = system.full("ball")
     axis = body.boundary_nodes("left")
     axis = axis[np.argsort(body.X[1, axis])]
@@ -77,7 +75,7 @@ def _approach(system: Bodies, converged: Solved) -> float:
 
 
 def _ball_radius(X: Array) -> float:
-    """Return the radius of a ball that touches the origin, from its nodes (2, n)."""
+    """Return the radius [mm] of a ball that touches the origin, from its nodes (2, n) [mm]."""
     far = np.argmax(X[0])
     return float((X[:, far] ** 2).sum() / (2 * abs(X[1, far])))
 
@@ -90,7 +88,7 @@ def indentation(run: FinishedRun) -> Values:
 
 
 def crater(run: FinishedRun) -> Values:
-    """Return how the surface of the body that yields has moved, and what is left of it."""
+    """Return the surface displacement of the body that yields, crater depth and pile-up."""
     s, name = run.view.s, run.view.profile_body
     body = run.system.full(name)
     nodes = body.boundary_nodes(run.view.surfaces[name])
