@@ -1,8 +1,8 @@
 """The service over HTTP: start it, submit a study, follow it, fetch its data set, stop it.
 
-Run it with ``python examples/http_client.py``. The service works in a temporary directory, on a
-free port of this machine, and is gone afterwards. In daily use the service runs elsewhere, and
-only the function `use` is yours.
+Run it with ``python examples/http_client.py``. The service uses a temporary directory and a free
+port of this machine, and is stopped at the end. In daily use the service runs elsewhere, and you
+need only the function `use`.
 """
 
 import json
@@ -25,20 +25,20 @@ STUDY = {
 
 
 def free_port() -> int:
-    """Return a port that nobody listens on."""
+    """Return a free port of this machine."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def wait_until_ready(client: httpx.Client, seconds: float = 30.0) -> None:
-    """Wait until the service says that it can compute."""
+    """Wait until the service reports that it is ready."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         try:
             if client.get("/health").is_success:
                 return
-        except httpx.TransportError:  # it does not listen yet
+        except httpx.TransportError:  # the service does not listen yet
             pass
         time.sleep(0.2)
     raise TimeoutError("the service did not start")
@@ -46,13 +46,13 @@ def wait_until_ready(client: httpx.Client, seconds: float = 30.0) -> None:
 
 def use(client: httpx.Client, target: Path) -> None:
     """Submit the study, follow it to its end, and save its data set."""
-    # 201: accepted. 200: this study is known already, and is not computed again. An answer of 4xx
-    # is a problem document, whose `errors` say which field is wrong and what is allowed.
+    # 201: accepted. 200: the service has this study already and does not compute it again. 4xx: a
+    # problem document, whose `errors` say which field is wrong and what is allowed.
     answer = client.post("/studies", json=STUDY).raise_for_status()
     study = answer.headers["location"]  # /studies/<id>
     print(f"{answer.status_code} {study}")
 
-    # The service sends an event whenever something has changed, and ends the stream at the end.
+    # The service sends an event after each change, and closes the stream when the study ends.
     with client.stream("GET", f"{study}/events", timeout=None) as events:
         for line in events.iter_lines():
             if line.startswith("data:"):
@@ -74,7 +74,7 @@ with tempfile.TemporaryDirectory() as home:
             wait_until_ready(client)
             use(client, Path(home, "tour.nc"))
     finally:
-        service.terminate()  # the service ends its work in order, as on Ctrl-C
+        service.terminate()  # the service shuts down cleanly, as after Ctrl-C
         service.wait(timeout=30.0)
     with xr.open_dataset(Path(home, "tour.nc")) as dataset:
         print(dataset["peak_residual_tension"].squeeze("hardening").to_pandas().to_string())

@@ -1,4 +1,4 @@
-"""The gap between two meshes under the hat of one vertex, drawn and computed again by sampling.
+"""Draw the gap between two meshes under the hat function of one vertex; check it by sampling.
 
 Run it with ``python examples/mortar_picture.py``; it writes ``mortar.png``. Units are mm.
 """
@@ -30,7 +30,7 @@ contact = ContactPair(slave=("above", "bottom"), master=("below", "top"), slidin
 slave, master = interface.slave_surface, interface.master_surface
 found = pair(slave, np.zeros_like(slave.X), master, np.zeros_like(master.X))
 
-# Go along the two edges at the vertex, and from each point along the normal to the master.
+# Sample the two edges at the vertex, and project each point along the normal on the master.
 start, end = end_normals(slave.X, slave)[..., VERTEX - 1 : VERTEX + 1].transpose(1, 0, 2)
 corners = slave.X[:, slave.vertices[VERTEX - 1 : VERTEX + 2]]
 share = (np.arange(400) + 0.5) / 400

@@ -1,4 +1,4 @@
-"""A back stress of one's own, which forgets nothing below a threshold, held against tension."""
+"""Define a back stress that does not fade below a threshold, and check it in tension."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ class Threshold(MovingRule, BackStress):
     limit = property(lambda self: self.threshold + self.modulus / self.recall)
 
     def parts(self, yield_stress):
-        """Return the back stresses of the word: this one."""
+        """Return the back stresses of this rule: itself."""
         return (self,)
 
     def in_tension(self, p):

@@ -1,4 +1,4 @@
-"""A hardening curve of one's own: Swift's law, k (e0 + p)^n, held against a bar in tension."""
+"""Define a hardening curve, Swift's law k (e0 + p)^n, and check it with a bar in tension."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class Swift:
 @HARDENING.word("swift")
 @dataclass(frozen=True, kw_only=True)
 class SwiftHardening(GrowingRule):
-    """The same by a word, with parameters, for studies and scene files."""
+    """Swift's law under a word, with parameters, for studies and scene files."""
 
     swift_strain: float = described(0.002, "e0 of swift hardening")
     swift_exponent: float = described(0.2, "n of swift hardening")
@@ -52,6 +52,6 @@ if __name__ == "__main__":
         loads=(Displacement(boundary="right", x=0.2),),
     )  # fmt: skip
     stress = solve(Model(bodies=(bar,))).stress("bar", "loaded")[0]
-    plastic = 0.2 / 10 - stress / E  # what is not elastic of a strain of 2 %
+    plastic = 0.2 / 10 - stress / E  # strain of 2 % less its elastic part
     assert np.allclose(stress, curve.flow_stress(plastic), rtol=1e-9), stress
     print(f"stress at a strain of 2 %: {stress[0]:.2f} MPa")

@@ -1,4 +1,4 @@
-"""An element of one's own: eight nodes, averaged dilatation, for what hardly changes its volume."""
+"""Define an element for nearly incompressible bodies: eight nodes with averaged dilatation."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
-"""Friction of one's own, tau_max (1 - exp(-mu p / tau_max)), by lines that touch the curve.
+"""Define a friction law, tau_max (1 - exp(-mu p / tau_max)), by tangents of the curve.
 
-With RESIDUA_PARTS=own_friction.py studies and scene files know it: friction_law = "saturating".
+With RESIDUA_PARTS=own_friction.py studies and scene files can use it: friction_law = "saturating".
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from solver.parameters import Friction, Stress, described
 @FRICTION.word("saturating")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Saturating(FrictionLaw):
-    """Friction that tends to a shear."""
+    """Friction whose shear saturates under pressure."""
 
     friction: Friction = described(0.0, "Coulomb friction coefficient")
-    tau_max: Stress = described(50.0, "shear it tends to under pressure")
+    tau_max: Stress = described(50.0, "limit of the shear under pressure")
 
     def bound(self, at):
-        """Return lines (slope, stress [MPa]): tangents at u = mu p / tau_max, and the level one."""
+        """Return lines (slope, stress [MPa]): tangents at u = mu p / tau_max, and the limit."""
         u = np.linspace(0.0, 6.0, 25)
         stress = self.tau_max * (1 - np.exp(-u) * (1 + u))
         return [*zip(self.friction * np.exp(-u), stress, strict=True), (0.0, self.tau_max)]

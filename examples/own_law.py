@@ -1,11 +1,10 @@
-"""A material law of one's own: a yield stress that saturates, after Voce.
+"""Define a material law with a yield stress that saturates, after Voce.
 
     flow stress R(p) = Y + Q (1 - exp(-b p))
 
-The package has it too, as a curve of `Chaboche`. Written out here it shows what a law of your own
-must give (`solver.materials.Law`): its elasticity, its flow stress, and its response to a strain.
-Everything else (yield value, plane stress, strength in shear, what the audit checks) follows from
-these.
+The package has it too, as a curve of `Chaboche`. Written out here it shows what a law must define
+(`solver.materials.Law`): its elasticity, its flow stress, and its response to a strain. All else
+(yield value, plane stress, strength in shear, checks of the audit) follows from these.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ from solver.tensors import identity
 class Saturating(Law):
     """Von Mises plasticity with isotropic hardening that saturates.
 
-    ``yield_stress`` is Y and ``growth`` is Q [MPa]; ``rate`` is b. It ends at a limit load, and
-    so `hardens` stays False, as `Law` has it.
+    ``yield_stress`` is Y and ``growth`` is Q [MPa]; ``rate`` is b. There is a limit load, so
+    `hardens` stays False, the default of `Law`.
     """
 
     elasticity: Elasticity
@@ -49,8 +48,8 @@ class Saturating(Law):
         """Return stress, tangent and new state: the radial return with a curved R(p).
 
         1. trial stress with the plastic strain frozen, its von Mises stress q
-        2. solve q - 3 G dp = R(p + dp). The left less the right side is convex and falls, so that
-           Newton's iteration from dp = 0 comes to the root from the left without a safeguard
+        2. solve q - 3 G dp = R(p + dp). Left side minus right side is convex and falls, so Newton's
+           iteration from dp = 0 approaches the root from the left without a safeguard
         3. plastic strain += dp N, with N = 3/2 s / q, and stress -= 2 G dp N
         """
         G, C = self.elasticity.shear_modulus, self.stiffness(len(strain))
@@ -86,8 +85,8 @@ steel = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
 law = Saturating(elasticity=steel, yield_stress=300.0, growth=150.0, rate=40.0)
 LENGTH, TENSION = 10.0, 400.0
 
-# A bar is pulled to 400 MPa and let go. Where tension is all there is (in plane stress, and in a
-# round bar), strain is known: TENSION / E, and the plastic strain at which R(p) = TENSION.
+# A bar is loaded to a tension of 400 MPa and unloaded. In plane stress and in a round bar stress is
+# uniaxial, and the strain is known: TENSION / E plus the plastic strain at which R(p) = TENSION.
 plastic = -np.log(1 - (TENSION - law.yield_stress) / law.growth) / law.rate
 total = TENSION / steel.youngs_modulus + plastic
 
@@ -105,7 +104,7 @@ for kinematics in ("plane_stress", "axisymmetric", "plane_strain"):
     assert audit.passed, audit.violations
     kept = solution.plastic_strain("bar")
     xx, yy, zz, xy = solution.stress("bar", "loaded")
-    if kinematics == "plane_strain":  # the bar cannot get thinner along z, and is stronger
+    if kinematics == "plane_strain":  # the bar cannot contract along z, and is stronger
         assert np.all(zz > 100.0)
         assert kept.max() < plastic
     else:

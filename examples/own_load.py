@@ -1,4 +1,4 @@
-"""A load of one's own: centrifugal force, held against the closed form of a turning cylinder."""
+"""Define a load, centrifugal force, and compare it with the closed form of a rotating cylinder."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,7 +14,7 @@ from solver.model.loads import LOADS, Load
 @LOADS.word("centrifugal")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Centrifugal(Load):
-    """The centrifugal force of a body that turns about the axis x = 0."""
+    """The centrifugal force of a body that rotates about the axis x = 0."""
 
     density: Annotated[float, Interval(gt=0.0), Unit("t/mm3")] = 7.85e-9
     speed: Annotated[float, Interval(ge=0.0), Unit("rad/s")]

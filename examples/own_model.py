@@ -1,4 +1,4 @@
-"""A model of one's own: a pad pressed on a plate, released, checked and drawn.
+"""Define a model, a pad pressed on a plate and released; check and draw the result.
 
 Run it with ``python examples/own_model.py``; it writes ``own_model.png``. Units are N, mm, MPa;
 tension is positive.
@@ -21,8 +21,8 @@ steel = Material(
 )
 
 # A mesh is any scikit-fem mesh of quadrilaterals or triangles with named boundaries.
-# skfem.Mesh.load reads those of Gmsh, Abaqus and others. Here x = 0 is a line of symmetry, so that
-# half of each body is enough.
+# skfem.Mesh.load reads meshes of Gmsh, Abaqus and others. Here x = 0 is a line of symmetry, so half
+# of each body is enough.
 pad_mesh = MeshQuad.init_tensor(np.linspace(0, 10, 21), np.linspace(0, 10, 11)).with_boundaries(
     {"axis": lambda x: x[0] == 0, "foot": lambda x: x[1] == 0, "top": lambda x: x[1] == 10}
 )
@@ -30,14 +30,14 @@ plate_mesh = MeshQuad.init_tensor(np.linspace(0, 30, 31), np.linspace(-20, 0, 21
     {"axis": lambda x: x[0] == 0, "base": lambda x: x[1] == -20, "top": lambda x: x[1] == 0}
 )
 
-# A support names the components of displacement that a boundary holds. Nothing holds the pad
-# along y: the contact does.
+# A support names the components of displacement that are zero on a boundary. The pad has no support
+# along y: contact holds it.
 pad = Body(
     name="pad",
     mesh=pad_mesh,
     material=steel,
     supports={"axis": "x"},
-    pressure={"top": 450.0},  # at load factor 1, positive when it pushes
+    pressure={"top": 450.0},  # at load factor 1, positive in compression
 )
 plate = Body(name="plate", mesh=plate_mesh, material=steel, supports={"axis": "x", "base": "y"})
 
@@ -45,15 +45,15 @@ plate = Body(name="plate", mesh=plate_mesh, material=steel, supports={"axis": "x
 contact = ContactPair(slave=("pad", "foot"), master=("plate", "top"), friction=0.3)
 model = Model(bodies=(pad, plate), contacts=(contact,))
 
-# `solve` raises the load in increments, takes it off, takes the bodies apart, and returns the
-# state under load and the released one. It raises LimitLoad or NotConverged where it cannot.
+# `solve` increases the load in increments, removes it, separates the bodies, and returns the states
+# under load and after unloading. If it fails, it raises LimitLoad or NotConverged.
 solution = solve(model)
 
-# The audit checks the result by other means than those that found it.
+# The audit checks the result by independent means.
 audit = solution.audit()
 assert audit.passed, audit.violations
 
-# Under load the contact carries what pushes on the pad: 450 MPa on 10 mm, per mm of thickness.
+# Under load contact carries the force on the pad: 450 MPa on 10 mm, per mm of thickness.
 acting = solution.contact()
 where, pressure, shear = acting.X, acting.pressure, acting.shear
 order = np.argsort(where[0])

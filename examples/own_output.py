@@ -1,7 +1,7 @@
-"""An output of one's own, added to a scene of the package: how deep the half-plane has yielded.
+"""Add an output to a scene of the package: the depth to which the half-plane has yielded.
 
-Run it with ``python examples/own_output.py``. What an output gives is declared once: its name,
-what it is, its unit. Data sets and pictures read this declaration.
+Run it with ``python examples/own_output.py``. Name, meaning and unit of the result are declared
+once. Data sets and pictures read this declaration.
 """
 
 from dataclasses import replace
@@ -26,11 +26,11 @@ def yielded_depth(run: FinishedRun) -> Values:
     return {YIELDED_DEPTH: float(yielded.max(initial=0.0))}
 
 
-# A scene under a name of its own. To add it to SCENES makes it known to studies.
+# A scene with a new name; studies can use it once it is in SCENES.
 scene = replace(PUNCH, name="punch_depth", outputs=(*PUNCH.outputs, yielded_depth))
 SCENES[scene.name] = scene
 
-# A scene walks one path for several values of its branch parameter, here the load.
+# A scene computes several values of its branch parameter, here the load, on one path.
 coarse = scene.parameters(smallest_element=0.05, growth=2.5, load_step=0.15, hardening="isotropic")
 records = list(scene.path(coarse, values=[0.6, 1.2, 1.4], monitor=lambda fraction: None))
 

@@ -1,8 +1,8 @@
-"""A scene of one's own: a block pressed in a die, and released.
+"""Define a scene: a block pressed in a die and released.
 
-The die keeps the block from getting wider. Under pressure the block yields; when the pressure is
-taken off, the die still presses on its sides. Without hardening this stress is known in closed
-form, and the sweep is checked against it.
+The die keeps the width of the block constant. Under pressure the block yields; after unloading the
+die still presses on its sides. Without hardening this stress is known in closed form, and the sweep
+is compared with it.
 
 Run it with ``python examples/own_scene.py``; it writes runs and data set to the directory ``die``.
 """
@@ -28,21 +28,21 @@ from studies import Store, Study, open_study, run_study
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DieParameters(MaterialParameters):
-    """Parameters of the block (N, mm, MPa); those of its material are inherited."""
+    """Parameters of the block (N, mm, MPa); the parameters of its material are inherited."""
 
-    load_ratio: Ratio = described(2.0, "pressure on the block / yield stress")
+    load_ratio: Ratio = described(2.0, "ratio of the pressure on the block to the yield stress")
     width: Length = described(20.0, "width of the block")
     height: Length = described(10.0, "height of the block")
     element_size: Length = described(2.5, "side of an element")
     load_step: Annotated[float, Interval(ge=1e-4, le=1.0), Unit("1")] = described(
         0.25, "largest increment of load_ratio"
     )
-    # check what fields say together in __post_init__: call MaterialParameters.__post_init__(self)
-    # first, and raise ModelError(field, value, allowed)
+    # to check combinations of fields write __post_init__: first call
+    # MaterialParameters.__post_init__(self), then raise ModelError(field, value, allowed)
 
 
 def model(parameters: DieParameters) -> Model:
-    """Return one half of the block: the die holds its right side, symmetry its left one."""
+    """Return one half of the block: the die holds its right side, symmetry its left side."""
     half, size = parameters.width / 2, parameters.element_size
     across = np.linspace(0.0, half, 1 + max(1, round(half / size)))
     down = np.linspace(-parameters.height, 0.0, 1 + max(1, round(parameters.height / size)))
@@ -53,7 +53,7 @@ def model(parameters: DieParameters) -> Model:
         supports={"left": "x", "right": "x", "bottom": "y"},
         pressure={
             "top": parameters.yield_stress
-        },  # times the load factor, which goes to load_ratio
+        },  # times the load factor, which increases to load_ratio
     )
     return Model(bodies=(block,))
 
@@ -64,7 +64,7 @@ def program(parameters: DieParameters) -> Program:
 
 
 def view(parameters: DieParameters) -> View:
-    """Return where results are taken: a function of its size, not of its mesh."""
+    """Return the positions of results: they depend on the size of the block, not on its mesh."""
     return View(
         x=parameters.width / 2 * (np.arange(20) + 0.5) / 20,
         y=-parameters.height * (np.arange(20) + 0.5) / 20,
@@ -77,11 +77,11 @@ def view(parameters: DieParameters) -> View:
     )
 
 
-SIDE_PRESSURE = declare("side_pressure", "pressure that the die keeps on the sides", "MPa")
+SIDE_PRESSURE = declare("side_pressure", "pressure of the die on the sides after unloading", "MPa")
 
 
 def side_pressure(run: FinishedRun) -> Values:
-    """Return the mean pressure on the side that the die holds."""
+    """Return the mean pressure on the side that the die holds [MPa]."""
     side = run.system.full("block").boundary_nodes("right")
     return {
         SIDE_PRESSURE: -float(
@@ -103,8 +103,8 @@ SCENES["die"] = Scene(
     advice={Status.NOT_CONVERGED: "reduce load_step"},
 )
 
-# Worker processes import this script, and find the scene. Without this line each of them would
-# start the study.
+# Worker processes import this script to get the scene. Without this line each of them would start
+# the study.
 if __name__ == "__main__":
     study = Study.from_dict(
         {"name": "die", "scene": "die", "sweep": {"load_ratio": [1.0, 2.0, 3.0], "width": [20, 40]}}
@@ -115,8 +115,8 @@ if __name__ == "__main__":
         found = dataset["side_pressure"].squeeze("hardening")
         print(found.to_pandas().round(2).to_string())
         assert found.attrs["units"] == "MPa"
-        # Below first yield the side carries nu / (1 - nu) of the pressure p; beyond, p - Y. Taking
-        # p off is elastic: what is left is the difference.
+        # Below first yield the side carries nu / (1 - nu) of the pressure p; beyond it, p - Y.
+        # Unloading is elastic: the difference remains.
         p, Y, nu = 350.0 * found["load_ratio"], 350.0, 0.3
         elastic = nu / (1 - nu) * p
         np.testing.assert_allclose(

@@ -1,6 +1,6 @@
-"""A yield surface of one's own, Hosford's, between von Mises and Tresca, held against pure shear.
+"""Define a yield surface, Hosford's, between von Mises and Tresca, and check it in pure shear.
 
-With RESIDUA_PARTS=own_yield_surface.py studies and scene files know it:
+With RESIDUA_PARTS=own_yield_surface.py studies and scene files can use it:
 yield_condition = "hosford".
 """
 
@@ -19,14 +19,14 @@ from solver.parameters import described
 @YIELD_CONDITIONS.word("hosford")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hosford(SmoothCondition):
-    """The mean of the differences of principal stresses, each to a power, decides."""
+    """Yield by the mean of powers of the differences of principal stresses."""
 
     hosford_exponent: Annotated[float, Interval(ge=2.0, le=100.0), Unit("1")] = described(
-        8.0, "exponent of the hosford condition: 2 is mises, a large one next to tresca"
+        8.0, "exponent of the hosford condition: 2 is mises, a large exponent is close to tresca"
     )
 
     def tension(self, s):
-        """Return the tensile stress that principal stresses s[0] >= s[1] >= s[2] amount to."""
+        """Return the equivalent tensile stress of principal stresses s[0] >= s[1] >= s[2]."""
         a = self.hosford_exponent
         return (((s[0] - s[1]) ** a + (s[1] - s[2]) ** a + (s[0] - s[2]) ** a) / 2) ** (1 / a)
 

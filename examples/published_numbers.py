@@ -1,7 +1,7 @@
-"""Published numbers beside computed ones: the rolling cases of P. Marek (Warsaw 1995).
+"""Compare computed with published numbers: the rolling cases of P. Marek (Warsaw 1995).
 
 ``python examples/published_numbers.py`` computes the cases on a coarse mesh and writes
-``published.md``. For the mesh of the study compute that first, and name its directory:
+``published.md``. To use the mesh of the study, compute the study first and give its directory:
 ``residua run data/studies/rolling-table.toml --out table``, then
 ``python examples/published_numbers.py table``.
 """
@@ -23,14 +23,14 @@ NAMES["plastic_strain"] = "plastic strain"
 
 
 def feature(profile, quantity, top, bottom):
-    """Return value and depth of a feature of a profile, looked for between two depths."""
+    """Return value and depth of a feature of a profile between two depths."""
     line = profile.dropna("depth").sel(depth=slice(top, bottom))
     values = line.to_numpy()
     if quantity == "local_maximum":  # the most prominent one
-        peaks, told = find_peaks(values, prominence=0.0)
+        peaks, details = find_peaks(values, prominence=0.0)
         if not peaks.size:
             return np.nan, np.nan
-        at = peaks[told["prominences"].argmax()]
+        at = peaks[details["prominences"].argmax()]
     else:
         at = {"surface": 0, "minimum": values.argmin(), "maximum": values.argmax()}[quantity]
     return values[at], float(line["depth"][at])
@@ -78,12 +78,12 @@ def write(table, path):
 
 
 def main():
-    """Compare what is in the directory named on the command line, or compute coarse runs."""
+    """Compare the runs of the directory given on the command line, or compute coarse runs."""
     directory = sys.argv[1] if len(sys.argv) > 1 else "published"
     if len(sys.argv) == 1:
         study = tomllib.loads((DATA / "studies/rolling-table.toml").read_text())
         study["parameters"] = COARSE
-        cases = ("T1", "T3", "T6", "T7", "T8")  # nothing was published in numbers of the others
+        cases = ("T1", "T3", "T6", "T7", "T8")  # there are no published numbers for the others
         study["sweep"]["case"] = {case: study["sweep"]["case"][case] for case in cases}
         assert run_study(Study.from_dict(study), Store(directory), workers=2).ok
     published = pd.read_csv(DATA / "reference/rolling.csv")
@@ -97,5 +97,5 @@ def main():
     assert (lowest[["published", "computed"]] < -100.0).all(axis=None), lowest
 
 
-if __name__ == "__main__":  # worker processes import this script anew
+if __name__ == "__main__":  # worker processes import this script again
     main()

@@ -1,4 +1,4 @@
-"""Names of axes and of the components of symmetric tensors, and the scaling of these.
+"""Names of axes and tensor components, and the scaling of components of symmetric tensors.
 
 Inside the solver strain and stress are Mandel vectors, components first, points last:
 ``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three,
@@ -23,14 +23,17 @@ SQRT2 = float(np.sqrt(2.0))
 
 
 def components(count: int) -> tuple[str, ...]:
-    """Return the names of the components of a tensor with 4 of them, in two dimensions, or 6."""
+    """Return the names of the 4 components of a tensor in two dimensions, or of the 6 in three.
+
+    Raises `ValueError` for any other count.
+    """
     if count not in (4, 6):
         raise ValueError(f"{count} components: must be 4 or 6")
     return _COMPONENTS[:count]
 
 
 COMPONENTS = components(4)
-"""Those of bodies in two dimensions."""
+"""Names of the components in two dimensions."""
 
 
 def to_tensor(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -67,7 +70,10 @@ def von_mises(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def not_below_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values of an invariant that has no sign, without what interpolation undershoots."""
+    """Return values of an invariant that cannot be negative, with negative ones set to zero.
+
+    Interpolation can make them slightly negative.
+    """
     return np.maximum(values, 0.0)
 
 

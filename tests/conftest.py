@@ -1,4 +1,4 @@
-"""What every test takes for granted."""
+"""Hooks and fixtures of all tests."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from tests.marks import LONG, allowed, of_folder
 if TYPE_CHECKING:
     from studies import Access
 
-# Workers of the test run share the cores: threads of BLAS would wait for each other. Set before
-# any test loads the library, and inherited by the processes that tests start.
+# Workers of the test run share the cores: threads of BLAS would wait for each other. This is set
+# before any test loads the library; processes that tests start inherit it.
 os.environ["OMP_NUM_THREADS"] = "1"
 
-# Hundreds of processes import the project: 0.15 s each where none keeps what it has compiled.
+# Hundreds of processes import the project: without compiled files each would take 0.15 s longer.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put long files first; mark the tests of folders, before tests are chosen by marks."""
+    """Put long files first; add the marks of folders before tests are selected by marks."""
     items.sort(key=lambda item: item.path not in LONG)
     for item in items:
         for mark in of_folder(item.path):
@@ -36,14 +36,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
-    """Refuse what is dear to a test, and to the fixtures made for it, without the mark for it."""
+    """Refuse expensive functions to a test and its fixtures if the test lacks the mark for them."""
     with allowed({mark.name for mark in item.iter_markers()}):
         return (yield)
 
 
 @pytest.fixture(autouse=True, scope="module")
 def nothing_solved_outlives_its_module() -> Iterator[None]:
-    """Forget solved problems, which hold factors of hundreds of megabytes."""
+    """Clear caches of solved problems, which hold factors of hundreds of megabytes."""
     yield
     for name, module in list(sys.modules.items()):
         if name.startswith(("tests.verification", "tests.solver")):
@@ -55,7 +55,7 @@ def nothing_solved_outlives_its_module() -> Iterator[None]:
 
 @pytest.fixture(autouse=True, scope="session")
 def no_settings_from_outside() -> Iterator[None]:
-    """Keep the ``RESIDUA_`` settings of whoever runs the tests out of them."""
+    """Remove ``RESIDUA_`` settings of the user's environment."""
     with pytest.MonkeyPatch.context() as patch:
         for name in [name for name in os.environ if name.startswith("RESIDUA_")]:
             patch.delenv(name)
@@ -64,7 +64,7 @@ def no_settings_from_outside() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lasting_worker() -> Iterator[Access]:
-    """One worker for all studies whose claim is not how workers start and end."""
+    """One worker for all tests that do not test the start and end of workers."""
     from studies import own_workers
 
     with own_workers(1) as access:
@@ -73,7 +73,7 @@ def lasting_worker() -> Iterator[Access]:
 
 @pytest.fixture(scope="module")
 def one_worker(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Have studies that start one worker take the lasting one: to start it takes 3 s of CPU."""
+    """Let studies that start one worker use the lasting one, as a start takes 3 s of CPU."""
     from studies.execution import run
 
     own_workers = run.own_workers

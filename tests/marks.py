@@ -1,7 +1,7 @@
-"""What tests cost, and may cost: ``make check`` runs those that need none of the marks.
+"""Marks of expensive tests; ``make check`` runs the tests without a mark.
 
-``solves`` is for tests that compute a state of a model, ``processes`` for those that start another
-process, ``pages`` for those that run what a page or an example shows, which may do both.
+``solves`` is for tests that compute a state of a model, ``processes`` for tests that start another
+process, ``pages`` for tests that run the code of a page or an example, which may do both.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ FOLDERS = {
 }
 """Marks of all tests of a folder."""
 
-
 LONG = {
     HERE / name
     for name in (
@@ -41,9 +40,9 @@ LONG = {
         "verification/test_track_ends.py",
     )
 }
-"""Files of more than 30 s of CPU: begun first, or one core would wait for them at the end."""
+"""Files of more than 30 s of CPU; they start first, so that no core waits for them at the end."""
 
-DEAR = {
+EXPENSIVE = {
     "solves": ("solver.loading.increment.Increment.solve", "solver.steady.search.passing"),
     "processes": (
         "subprocess.Popen.__init__",
@@ -51,10 +50,11 @@ DEAR = {
         "studies.execution.run._Work.compute",
     ),
 }
-"""Functions that only tests with a mark may call. Workers start in a thread, which would hang."""
+"""Functions that only tests with a mark may call, by mark. `_Work.compute` is among them because
+workers start in a thread, where a refusal would hang."""
 
-ASKED = ("git", "uname")
-"""Commands that tell in milliseconds what the project and this machine are."""
+CHEAP = ("git", "uname")
+"""Commands that any test may run: they report on project and machine in milliseconds."""
 
 _START = subprocess.Popen.__init__
 
@@ -66,19 +66,19 @@ def of_folder(path: Path) -> tuple[str, ...]:
 
 @contextmanager
 def allowed(marks: set[str]) -> Iterator[None]:
-    """Refuse to solve and to start processes, but for what the marks of a test allow."""
+    """Refuse to solve and to start processes, except as the marks of a test allow."""
     with pytest.MonkeyPatch.context() as patch:
-        for mark in DEAR.keys() - marks if "pages" not in marks else ():
-            for name in DEAR[mark]:
+        for mark in EXPENSIVE.keys() - marks if "pages" not in marks else ():
+            for name in EXPENSIVE[mark]:
                 patch.setattr(name, refusal(mark))
         yield
 
 
 def refusal(mark: str) -> Callable[..., None]:
-    """Return a function that fails the test in which it is called, but for `ASKED`."""
+    """Return a function that fails the calling test, except for the commands `CHEAP`."""
 
     def refuse(*arguments: Any, **named: Any) -> None:
-        if isinstance(arguments[0], subprocess.Popen) and arguments[1][0] in ASKED:
+        if isinstance(arguments[0], subprocess.Popen) and arguments[1][0] in CHEAP:
             _START(*arguments, **named)
         else:
             pytest.fail(f"only tests with the mark `{mark}` may do this")

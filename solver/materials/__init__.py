@@ -2,10 +2,10 @@
 
 `Law` is the contract. `Material` is the law of the scenes: von Mises, linear hardening. `Chaboche`
 hardens along a `Curve`, such as `Voce` or `Table`, and by `BackStress`es that fade, such as
-`ArmstrongFrederick`; `Layered` by layers that yield one after the other; `TrescaMaterial` yields by
-the largest shear stress, `SmoothMaterial` on any `SmoothSurface`. `PlaneStress` makes any law one
-for plane stress, `Heated` lowers the stiffness and strength of any law; both are `wrapped.Wrapped`,
-which passes on what a wrapper does not change.
+`ArmstrongFrederick`. In `Layered`, layers yield one after the other. `TrescaMaterial` yields by the
+largest shear stress, `SmoothMaterial` on any `SmoothSurface`. `PlaneStress` turns any law into one
+for plane stress; `Heated` lowers the stiffness and strength of any law. Both inherit from
+`wrapped.Wrapped`, which takes all other members from the wrapped law.
 """
 
 from solver.materials.back_stress import ArmstrongFrederick, BackStress

@@ -1,4 +1,4 @@
-"""Attributes that `Law` computes, and that a subclass may have as fields instead."""
+"""Attributes that `Law` computes and a subclass may define as fields instead."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 else:
 
     class attribute:  # noqa: N801
-        """A property that a subclass may also have as a field of its dataclass.
+        """A property that a subclass may replace by a field of its dataclass.
 
         With a plain property, ``dataclass`` would take the property for the field's default value,
         and the field could not be set.

@@ -1,7 +1,7 @@
-"""Rules by which the centre of a yield surface moves: parts of `Chaboche`.
+"""Back stresses: rules by which the centre of a yield surface moves, used by `Chaboche`.
 
-A rule of one's own is a class of `BackStress` with a modulus, a limit, its stress in tension and
-`evolve`. The return mapping and the tangent need no more (`solver.materials.back_stress_return`).
+To add a rule, subclass `BackStress` and define ``modulus``, ``limit``, `in_tension` and `evolve`.
+The return mapping and the tangent need no more (`solver.materials.back_stress_return`).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _STEP = 1e-5
-"""Step of the central differences, which are exact to its square; |normal| is 1.2."""
+"""Step of the central differences, relative; their error is its square. |normal| is 1.2."""
 _STRAIN = 1e-4
-"""Plastic strain over which a back stress changes: not less than that of first yield."""
+"""Plastic strain added to dp in the scale of the step: not less than the strain at first yield."""
 
 
 class BackStress(ABC):
@@ -42,12 +42,12 @@ class BackStress(ABC):
 
     @attribute
     def limit(self) -> float:
-        """The stress that it tends to in tension [MPa]; inf where it grows without bound."""
+        """Stress that it tends to in tension [MPa]; inf if it grows without bound."""
         raise NotImplementedError(f"{type(self).__name__} must give its limit")
 
     @attribute
     def symmetric(self) -> bool:
-        """Whether the derivative of `evolve` by plastic strain is."""
+        """Whether the derivative of `evolve` by plastic strain is symmetric."""
         return False
 
     @abstractmethod
@@ -60,20 +60,24 @@ class BackStress(ABC):
 
         Parameters
         ----------
-        old : back stress at its beginning, in heat perhaps beyond the limit
-        growth : (n_points,) dp, of the accumulated plastic strain
+        old : back stress at its beginning; after heating it may exceed the limit
+        growth : (n_points,) dp, increment of the accumulated plastic strain
         normal : (n_components, n_points) N; the plastic strain grows by dp N, and N : N = 3/2
+
+        Returns
+        -------
+        (n_components, n_points), Mandel [MPa]
         """
 
     def slopes(self, old: Array, growth: Array, normal: Array) -> tuple[Array, Array]:
         """Return the derivatives of `evolve` by dp and by N, for Newton's method and the tangent.
 
-        They are central differences; a rule may give its own.
+        The default takes central differences; a rule may override it.
 
         Returns
         -------
         by_growth, by_normal
-            (n_components, n_points) and (n_components, n_components, n_points)
+            (n_components, n_points) and (n_components, n_components, n_points) [MPa]
         """
         h = _STEP * (growth + _STRAIN)
         more, less = (self.evolve(old, growth + step, normal) for step in (h, -h))
@@ -87,7 +91,7 @@ class BackStress(ABC):
     def heat(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
         """Return the stored work that recall turns into heat (n_points,) [N mm/mm3].
 
-        Stored is 3/4 X:X / C; ``flow`` is the growth of plastic strain.
+        The stored work is 3/4 X:X / C; ``flow`` is the increment of plastic strain.
         """
         del growth
         if not self.modulus:
@@ -111,7 +115,7 @@ class ArmstrongFrederick(BackStress):
     Attributes
     ----------
     modulus : C [MPa], initial slope in tension
-    recall : gamma, how fast it forgets; 0 is Prager's rule. In tension it tends to C / gamma
+    recall : gamma, rate at which it fades; 0 is Prager's rule. In tension it tends to C / gamma
     """
 
     modulus: float
@@ -132,7 +136,7 @@ class ArmstrongFrederick(BackStress):
 
     @property
     def symmetric(self) -> bool:
-        """Whether it does not fade."""
+        """True if it does not fade (gamma = 0)."""
         return not self.recall
 
     def in_tension(self, accumulated: Array) -> Array:
@@ -141,7 +145,7 @@ class ArmstrongFrederick(BackStress):
         return C * (-np.expm1(-gamma * p) / gamma if gamma else p)
 
     def evolve(self, old: Array, growth: Array, normal: Array) -> Array:
-        """Return (X + 2/3 C dp N) / (1 + gamma dp)."""
+        """Return (X + 2/3 C dp N) / (1 + gamma dp) (n_components, n_points) [MPa]."""
         return (old + 2 / 3 * self.modulus * growth * normal) / (1 + self.recall * growth)
 
     def heat(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
@@ -151,5 +155,5 @@ class ArmstrongFrederick(BackStress):
         return np.asarray(factor * (new**2).sum(axis=0) * growth)
 
     def misfit(self, old: Array, new: Array, growth: Array, flow: Array) -> Array:
-        """Return the error of the rule, summed over an increment."""
+        """Return the error (n_components, n_points) of the rule over an increment [MPa]."""
         return new - old - 2 / 3 * self.modulus * flow + self.recall * growth * new

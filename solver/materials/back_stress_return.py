@@ -1,4 +1,4 @@
-"""Return to a von Mises surface that grows along a curve and is moved by back stresses."""
+"""Return mapping to a von Mises surface that grows along a curve and moves by back stresses."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
-"""Ratio of residual to trial stress at which nothing is left to gain."""
+"""Ratio of residual to trial stress; up to it the residual is rounding."""
 _SMALL = 1e-10
-"""The same where rounding of a rule lets it gain no more."""
+"""Ratio up to which a point counts as solved when further steps do not lessen the residual."""
 _MAX_ITERATIONS = 100
 
 
 class FlowStep(NamedTuple):
-    """An increment of flow at points.
+    """An increment of plastic flow at n points.
 
-    ``growth`` dp (n,); ``flow`` plastic strain (n_components, n); ``back`` the new back stresses
-    (n_back, n_components, n) [MPa]; ``softening`` elastic stiffness minus tangent (n_components,
-    n_components, n) [MPa].
+    ``growth`` (n,) dp; ``flow`` (n_components, n) increment of plastic strain; ``back`` (n_back,
+    n_components, n) new back stresses [MPa]; ``softening`` (n_components, n_components, n) elastic
+    stiffness minus tangent [MPa].
     """
 
     growth: Array
@@ -48,9 +48,9 @@ def fading_return(
     curve: Curve,
     G: float,
 ) -> FlowStep:
-    """Return the flow from a trial deviator (n_components, n) by one scalar equation a point.
+    """Return the flow from a trial deviator (n_components, n) by one scalar equation per point.
 
-    With the back stresses X at the beginning, the direction of flow is that of
+    With the back stresses X at the beginning of the increment, flow has the direction of
 
         xi(dp) = s - sum of X / (1 + gamma dp)
 
@@ -75,7 +75,7 @@ def fading_return(
 
     nothing = np.zeros(s.shape[1])
     first, _ = excess(nothing)
-    # what heat has left of a back stress beyond C / gamma fades in favour of the excess
+    # after heating a back stress may exceed C / gamma: as it fades, the excess grows
     for X, (modulus, recall) in zip(back, constants, strict=True):
         if recall:
             first = first + np.maximum(von_mises(X) - modulus / recall, 0.0)
@@ -109,22 +109,22 @@ def general_return(
     curve: Curve,
     G: float,
 ) -> FlowStep:
-    """Return the flow from a trial deviator (n_components, n) for any rules.
+    """Return the flow from a trial deviator (n_components, n) for any rules of back stresses.
 
     1. unknowns: relative stress xi and growth dp; N = 3/2 xi / q, with q its von Mises stress
     2. ``xi - s + 2 G dp N + sum of X(dp, N) = 0`` and ``q - R(p + dp) = 0``
     3. Newton's method from the flow without hardening; a step that does not lessen the residual, or
        makes dp negative, is halved
-    4. the derivative of xi and dp by s, from the same equations, makes the tangent
+    4. the tangent follows from the derivative of xi and dp by s, from the same equations
 
-    Where no solution is found dp is NaN, and the increment does not converge.
+    If no solution is found, dp is NaN and the increment does not converge.
     """
     n, count = s.shape
     scale, xi = von_mises(s), s - back.sum(axis=0)
     q = von_mises(xi)
     growth = q - curve.flow_stress(accumulated)
     for rule, X in zip(rules, back, strict=True):
-        growth += np.maximum(von_mises(X) - rule.limit, 0.0)  # heat may have left more
+        growth += np.maximum(von_mises(X) - rule.limit, 0.0)  # X may exceed it after heating
     growth /= 3 * G
     found = np.concatenate([xi / q * curve.flow_stress(accumulated + growth), [growth]])
     least, share = np.full(count, np.inf), np.ones(count)
@@ -175,7 +175,7 @@ class _Equations:
         return np.stack([rule.evolve(X, self.growth, self.normal) for rule, X in each])
 
     def residual(self) -> Array:
-        """Return what the equations lack (n_components + 1, n) [MPa]."""
+        """Return the residual of the equations (n_components + 1, n) [MPa]."""
         flow = 2 * self._G * self.growth * self.normal
         aside = self._xi - self._s + flow + self.moved().sum(axis=0)
         return np.concatenate([aside, [self._q - self._curve.flow_stress(self._p)]])
@@ -203,7 +203,7 @@ class _Equations:
 
 
 def _solved(matrices: Array, right: Array) -> Array:
-    """Return the solutions (n, m, n_points) of systems (n, n, n_points) with m right sides each."""
+    """Return solutions (n, m, n_points) of systems (n, n, n_points) with m right-hand sides."""
     found = np.linalg.solve(np.moveaxis(matrices, -1, 0), np.moveaxis(right, -1, 0))
     return np.asarray(np.moveaxis(found, 0, -1), dtype=float)
 

@@ -1,8 +1,8 @@
 """Von Mises plasticity whose yield surface grows along a curve and moves by fading back stresses.
 
-What fatigue and rail engineers use: the back stresses of Armstrong and Frederick forget, so that
-repeated loading about a mean stress ratchets, and the curve lets the surface grow and saturate.
-Other rules of back stresses are classes of `BackStress`.
+It is the law of fatigue and rail engineers: the back stresses of Armstrong and Frederick fade, so
+that repeated loading about a mean stress ratchets; the curve lets the surface grow and saturate.
+Other rules of back stresses are subclasses of `BackStress`.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 class ChabocheState(PlasticState):
     """Internal variables, with the back stresses (n_back, n_components, n_points) [MPa].
 
-    Each is 2/3 C times a strain, that of the plastic flow which is not forgotten, and is stretched
-    like it.
+    Each is 2/3 C times a strain, the plastic strain less the faded part, and `stretched` scales it
+    like a strain.
     """
 
     back: Array
@@ -67,7 +67,7 @@ class Chaboche(Law):
 
     @property
     def symmetric(self) -> bool:
-        """Whether no back stress fades."""
+        """Whether the tangent is symmetric: no back stress fades."""
         return all(rule.symmetric for rule in self.back_stresses)
 
     @property
@@ -77,7 +77,7 @@ class Chaboche(Law):
 
     @property
     def ultimate_shear_stress(self) -> float:
-        """What curve and back stresses tend to together, in shear [MPa]."""
+        """Shear stress that curve and back stresses together tend to [MPa]."""
         return self.surface.shear(self._limit)
 
     @property
@@ -108,7 +108,7 @@ class Chaboche(Law):
     def dissipation(self, before: PlasticState, response: Response) -> Array:
         """Return the work (n_points,) that an increment turns into heat [N mm/mm3].
 
-        Back stresses that fade give what they had stored.
+        Back stresses that fade release stored work.
         """
         heat = Law.dissipation(self, before, response)
         for rule, increment in self._increments(before, response.state):
@@ -118,7 +118,7 @@ class Chaboche(Law):
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
     ) -> Array:
-        """Return the error of an increment, that of the back stresses included [MPa]."""
+        """Return the error of an increment, including the back stresses (n_points,) [MPa]."""
         worst = Law.misfit(self, strain, stress, before, after)
         for rule, increment in self._increments(before, after):
             worst = np.maximum(worst, np.abs(rule.misfit(*increment)).max(axis=0))
@@ -127,7 +127,7 @@ class Chaboche(Law):
     def _increments(
         self, before: PlasticState, after: PlasticState
     ) -> Iterator[tuple[BackStress, tuple[Array, Array, Array, Array]]]:
-        """Yield each rule with old and new back stress, growth and flow."""
+        """Yield each rule with old and new back stress, growth dp and flow."""
         assert isinstance(before, ChabocheState) and isinstance(after, ChabocheState)
         flow = after.plastic_strain - before.plastic_strain
         dp = after.accumulated - before.accumulated
@@ -135,7 +135,7 @@ class Chaboche(Law):
             yield rule, (old, new, dp, flow)
 
     def respond(self, strain: Array, state: PlasticState) -> Response:
-        """Return stress, tangent and new state.
+        """Return stress, consistent tangent and new state.
 
         Fading back stresses make the tangent unsymmetric.
 

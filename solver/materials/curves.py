@@ -1,4 +1,4 @@
-"""How a yield surface grows: its size over the accumulated plastic strain."""
+"""Hardening curves: the size of the yield surface over the accumulated plastic strain."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Curve(Protocol):
-    """The tensile stress that a yield surface grows to; it does not fall."""
+    """The size of a yield surface, as a tensile stress; it must not fall with plastic strain."""
 
     def flow_stress(self, accumulated: Array) -> Array:
         """Return the size (n,) of the yield surface at plastic strains (n,) [MPa]."""
@@ -27,19 +27,19 @@ class Curve(Protocol):
 
     @property
     def limit(self) -> float:
-        """The size that it tends to [MPa]; inf where it grows without bound."""
+        """Size that it tends to [MPa]; inf if it grows without bound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Voce:
-    """Exponential growth that saturates: Re + Q (1 - exp(-b p)), and a linear part.
+    """Exponential growth that saturates, plus a linear part: Re + Q (1 - exp(-b p)) + H p.
 
     Attributes
     ----------
     yield_stress : Re, tensile stress at first yield [MPa]
-    saturation : Q, growth in the end [MPa]
-    rate : b, how fast
-    modulus : slope of the linear part [MPa]
+    saturation : Q, growth at saturation [MPa]
+    rate : b, rate of growth with plastic strain
+    modulus : H, slope of the linear part [MPa]
 
     References
     ----------
@@ -83,7 +83,7 @@ class Table:
     Attributes
     ----------
     plastic_strain : (n,) from 0, increasing
-    stress : (n,) the size there, positive, not falling [MPa]
+    stress : (n,) size at these strains, positive, not falling [MPa]
     """
 
     plastic_strain: tuple[float, ...]
@@ -105,7 +105,7 @@ class Table:
         return np.asarray(np.interp(accumulated, self.plastic_strain, self.stress))
 
     def slope(self, accumulated: Array) -> Array:
-        """See `Curve`; at a point that of the line after it."""
+        """See `Curve`; at a point of the table it is the slope of the line after it."""
         slopes = np.append(np.diff(self.stress) / np.diff(self.plastic_strain), 0.0)
         at = np.searchsorted(self.plastic_strain, accumulated, side="right") - 1
         return np.asarray(slopes[at])

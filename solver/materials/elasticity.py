@@ -38,7 +38,7 @@ class Elasticity:
 
     @property
     def plane_strain_modulus(self) -> float:
-        """E / (1 - nu^2): stress / strain in tension, one lateral strain held at zero [MPa]."""
+        """E / (1 - nu^2): slope of stress over strain if one lateral strain is zero [MPa]."""
         return self.youngs_modulus / (1 - self.poisson_ratio**2)
 
     def stiffness(self, n_components: int) -> NDArray[np.float64]:

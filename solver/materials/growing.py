@@ -1,4 +1,4 @@
-"""Laws whose yield surface grows along a curve, stays where it is, and is isotropic."""
+"""Laws with an isotropic yield surface that grows along a curve and does not move."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class GrowingLaw(Law):
     Attributes
     ----------
     elasticity : Hooke's law
-    curve : how its yield surface grows; `Voce` without saturation and modulus does not harden
+    curve : size of its yield surface; `Voce` without saturation and modulus does not harden
     """
 
     elasticity: Elasticity
@@ -37,7 +37,7 @@ class GrowingLaw(Law):
 
     @property
     def ultimate_shear_stress(self) -> float:
-        """The shear stress of the stress that the curve tends to [MPa]."""
+        """Shear stress equivalent to the limit of the curve [MPa]."""
         return self.surface.shear(self.curve.limit)
 
     def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""How a yield surface grows and moves with plastic strain."""
+"""Linear growth and motion of a yield surface with plastic strain."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class LinearHardening:
 
     @property
     def prager_modulus(self) -> float:
-        """2/3 Hk: back stress over plastic strain, as tensors [MPa]."""
+        """2/3 Hk: ratio of back stress to plastic strain, as tensors [MPa]."""
         return 2 / 3 * self.kinematic_modulus
 
     def flow_stress(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the size Re + Hi p (n,) of the yield surface at equivalent plastic strain p."""
+        """Return the size Re + Hi p (n,) of the yield surface at plastic strain p (n,) [MPa]."""
         return self.yield_stress + self.isotropic_modulus * accumulated
 
     def strength(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:

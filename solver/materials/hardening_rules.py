@@ -1,7 +1,7 @@
-"""Hardening rules by the word that scenes and scene files name them with.
+"""Hardening rules by the word that names them in scenes and scene files.
 
-A rule is a frozen dataclass whose fields are its parameters. It gives the law of a material; one
-that lets the yield surface grow and not move gives its curve, and goes with any yield condition.
+A rule is a frozen dataclass whose fields are its parameters. It gives the law of a material. A rule
+by which the yield surface grows and does not move gives a curve and goes with any yield condition.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ class HardeningRule(ABC):
 
     @abstractmethod
     def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
-        """Return the law of a material that yields by von Mises.
+        """Return the law of a von Mises material with this hardening; ``yield_stress`` in MPa.
 
         Raises
         ------
         ModelError
-            naming the parameter that is wrong
+            naming the wrong parameter
         """
 
 
 HARDENING: Parts[HardeningRule] = Parts("hardening")
-"""The rules by word. The order is that of their parameters in files and tables."""
+"""The rules by word. Files and tables list their parameters in this order."""
 
 
 class GrowingRule(HardeningRule):
@@ -61,24 +61,24 @@ class GrowingRule(HardeningRule):
 
     @abstractmethod
     def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
-        """Return how the yield surface grows."""
+        """Return the curve along which the yield surface grows; ``yield_stress`` in MPa."""
 
     def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
-        """Return the law of von Mises with this curve."""
+        """Return the von Mises law with this curve."""
         return Chaboche(elasticity=elasticity, curve=self.flow_curve(elasticity, yield_stress))
 
 
 class MovingRule(HardeningRule):
-    """The yield surface moves by back stresses, and does not grow unless `flow_curve` says so."""
+    """The yield surface moves by back stresses; it grows only if `flow_curve` is overridden."""
 
     __slots__ = ()
 
     @abstractmethod
     def parts(self, yield_stress: float) -> tuple[BackStress, ...]:
-        """Return the rules of the back stresses."""
+        """Return the rules of the back stresses; ``yield_stress`` in MPa."""
 
     def flow_curve(self, yield_stress: float) -> Curve:
-        """Return how the yield surface grows."""
+        """Return the curve along which the yield surface grows; by default it is constant."""
         return Voce(yield_stress=yield_stress)
 
     def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
@@ -88,13 +88,13 @@ class MovingRule(HardeningRule):
 
 
 class LinearRule(HardeningRule):
-    """The rule of `Material` that has this word."""
+    """A rule that `Material` has in closed form, under the same word."""
 
     __slots__ = ()
     word: ClassVar[Hardening]
 
     def law(self, elasticity: Elasticity, yield_stress: float) -> Material:
-        """Return the closed-form law; yield stress inf makes it elastic."""
+        """Return the closed-form law; it is elastic if the yield stress is inf."""
         return Material(
             youngs_modulus=elasticity.youngs_modulus,
             poisson_ratio=elasticity.poisson_ratio,
@@ -105,7 +105,7 @@ class LinearRule(HardeningRule):
 
 
 class LinearGrowingRule(LinearRule, GrowingRule):
-    """A rule of `Material` by which the yield surface does not move."""
+    """A rule of `Material` whose yield surface does not move."""
 
     __slots__ = ()
 
@@ -121,7 +121,7 @@ class LinearGrowingRule(LinearRule, GrowingRule):
 @HARDENING.word("none")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoHardening(LinearGrowingRule):
-    """The yield surface stays."""
+    """The yield surface does not change."""
 
     word: ClassVar[Hardening] = "none"
 
@@ -129,7 +129,7 @@ class NoHardening(LinearGrowingRule):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Sloped(LinearRule):
     hardening_ratio: HardeningRatio = described(
-        0.024, "slope Eu of the uniaxial hardening branch / Young's modulus"
+        0.024, "ratio of the slope Eu of the uniaxial hardening branch to Young's modulus"
     )
 
 
@@ -161,10 +161,10 @@ class MixedHardening(_Sloped):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Saturating:
     saturation: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
-        0.0, "growth of the yield stress in the end, with voce and chaboche hardening"
+        0.0, "growth of the yield stress at saturation, with voce and chaboche hardening"
     )
     saturation_rate: Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")] = described(
-        10.0, "how fast it grows: as 1 - exp(-rate * plastic strain)"
+        10.0, "rate of this growth: it follows 1 - exp(-rate * plastic strain)"
     )
 
     def voce(self, yield_stress: float) -> Voce:
@@ -176,7 +176,7 @@ class _Saturating:
 @HARDENING.word("voce")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoceHardening(_Saturating, GrowingRule):
-    """The yield surface grows, and saturates."""
+    """The yield surface grows and saturates."""
 
     def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
         """Return Voce's curve."""
@@ -195,7 +195,10 @@ class _Measured:
     def points(
         self, yield_stress: float, word: str
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return plastic strain and stress of the points."""
+        """Return plastic strain (n,) and stress (n,) [MPa] of the points.
+
+        Raises `ModelError` unless they begin at [0, yield_stress] and rise.
+        """
         strain, stress = np.reshape(_pairs("curve", self.curve), (-1, 2)).T
         begins = bool(self.curve) and (strain[0], stress[0]) == (0.0, yield_stress)
         rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
@@ -214,7 +217,7 @@ class TableHardening(_Measured, GrowingRule):
     """The yield surface grows along measured points."""
 
     def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
-        """Return the lines between the points."""
+        """Return the straight lines between the points."""
         strain, stress = self.points(yield_stress, "table")
         return Table(plastic_strain=tuple(strain.tolist()), stress=tuple(stress.tolist()))
 
@@ -229,7 +232,7 @@ class ChabocheHardening(_Saturating, MovingRule):
     )
 
     def parts(self, yield_stress: float) -> tuple[BackStress, ...]:
-        """Return Armstrong and Frederick's rule with each pair of constants."""
+        """Return one Armstrong-Frederick rule per pair of constants."""
         if not self.back_stresses:
             allowed = (
                 "must be given with chaboche hardening: [modulus C in MPa, recall gamma] of each"
@@ -265,7 +268,7 @@ class LayeredHardening(_Measured, HardeningRule):
 
 
 def _pairs(name: str, value: Pairs) -> Pairs:
-    """Return the pairs of numbers that a parameter must be."""
+    """Return the value if it is pairs of finite numbers, as the parameter must be."""
     known = isinstance(value, tuple) and all(
         isinstance(pair, Sequence) and len(pair) == 2 and all(map(_finite, pair)) for pair in value
     )

@@ -1,13 +1,13 @@
 """Any law at points where heat has lowered Young's modulus and the yield stress.
 
-With Young's modulus e E and the yield stress r Re the response follows from that of the law::
+With Young's modulus e E and yield stress r Re the response follows from that of the cold law::
 
     stress(strain) = r stress0(strain e / r),   tangent = e tangent0
 
-Every slope of the curve falls with Young's modulus then, and its stresses with the yield stress.
-Plastic strain stays what it is while the temperature changes, and so do the strains that back
-stresses belong to: Prager's back stress is 2/3 e H times the plastic strain at any temperature, and
-those of `Chaboche` fall with Young's modulus too.
+So every slope of the curve falls with Young's modulus, and its stresses fall with the yield stress.
+A change of temperature leaves plastic strain unchanged, and also the strains of back stresses:
+Prager's back stress is 2/3 e H times the plastic strain at any temperature, and the back stresses
+of `Chaboche` fall with Young's modulus too.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class Heated(Wrapped):
 
     Attributes
     ----------
-    law : the law at the temperature that its constants hold for; these are what the properties of
-        this one are
+    law : the law at the temperature for which its constants are given; the constants of this law,
+        such as ``yield_stress``, are the same
     stiff, strong : (n_points,) factors of Young's modulus and of the yield stress
     """
 
@@ -45,7 +45,7 @@ class Heated(Wrapped):
 
     @property
     def ultimate_shear_stress(self) -> float:
-        """That of the strongest point [MPa]."""
+        """Ultimate shear stress of the strongest point [MPa]."""
         return self.law.ultimate_shear_stress * float(self.strong.max())
 
     @property
@@ -85,7 +85,7 @@ class Heated(Wrapped):
     def flow_rule_error(
         self, stress: Array, flow: Array, growth: Array, after: PlasticState
     ) -> Array:
-        """Return the error (n_points,) of a plastic flow with respect to this law."""
+        """Return the error (n_points,) of a plastic flow by this law."""
         k = self._stretch
         own = stress / self.strong, flow * k, growth * k, after.stretched(k)
         return self.law.flow_rule_error(*own) / k
@@ -105,13 +105,13 @@ class Heated(Wrapped):
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
     ) -> Array:
-        """Return the error of an increment with respect to this law (n_points,) [MPa]."""
+        """Return the error of an increment by this law (n_points,) [MPa]."""
         k = self._stretch
         own = strain * k, stress / self.strong, before.stretched(k), after.stretched(k)
         return self.strong * self.law.misfit(*own)
 
     def respond(self, strain: Array, state: PlasticState) -> Response:
-        """Return stress, tangent and new state; no softened tangent is the elastic stiffness."""
+        """Return stress, tangent and new state; points with lowered stiffness count as yielding."""
         k = self._stretch
         before = state.stretched(k)
         own = self.law.respond(strain * k, before)

@@ -6,13 +6,16 @@ Arrays have their components first and their points last, and the number of comp
 the arrays: 4 in two dimensions, 6 in three (`solver.tensors`).
 
 A new law must define `elasticity`, `flow_stress` and `respond`. All else has a default for
-associated flow on a von Mises surface and isotropic hardening that comes to an end. Override
-`back_stress` and `strength` with kinematic hardening, `hardens` where stress grows without end,
-`ultimate_shear_stress` without hardening, `surface` for another yield condition, `flow_rule_error`
-and `has_corners` where that has edges, `symmetric` where the tangent is not. A law with internal
-variables of its own gives them in `initial`; its state names which of them are tensors
-(`PlasticState.TENSORS`), so that passes back over a track see them mirrored. What is marked as an
-attribute here may be a property or a field of a dataclass there.
+associated flow on a von Mises surface and isotropic hardening that saturates. Override:
+
+- `back_stress` and `strength` for kinematic hardening
+- `hardens` if stress grows without bound, `ultimate_shear_stress` if there is no hardening
+- `surface` for another yield condition, `flow_rule_error` and `has_corners` if it has edges
+- `symmetric` if the tangent is not symmetric
+
+A law with more internal variables returns them from `initial`; its state names those that are
+tensors (`PlasticState.TENSORS`), so that they can be mirrored for passes in the other direction.
+A subclass may define what is marked as an attribute here as a property or a dataclass field.
 """
 
 from __future__ import annotations
@@ -44,7 +47,7 @@ class Law(ABC):
 
     __slots__ = ()
 
-    # -- its parts -----------------------------------------------------------------------------
+    # -- parts ---------------------------------------------------------------------------------
 
     @attribute
     def elasticity(self) -> Elasticity:
@@ -53,7 +56,7 @@ class Law(ABC):
 
     @attribute
     def surface(self) -> YieldSurface:
-        """The shape of its yield surface."""
+        """The shape of the yield surface."""
         return VonMises()
 
     @abstractmethod
@@ -67,10 +70,10 @@ class Law(ABC):
         """Return the centre of the yield surface (n_components, n_points), Mandel [MPa]."""
         return np.zeros_like(state.plastic_strain)
 
-    # -- its response --------------------------------------------------------------------------
+    # -- response ------------------------------------------------------------------------------
 
     def initial(self, n_points: int, n_components: int) -> PlasticState:
-        """Return the internal variables before any load; a law with more of them overrides this."""
+        """Return the internal variables before any load; override it for more of them."""
         return PlasticState.virgin(n_points, n_components)
 
     @abstractmethod
@@ -96,11 +99,11 @@ class Law(ABC):
         return self.elasticity.energy_density(stress)
 
     def at(self, points: NDArray[np.int64]) -> Law:
-        """Return the law of some points: the same, where it is one for all."""
+        """Return the law of some points: the law itself if it is the same at all points."""
         del points
         return self
 
-    # -- its strength --------------------------------------------------------------------------
+    # -- strength ------------------------------------------------------------------------------
 
     @attribute
     def yield_stress(self) -> float:
@@ -119,7 +122,7 @@ class Law(ABC):
 
     @attribute
     def symmetric(self) -> bool:
-        """Whether its tangent is; bodies take the symmetric part of one that is not."""
+        """Whether the tangent is symmetric; otherwise bodies use its symmetric part."""
         return True
 
     @attribute
@@ -129,16 +132,16 @@ class Law(ABC):
 
     @attribute
     def has_corners(self) -> bool:
-        """Whether stress may stay in a corner, or on an edge, of its yield surface.
+        """Whether stress may stay at a corner or on an edge of the yield surface.
 
-        Little tangent or none is left there, though the body may bear more: softness proves no
-        limit load.
+        The tangent is small or zero there, though the body may carry more load: a soft body is then
+        no proof of a limit load.
         """
         return False
 
     @attribute
     def ultimate_shear_stress(self) -> float:
-        """Shear stress that no plastic strain lets it exceed [MPa]; inf where none is known."""
+        """Upper bound of the shear stress at any plastic strain [MPa]; inf if none is known."""
         return math.inf
 
     def strength(self, state: PlasticState) -> Array:
@@ -149,7 +152,7 @@ class Law(ABC):
         """Return the stress (n_points,) of the curve in pure shear at this plastic strain [MPa]."""
         return self.surface.shear(self.strength(state))
 
-    # -- its conditions ------------------------------------------------------------------------
+    # -- conditions ----------------------------------------------------------------------------
 
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
         """Return the yield function (n_points,) [MPa]: negative inside the yield surface."""
@@ -159,7 +162,7 @@ class Law(ABC):
     def flow_direction(self, stress: Array, state: PlasticState) -> Array:
         """Return the flow direction (n_components, n_points), Mandel.
 
-        It is the increment of plastic strain / plastic multiplier.
+        It is the increment of plastic strain per unit of the plastic multiplier.
         """
         return self.surface.normal(stress - self.back_stress(state))
 
@@ -172,18 +175,18 @@ class Law(ABC):
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
     ) -> Array:
-        """Return the error of an increment with respect to this law (n_points,) [MPa].
+        """Return the error of an increment by this law (n_points,) [MPa].
 
-        The conditions are evaluated here, not solved, so that `respond` is checked without being
-        called. With dp the growth of the accumulated plastic strain, backward Euler requires:
+        The conditions are evaluated, not solved: this checks `respond` without calling it. With dp
+        the growth of the accumulated plastic strain, backward Euler requires:
 
         - stress = C : (strain - plastic strain)
         - the yield value is not above 0, and is 0 where dp > 0
         - plastic strain grew by dp times the flow direction at the end, dp >= 0
 
         The largest error counts; an error of strain is multiplied by 2 G. Stress is the difference
-        of terms as large as C : strain. Their rounding turns the flow direction, at very large
-        strain by more than any error of interest: so much of the flow is left out.
+        of terms as large as C : strain. Their rounding turns the flow direction; at very large
+        strain this exceeds any error of interest, so the error of flow is reduced by it.
 
         Parameters
         ----------
@@ -203,15 +206,15 @@ class Law(ABC):
     def flow_rule_error(
         self, stress: Array, flow: Array, growth: Array, after: PlasticState
     ) -> Array:
-        """Return the error (n_points,) of a plastic flow with respect to this law.
+        """Return the error (n_points,) of a plastic flow by this law, a strain.
 
-        Override it where a yield surface has edges, on which more than one direction is right.
+        Override it for a yield surface with edges, where more than one direction is permitted.
 
         Parameters
         ----------
-        stress, flow : (n_components, n_points) Mandel, at the end of an increment; its plastic
-            strain
+        stress : (n_components, n_points) Mandel stress at the end of an increment [MPa]
+        flow : (n_components, n_points) increment of plastic strain, Mandel
         growth : (n_points,) plastic multiplier
-        after : internal variables at its end
+        after : internal variables at the end
         """
         return np.asarray(np.abs(flow - growth * self.flow_direction(stress, after)).max(axis=0))

@@ -1,7 +1,7 @@
 """Layered (overlay) material: perfectly plastic layers that share one strain.
 
-Each layer yields at a stress of its own. Together they harden along straight lines, and after
-reversal yield early, as metals do (the Bauschinger effect), with twice the curve of first loading.
+Each layer has its own yield stress. Together they harden along straight lines. After reversal they
+yield early, as metals do (the Bauschinger effect), along twice the curve of first loading.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class LayeredState(PlasticState):
-    """Internal variables, of all layers together (weighted means) and of each.
+    """Internal variables of all layers together (weighted means) and of each layer.
 
     Attributes
     ----------
@@ -48,8 +48,13 @@ class Layered(Law):
     Attributes
     ----------
     elasticity : Hooke's law of all layers
-    weights : (n_layers,) shares of the layers that yield; what is missing to 1 stays elastic
+    weights : (n_layers,) shares of the layers that yield; the rest, up to 1, stays elastic
     yields : (n_layers,) their yield stresses [MPa], increasing
+
+    Raises
+    ------
+    ModelError
+        if weights or yield stresses are not as above
 
     References
     ----------
@@ -79,18 +84,23 @@ class Layered(Law):
         stress: Sequence[float],
         slope: float = 0.0,
     ) -> Layered:
-        """Return the layers whose curve in tension goes through these points in straight lines.
+        """Return the layers whose curve in tension consists of straight lines between these points.
 
         The first point is that of first yield: its strain is stress / E. In tension a layer that
-        flows contracts more across than one that does not, so that the shares of the layers are
-        not the ratios of slopes. With the slope T after a point, the layers that flow have the
-        share ``(E - T) / (E - (1 - 2 nu) / 3 T)``. One that begins to flow at strain e and stress
-        s has the yield stress ``(3 E e - (1 - 2 nu) s) / (2 (1 + nu))``.
+        flows contracts more in the lateral direction than one that does not, so the shares of the
+        layers are not the ratios of slopes. If the slope after a point is T, the layers that flow
+        have the share ``(E - T) / (E - (1 - 2 nu) / 3 T)``. A layer that begins to flow at strain e
+        and stress s has the yield stress ``(3 E e - (1 - 2 nu) s) / (2 (1 + nu))``.
 
         Parameters
         ----------
-        strain, stress : (n,) total strain and stress in tension [MPa]
-        slope : of stress over total strain after the last point [MPa]
+        strain, stress : (n,) total strain, and stress in tension [MPa]
+        slope : slope of stress over total strain after the last point [MPa]
+
+        Raises
+        ------
+        ModelError
+            if the first point is not at first yield, or the slope does not fall from line to line
         """
         E, nu = elasticity.youngs_modulus, elasticity.poisson_ratio
         e, s = np.asarray(strain, dtype=float), np.asarray(stress, dtype=float)
@@ -114,7 +124,7 @@ class Layered(Law):
             yields=tuple(yields.tolist()),
         )
 
-    # -- its layers ----------------------------------------------------------------------------
+    # -- layers --------------------------------------------------------------------------------
 
     @property
     def _layers(self) -> list[tuple[float, Material]]:
@@ -127,7 +137,7 @@ class Layered(Law):
 
     @property
     def elastic_weight(self) -> float:
-        """Share of what never yields."""
+        """Share of the layer that never yields."""
         rest = 1 - sum(self.weights)
         return rest if rest > 1e-12 else 0.0
 
@@ -148,7 +158,7 @@ class Layered(Law):
         )
 
     def _stresses(self, stress: Array, state: PlasticState) -> list[Array]:
-        """Return the stress of each layer from that of all together, as they share one strain."""
+        """Return the stress of each layer from the total stress, as they share one strain."""
         C = self.stiffness(len(stress))
         return [
             stress + C @ (state.plastic_strain - layer.plastic_strain)
@@ -159,12 +169,12 @@ class Layered(Law):
 
     @property
     def hardens(self) -> bool:
-        """Whether a part never yields."""
+        """Whether stress grows without bound: one layer never yields."""
         return self.elastic_weight > 0
 
     @property
     def ultimate_shear_stress(self) -> float:
-        """The weighted yield stresses together, in shear [MPa]."""
+        """Shear stress equivalent to the weighted sum of the yield stresses [MPa]."""
         most = float(np.dot(self.weights, self.yields))
         return math.inf if self.hardens else self.surface.shear(most)
 
@@ -180,7 +190,7 @@ class Layered(Law):
     def strength(self, state: PlasticState) -> Array:
         """Return the stress of a tension test at this plastic strain (n_points,) [MPa].
 
-        All layers are taken to contract alike, as they do where volume is kept.
+        All layers are assumed to contract alike, which is exact if the volume is constant.
         """
         stiff = 3 * self.elasticity.shear_modulus
         weights, yields = np.array(self.weights), np.array(self.yields)
@@ -193,7 +203,7 @@ class Layered(Law):
         return np.interp(state.accumulated, plastic, stress) + slope * beyond
 
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
-        """Return the largest yield function of a layer (n_points,) [MPa]."""
+        """Return the largest yield function of all layers (n_points,) [MPa]."""
         each = zip(self._layers, self._stresses(stress, state), self._states(state), strict=True)
         return np.max([law.yield_value(own, layer) for (_, law), own, layer in each], axis=0)
 
@@ -211,14 +221,14 @@ class Layered(Law):
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
     ) -> Array:
-        """Return the largest error of a layer's increment, and of the sum of stresses [MPa]."""
+        """Return the largest error (n_points,) of the layers, means and total stress [MPa]."""
         C = self.stiffness(len(stress))
         worst = np.abs(stress - C @ (strain - after.plastic_strain)).max(axis=0)
         for state in (before, after):  # the means are those of the layers
             together = self._together(self._states(state))
-            apart = np.abs(state.plastic_strain - together.plastic_strain).max(axis=0)
-            apart = np.maximum(apart, np.abs(state.accumulated - together.accumulated))
-            worst = np.maximum(worst, 2 * self.elasticity.shear_modulus * apart)
+            error = np.abs(state.plastic_strain - together.plastic_strain).max(axis=0)
+            error = np.maximum(error, np.abs(state.accumulated - together.accumulated))
+            worst = np.maximum(worst, 2 * self.elasticity.shear_modulus * error)
         states = zip(self._layers, self._states(before), self._states(after), strict=True)
         for (_, law), old, new in states:
             own = law.misfit(strain, C @ (strain - new.plastic_strain), old, new)

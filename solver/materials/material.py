@@ -32,9 +32,15 @@ class Material(Law):
     poisson_ratio : nu, 0 <= nu < 0.5
     yield_stress : uniaxial yield stress [MPa]; ``inf`` (default) means elastic
     hardening : ``none``, ``isotropic``, ``kinematic`` (Prager) or ``mixed``
-    hardening_ratio : Eu / E, slope of the uniaxial curve beyond yield over Young's modulus
+    hardening_ratio : Eu / E, ratio of the slope of the uniaxial curve beyond yield to Young's
+        modulus
     isotropic_fraction : part of the plastic modulus that expands the yield surface when
         ``hardening`` is ``mixed``; the rest moves it
+
+    Raises
+    ------
+    ModelError
+        if a number is out of its range, or the word unknown
     """
 
     youngs_modulus: float
@@ -59,7 +65,7 @@ class Material(Law):
         if not 0 <= self.isotropic_fraction <= 1:
             raise ModelError("isotropic_fraction", self.isotropic_fraction, "must be in [0, 1]")
 
-    # -- its parts -----------------------------------------------------------------------------
+    # -- parts ---------------------------------------------------------------------------------
 
     @property
     def elasticity(self) -> Elasticity:
@@ -68,7 +74,7 @@ class Material(Law):
 
     @property
     def hardening_rule(self) -> LinearHardening:
-        """How its yield surface grows and moves."""
+        """Linear growth and motion of the yield surface."""
         return LinearHardening(
             yield_stress=self.yield_stress,
             isotropic_modulus=self.isotropic_modulus,

@@ -1,4 +1,4 @@
-"""Plane stress for any law: the thickness strain is solved for at each point."""
+"""Plane stress for any law: solve for the thickness strain at each point."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 _ZZ = 2
 _ROUNDING = float(np.finfo(float).eps)
-"""Ratio of stress zz to the size of the terms it is a sum of, below which it is rounding."""
+"""Ratio of stress zz to the magnitude of its terms; up to it stress zz is rounding."""
 _SMALL = 1e-9
-"""The same for laws that solve an equation by iteration, and are less exact."""
+"""The same for laws that iterate and are less exact; used when further steps do not improve."""
 _MAX_ITERATIONS = 100
 
 
 def condensed(stiffness: Array) -> Array:
-    """Return stiffnesses (n, n, ...) on Mandel strain with stress zz kept at zero.
+    """Return stiffnesses (n, n, ...) on Mandel strain [MPa] with stress zz kept at zero.
 
-    ``D - d d' / D_zz`` with d the column zz of D: row and column zz of the result are zero.
+    The result is ``D - d d' / D_zz`` with d the column zz of D; its row and column zz are zero.
     """
     D = stiffness
     out = np.asarray(D - D[:, _ZZ, None] * D[None, _ZZ] / D[_ZZ, _ZZ])
@@ -39,7 +39,7 @@ def condensed(stiffness: Array) -> Array:
 
 
 def _without_zz(strain: Array, state: PlasticState, C: Array) -> Array:
-    """Return strains with the zz row that makes stress zz zero, plastic strain as in a state."""
+    """Return strains whose zz row makes stress zz zero at the plastic strain of the state."""
     elastic = strain - state.plastic_strain
     elastic[_ZZ] = 0.0
     whole = strain.copy()
@@ -52,13 +52,13 @@ class PlaneStress(Wrapped):
     """Any law in plane stress, with four components; the zz row of strain is not read.
 
     1. strain zz from the elastic stiffness, plastic strain frozen
-    2. Newton's method for stress zz = 0; stress zz grows with strain zz. Where a step leaves the
+    2. Newton's method for stress zz = 0; stress zz grows with strain zz. If a step leaves the
        bracket of strains known to be too small and too large, the bracket is halved instead
     3. tangent condensed, stress zz set to zero
 
     Attributes
     ----------
-    law : the wrapped law, which needs all strains
+    law : the wrapped law, which needs all strain components
 
     References
     ----------
@@ -75,7 +75,7 @@ class PlaneStress(Wrapped):
     def misfit(
         self, strain: Array, stress: Array, before: PlasticState, after: PlasticState
     ) -> Array:
-        """Return the misfit of the wrapped law at the thickness strain without stress zz [MPa]."""
+        """Return the misfit of the wrapped law at the strain zz that makes stress zz zero [MPa]."""
         C = self.law.stiffness(len(strain))
         return self.law.misfit(_without_zz(strain, after, C), stress, before, after)
 
@@ -86,7 +86,7 @@ class PlaneStress(Wrapped):
     def respond(self, strain: Array, state: PlasticState) -> Response:
         """Return the response of the wrapped law at the thickness strain that makes stress zz zero.
 
-        Where no such strain is found stress is NaN, and the increment does not converge.
+        If no such strain is found, stress is NaN and the increment does not converge.
         """
         C = self.law.stiffness(len(strain))
         whole = _without_zz(strain, state, C)
@@ -108,7 +108,7 @@ class PlaneStress(Wrapped):
     def _thickness_strain(
         self, strain: Array, state: PlasticState, scale: Array, stiff: float
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the strain zz (n,) of points, and at which of them it makes stress zz zero."""
+        """Return the strain zz (n,) of points, and whether it makes stress zz zero there (n,)."""
         zz = strain[_ZZ].copy()
         n = len(zz)
         low, high = np.full(n, -np.inf), np.full(n, np.inf)
@@ -126,7 +126,7 @@ class PlaneStress(Wrapped):
             small = np.minimum(np.abs(off), least[going]) <= _SMALL * scale[going]
             done = (np.abs(off) <= _ROUNDING * scale[going]) | (small & ~better)
             least[going] = np.where(better, np.abs(off), least[going])
-            # stress zz grows with strain zz: a tangent that is not positive gives no direction
+            # stress zz grows with strain zz: a tangent that is not positive cannot be used
             step = zz[going] - off / np.where(slope > 0, slope, stiff)
             inside = (step > low[going]) & (step < high[going])
             middle = 0.5 * (low[going] + high[going])

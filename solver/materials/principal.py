@@ -1,4 +1,4 @@
-"""Principal values and directions of Mandel tensors, and tensors made of them."""
+"""Principal values and directions of Mandel tensors, and unit tensors of these directions."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ PAIRS = ((0, 1), (0, 2), (1, 2))
 def principal(mandel: Array) -> tuple[Array, Array]:
     """Return the principal values (3, n), the largest first, and their directions.
 
-    The directions (3, 3, n) have the components of a unit vector first, its number second. Values
-    of a tensor that is not finite are NaN.
+    In the directions (3, 3, n) the first axis is the component of the unit vector, the second its
+    number. Values of a tensor that is not finite are NaN.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def principal(mandel: Array) -> tuple[Array, Array]:
 def dyad(directions: Array, i: int, j: int, n_components: int) -> Array:
     """Return the unit tensor (n_components, n), Mandel, of two principal directions.
 
-    That is e_i e_i, or (e_i e_j + e_j e_i) / sqrt(2): together they are an orthonormal base.
+    It is e_i e_i, or (e_i e_j + e_j e_i) / sqrt(2); these tensors are an orthonormal basis.
     """
     a, b = directions[:, i], directions[:, j]
     rows = [

@@ -1,4 +1,4 @@
-"""The return of an isotropic material in principal stresses, whatever its yield surface."""
+"""Return mapping of an isotropic material in principal stresses, for any yield surface."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _ALIKE = 1e-10
+"""Ratio of the difference of two principal stresses to the largest one; up to it they are equal."""
 
 
 class IsotropicSurface(Protocol):
@@ -29,14 +30,18 @@ class IsotropicSurface(Protocol):
 
     @property
     def over_mises(self) -> float:
-        """Its equivalent stress is at most so many times that of von Mises."""
+        """Upper bound of the ratio of its equivalent stress to that of von Mises."""
 
     def of_principal(self, values: Array) -> Array:
-        """Return the equivalent stress (n,) of principal stresses (3, n), the largest first."""
+        """Return the equivalent stress (n,) of principal stresses (3, n), largest first [MPa]."""
 
 
 class Returned(NamedTuple):
-    """Principal plastic strains (3, n), multiplier (n,), d stress / d trial stress (3, 3, n)."""
+    """The plastic increment in principal values.
+
+    ``flow`` (3, n) plastic strains; ``growth`` (n,) multiplier; ``derivative`` (3, 3, n) of stress
+    by trial stress.
+    """
 
     flow: Array
     growth: Array
@@ -51,20 +56,20 @@ def principal_return(
     surface: IsotropicSurface,
     returned: Callable[[Array, Array], Returned],
 ) -> Response:
-    """Return stress and consistent tangent where all strain components are given.
+    """Return stress, consistent tangent and new state for all strain components given.
 
     1. trial: elastic strain with the plastic strain frozen, its principal stresses s1 >= s2 >= s3
     2. elastic where their equivalent stress is not above R(p)
-    3. elsewhere ``returned`` gives the principal stresses that are left, in the same order
+    3. elsewhere ``returned`` gives the plastic flow; the order of the stresses does not change
     4. principal directions are those of the trial stress. Tangent: the derivative of the principal
-       stresses, and (s_i - s_j) / (trial_i - trial_j) for what turns the directions
+       stresses, and (s_i - s_j) / (trial_i - trial_j) for the rotation of the directions
 
     Parameters
     ----------
     strain : (n_components, n_points) total Mandel strain
     state : internal variables of the last converged state, left unchanged
-    returned : principal trial stresses (3, n) beyond the surface, accumulated plastic strain (n,)
-        -> what flows
+    returned : maps principal trial stresses (3, n) beyond the surface [MPa] and accumulated plastic
+        strain (n,) to the plastic increment
 
     References
     ----------
@@ -98,9 +103,9 @@ def principal_return(
             turn += found.derivative[i, j] * own[i][:, None] * own[j][None]
     after = values - 2 * G * found.flow
     for i, j in PAIRS:
-        apart = values[i] - values[j]
-        alike = apart <= _ALIKE * (values[0] - values[2])
-        ratio = (after[i] - after[j]) / np.where(alike, 1.0, apart)
+        difference = values[i] - values[j]
+        alike = difference <= _ALIKE * (values[0] - values[2])
+        ratio = (after[i] - after[j]) / np.where(alike, 1.0, difference)
         limit = found.derivative[i, i] - found.derivative[i, j]
         mixed = dyad(directions, i, j, n_components)
         turn += np.where(alike, limit, ratio) * mixed[:, None] * mixed[None]
@@ -109,11 +114,11 @@ def principal_return(
 
 
 def grown(stiff: float | Array, trial: Array, before: Array, curve: Curve) -> tuple[Array, Array]:
-    """Return the multipliers dp (n,) of ``stiff dp + R(p + dp) = trial``, and the slopes of R.
+    """Return dp (n,) that solves ``stiff dp + R(p + dp) = trial``, and the slopes of R (n,) [MPa].
 
     Parameters
     ----------
-    stiff : what stress falls by with the multiplier [MPa]
+    stiff : fall of the elastic stress per unit of the multiplier [MPa]
     trial : (n,) stress without plastic flow, not below R(p) [MPa]
     before : (n,) p, the accumulated plastic strain
     """

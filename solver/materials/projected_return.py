@@ -36,7 +36,7 @@ class ProjectedReturn(PlaneStress):
     Attributes
     ----------
     law : the same law for three-dimensional states
-    hardening : how its yield surface grows and moves
+    hardening : linear growth and motion of its yield surface
     """
 
     hardening: LinearHardening
@@ -53,7 +53,7 @@ class ProjectedReturn(PlaneStress):
         return C
 
     def respond(self, strain: Array, state: PlasticState) -> Response:
-        """Return in-plane stress (zz = 0) and consistent tangent.
+        """Return stress with zz = 0, consistent tangent and new state.
 
         With eta = stress - back stress in the modes, c the modal stiffness and g the multiplier:
 

@@ -24,9 +24,9 @@ def radial_return(
     elasticity: Elasticity,
     hardening: LinearHardening,
 ) -> Response:
-    """Return stress and consistent tangent where all strain components are given.
+    """Return stress, consistent tangent and new state for all strain components given.
 
-    Plane strain, axisymmetry (4 components) and three dimensions (6 components).
+    It serves plane strain and axisymmetry (4 components) and three dimensions (6 components).
 
     1. trial: elastic strain with the plastic strain frozen, relative deviator xi
     2. f = |xi| - sqrt(2/3) (Re + Hi p); elastic where f <= 0

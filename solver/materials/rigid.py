@@ -1,4 +1,4 @@
-"""The law of what does not deform."""
+"""The law of rigid bodies."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 class Rigid(Law):
-    """A law without strain: infinitely stiff, never yielding."""
+    """A law without strain: infinitely stiff, it never yields."""
 
     @property
     def elasticity(self) -> Elasticity:
-        """An infinite modulus."""
+        """Elastic constants with an infinite modulus."""
         return Elasticity(youngs_modulus=np.inf, poisson_ratio=0.0)
 
     def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
@@ -29,7 +29,7 @@ class Rigid(Law):
         return np.full(state.accumulated.shape, np.inf)
 
     def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
-        """Return no stress for zero points; a rigid body has no others."""
+        """Return the empty response of zero points; a rigid body has no others."""
         if strain.shape[1]:
             raise ValueError("a rigid body has no points")
         count = len(strain)

@@ -1,4 +1,4 @@
-"""One equation at each point, solved for one unknown."""
+"""Solve one scalar equation at each point."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ def falling_root(
     scale: Array,
     start: Array | None = None,
 ) -> Array:
-    """Return where functions fall through zero (n,).
+    """Return the zeros (n,) of falling functions; NaN where none is found.
 
-    Newton's method. Where a step leaves the bracket of values known to be too small and too large,
-    the bracket is halved instead. What is not found is NaN.
+    Newton's method. If a step leaves the bracket of values known to be too small and too large, the
+    bracket is halved instead.
 
     Parameters
     ----------
-    excess : values (n,) -> (functions (n,), their derivatives), not negative at ``low``, falling
-    low, high : (n,) values that are not too large, and values that are too large
-    scale : (n,) size of the terms of the functions, which are solved to the rounding of these
-    start : (n,) first values, ``low`` if not given; from values inside the bracket steps may swing
-        about the zero and come hardly nearer: there it is halved too
+    excess : maps values (n,) to falling functions (n,), not negative at ``low``, and their
+        derivatives (n,)
+    low, high : (n,) lower and upper bounds of the zeros
+    scale : (n,) magnitude of the terms of the functions; the zeros are solved to their rounding
+    start : (n,) first values, by default ``low``; steps from values inside the bracket may
+        oscillate about the zero and converge slowly: the bracket is then halved too
     """
     x = low if start is None else start
     found, least, last = x, np.full_like(high, np.inf), np.zeros_like(high)

@@ -1,4 +1,4 @@
-"""A material with a smooth yield surface of one's own and isotropic hardening."""
+"""A material with a smooth user-defined yield surface and isotropic hardening."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SmoothMaterial(GrowingLaw):
     Raises
     ------
     ModelError
-        where that is not smooth, not convex, or not the tensile stress
+        if the surface is not smooth or not convex, or does not give the stress in tension
     """
 
     surface: SmoothSurface
@@ -54,13 +54,13 @@ def smooth_return(
 ) -> Returned:
     """Return to the surface along its normal.
 
-    A deviator is its size r and its Lode angle x, where the surface is f(x) r = R(p). The normal is
-    f along the deviator and f' across it. With the size t and the angle y of the trial stress:
+    A deviator has the size r and the Lode angle x; on the surface f(x) r = R(p). The normal has the
+    components f along the deviator and f' across it. If the trial stress has size t and angle y:
 
     1. along: t cos(y - x) = r + 2 G dp f, so that 2 G f^2 dp + R(p + dp) = t cos(y - x) f
-    2. across: t sin(y - x) = 2 G dp f', which is solved for x, with dp(x) from 1. Of its two sides
-       the left one is larger below the root and smaller above it, since the point of a convex
-       surface that is nearest to another one is the only one of its kind
+    2. across: t sin(y - x) = 2 G dp f', solved for x with dp(x) from step 1. There is one root,
+       since a convex surface has only one point nearest to the trial stress: the left side is
+       larger below the root and smaller above it
     3. derivative: (I + 2 G dp H)^-1 less its part along the normal, where H = (f + f'') / r is the
        curvature across
 
@@ -73,7 +73,7 @@ def smooth_return(
     first = curve.flow_stress(before)
 
     def solved(x: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-        """Return f, f', f + f'', r, dp and the slope of R at angles."""
+        """Return f, f', f + f'', r, dp and the slope of R, each (n,), at angles (n,)."""
         f, slope, bend = surface.at(x)
         along = np.maximum(size * np.cos(angle - x) * f, first)
         growth, hardening = grown(2 * G * f**2, along, before, curve)

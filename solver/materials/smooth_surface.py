@@ -1,8 +1,8 @@
-"""Yield surfaces of one's own: one function of the principal stresses, and what follows from it.
+"""Smooth user-defined yield surfaces: a function of principal stresses, and all that follows.
 
-The yield surface of an isotropic material that does not care for mean stress is a cylinder along
+The yield surface of an isotropic material that does not depend on mean stress is a cylinder along
 the hydrostatic axis. Its section is symmetric about the axes of the principal stresses, so that one
-sixth of it says all: how the equivalent stress of a deviator of size one depends on its Lode angle.
+sixth defines it: the equivalent stress of a unit deviator as a function of its Lode angle.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 SIXTH = math.pi / 3
-"""Lode angle of uniaxial compression; that of tension is 0, that of pure shear half of it."""
+"""Lode angle of uniaxial compression; it is 0 in tension and half of this in pure shear."""
 _MARGIN = 0.25
-"""How far beyond the sixth an angle is looked for: its ends are then no ends of a bracket."""
+"""Angle by which the bracket extends beyond the sixth, so that no root is at an end of it."""
 _IMAGINARY = 1e-30
 _STEP = 3e-6
-"""Step of the central difference of slopes that are exact: rounding and truncation are 1e-10."""
+"""Step of the central difference of the exact slopes: rounding and truncation are 1e-10."""
 _NOISE = 10.0
-"""A slope has the rounding of about so many operations."""
+"""Rounding of a slope, in units of the rounding of one operation."""
 _STATIONARY = 1e4
-"""Power hardly changes with the angle, which so many times the rounding leaves exact enough."""
+"""Tolerance of the angle of `power`, in units of rounding: power is stationary in this angle."""
 _FLAT = 1e-12
-"""Least curvature that a flat face is taken to have."""
+"""Curvature assigned to a flat face."""
 
 
 class Profile(NamedTuple):
-    """Equivalent stress over the Lode angle of a deviator of size one, each (n,).
+    """Equivalent stress of a unit deviator over its Lode angle, and its derivatives, each (n,).
 
-    ``size`` f, ``slope`` f' and ``bend`` f''. The section is convex where f + f'' is not negative.
+    ``size`` f, ``slope`` f' and ``bend`` f''. The section is convex if f + f'' is not negative.
     """
 
     size: Array
@@ -55,7 +55,7 @@ class Profile(NamedTuple):
 def polar(values: Array) -> tuple[Array, Array]:
     """Return size |s| (n,) and Lode angle (n,) of the deviators of principal stresses (3, n).
 
-    Where these are not finite the size is not either, and the angle is 0.
+    If a stress is not finite, neither is the size, and the angle is 0.
     """
     s1, s2, s3 = values
     x, y = (2 * s1 - s2 - s3) / math.sqrt(6), (s2 - s3) / math.sqrt(2)
@@ -72,13 +72,13 @@ def base(angle: Array) -> tuple[Array, Array]:
 def falling_angle(
     excess: Callable[[Array], tuple[Array, Array]], start: Array, scale: Array
 ) -> Array:
-    """Return the Lode angles (n,) where functions of size ``scale`` fall through zero."""
+    """Return the Lode angles (n,) at the zeros of falling functions of magnitude ``scale``."""
     low, high = np.full_like(start, -_MARGIN), np.full_like(start, SIXTH + _MARGIN)
     return falling_root(excess, low, high, _NOISE * scale, start)
 
 
 def _folded(angle: Array) -> tuple[Array, Array]:
-    """Return angles (n,) mirrored into the sixth, and the sign that slopes have there."""
+    """Return angles (n,) mirrored into the sixth, and the sign (n,) of slopes there."""
     inside = np.abs(angle)
     beyond = inside > SIXTH
     sign = np.where((angle < 0) ^ beyond, -1.0, 1.0)
@@ -86,7 +86,7 @@ def _folded(angle: Array) -> tuple[Array, Array]:
 
 
 def _stresses(angle: Any) -> Any:
-    """Return the deviators (3, n) of size one; no rounding changes the order of their values."""
+    """Return the unit deviators (3, n); rounding does not change the order of their values."""
     first, second = math.sqrt(2) * np.sin(SIXTH - angle), math.sqrt(2) * np.sin(angle)
     s3 = -(first + 2 * second) / 3
     return np.stack([s3 + second + first, s3 + second, s3])
@@ -99,11 +99,11 @@ class SmoothSurface(ABC):
 
     @abstractmethod
     def tension(self, s: Array) -> Array:
-        """Return the tensile stress (n,) that principal stresses amount to [MPa].
+        """Return the equivalent tensile stress (n,) of principal stresses [MPa].
 
-        It is convex, of degree one (twice the stresses, twice the result), does not depend on the
-        mean stress, and has no corner where two stresses are the same. Its slope is taken with
-        complex numbers: differences of the stresses need no ``abs``, which spoils it.
+        It must be convex, of degree one (twice the stresses, twice the result) and independent of
+        the mean stress, without a corner where two stresses are equal. Its slope is computed with
+        complex numbers, so it must not use ``abs``; ordered stresses do not need it.
 
         Parameters
         ----------
@@ -114,21 +114,21 @@ class SmoothSurface(ABC):
         """Return size, slope and bend at Lode angles (n,) from 0, tension, to pi / 3, compression.
 
         The slope is the imaginary part of `tension` after a step into the complex plane, which is
-        exact, and the bend its central difference. A surface that is to be fast gives its own.
+        exact; the bend is the central difference of slopes. Override it for speed.
         """
         inside, sign = _folded(np.stack([angle - _STEP, angle, angle + _STEP]))
         found = self.tension(_stresses(inside.ravel() + 1j * _IMAGINARY)).reshape(inside.shape)
         below, slope, above = sign * found.imag / _IMAGINARY
         return Profile(found.real[1], slope, (above - below) / (2 * _STEP))
 
-    # -- what follows --------------------------------------------------------------------------
+    # -- derived quantities --------------------------------------------------------------------
 
     @property
     def over_mises(self) -> float:
-        """Its equivalent stress is at most so many times that of von Mises.
+        """Upper bound of the ratio of its equivalent stress to that of von Mises.
 
-        A convex section that goes through tension and compression lies outside the hexagon whose
-        corners these are.
+        A convex section through the points of tension and compression lies outside the hexagon
+        with these corners.
         """
         tension, compression = self._size(np.array([0.0, SIXTH]))
         return 2 / math.sqrt(3) * max(1.0, compression / tension)
@@ -139,7 +139,7 @@ class SmoothSurface(ABC):
         return tension / ratio
 
     def of_principal(self, values: Array) -> Array:
-        """Return the equivalent stress (n,) of principal stresses (3, n), the largest first."""
+        """Return the equivalent stress (n,) of principal stresses (3, n), largest first [MPa]."""
         size, angle = polar(values)
         return size * self._size(angle)
 
@@ -148,7 +148,7 @@ class SmoothSurface(ABC):
         return self.of_principal(principal(stress)[0])
 
     def normal(self, stress: Array) -> Array:
-        """Return the derivative (n_components, n_points); zero where there is no deviator."""
+        """Return the derivative (n_components, n_points) of `equivalent`; zero without deviator."""
         values, directions = principal(stress)
         size, angle = polar(values)
         flow = np.sign(size) * self.gradient(angle)
@@ -156,9 +156,9 @@ class SmoothSurface(ABC):
         return np.asarray(sum(each))
 
     def power(self, strain: Array) -> Array:
-        """Return the most work (n_points,) on the deviator of Mandel strain; see `YieldSurface`.
+        """Return the largest work (n_points,) on the deviator of Mandel strain; see `YieldSurface`.
 
-        That is done by the stress at whose angle the normal of the section points along the strain.
+        The stress that does it has the angle at which the normal of the section is along strain.
         """
         size, angle = polar(principal(strain)[0])
 
@@ -174,7 +174,7 @@ class SmoothSurface(ABC):
         """Return the profile at any angles (n,): mirrored about tension and about compression."""
         inside, sign = _folded(angle)
         size, slope, bend = self.profile(inside)
-        bend = np.maximum(bend, -size)  # by rounding a flat face is not concave
+        bend = np.maximum(bend, -size)  # rounding must not make a flat face concave
         return Profile(size, sign * slope, bend)
 
     def gradient(self, angle: Array) -> Array:
@@ -186,10 +186,10 @@ class SmoothSurface(ABC):
     def _size(self, angle: Array) -> Array:
         return self.tension(_stresses(angle))
 
-    # -- whether it is one ---------------------------------------------------------------------
+    # -- check ---------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Raise `ModelError` where it is no smooth convex surface of the tensile stress."""
+        """Raise `ModelError` unless `tension` gives a smooth convex surface, as it must."""
         angle, step = np.linspace(0.0, SIXTH, 121), 1e-5
         s, one = _stresses(angle), np.array([[1.0], [0.0], [0.0]])
         with np.errstate(all="ignore"):

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class PlasticState:
     """Internal variables at the points of a body; never changed, only replaced.
 
-    A law with more internal variables inherits from this class and adds its arrays, points last.
-    Those that are tensors, ``(..., n_components, n_points)``, it names in `TENSORS` too.
+    For more internal variables inherit from this class and add arrays, points last. Name those that
+    are tensors, ``(..., n_components, n_points)``, in `TENSORS` too.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class PlasticState:
 
     @property
     def mirrored(self) -> Self:
-        """The internal variables as one sees them who looks along -x."""
+        """The internal variables in a frame whose x axis is reversed."""
         sign = np.ones((len(self.plastic_strain), *[1] * self.accumulated.ndim))
         sign[3::2] = -1.0  # xy, and zx in three dimensions
         return replace(self, **{name: getattr(self, name) * sign for name in self.TENSORS})
@@ -61,7 +61,7 @@ class PlasticState:
         )
 
     def unpacked(self, packed: NDArray[np.float64]) -> Self:
-        """Return internal variables of the same law from those of `packed` (n, ...)."""
+        """Return internal variables of the same law from an array like `packed` (n, ...)."""
         found, begin = {}, 0
         for name, shape, size in self._layout:
             found[name] = packed[begin : begin + size].reshape(*shape, *packed.shape[1:])
@@ -70,7 +70,7 @@ class PlasticState:
 
     @property
     def _layout(self) -> list[tuple[str, tuple[int, ...], int]]:
-        """Name, shape and count of the components of each internal variable."""
+        """Name, shape without points and number of components of each internal variable."""
         points = self.accumulated.ndim
         shapes = [(f.name, getattr(self, f.name).shape) for f in fields(self)]
         each = [(name, shape[: len(shape) - points]) for name, shape in shapes]
@@ -83,15 +83,16 @@ class PlasticState:
     def stepped(
         self, own: PlasticState, after: PlasticState, factor: NDArray[np.float64], flows: Points
     ) -> Self:
-        """Return these internal variables after a step of what they are when stretched.
+        """Return these internal variables after a step computed with stretched strains.
 
-        What the step has left as it was keeps every bit: there and back again, rounding would look
-        like flow.
+        Values that the step did not change are kept exactly: the rounding of stretching and its
+        inverse would look like plastic flow.
 
         Parameters
         ----------
-        own, after : the internal variables stretched by ``factor`` (n_points,), before and after
-        flows : (n_points,) points at which anything flows in the step
+        own, after : the stretched internal variables before and after the step
+        factor : (n_points,) factor of the stretched strains
+        flows : (n_points,) whether the point flows in the step
         """
         back = after.stretched(1 / factor)
         kept = {}
@@ -106,7 +107,7 @@ class Response(NamedTuple):
 
     ``stress`` (n_components, n_points) Mandel [MPa]; ``tangent`` (n_components, n_components,
     n_points), the derivative of stress by strain [MPa]; ``state`` the new internal variables;
-    ``yielding`` (n_points,) bool, where the tangent is not the elastic stiffness.
+    ``yielding`` (n_points,) bool, true where the tangent is not the elastic stiffness.
     """
 
     stress: NDArray[np.float64]

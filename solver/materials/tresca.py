@@ -30,13 +30,13 @@ class TrescaMaterial(GrowingLaw):
 
     @property
     def has_corners(self) -> bool:
-        """Yes: its surface has edges."""
+        """True: the surface has edges."""
         return True
 
     def flow_rule_error(
         self, stress: Array, flow: Array, growth: Array, after: PlasticState
     ) -> Array:
-        """Return the error of a flow, which at an edge may lie between two normals."""
+        """Return the error (n_points,) of a flow; at an edge it may lie between two normals."""
         return self.surface.flow_rule_error(stress, flow, growth, 2 * self.elasticity.shear_modulus)
 
     def respond(self, strain: Array, state: PlasticState) -> Response:

@@ -1,4 +1,4 @@
-"""Tresca plasticity with isotropic hardening: the return to a face or an edge."""
+"""Tresca plasticity with isotropic hardening: return mapping to a face or an edge."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 _FACE = np.array([1.0, 0.0, -1.0])
 _EDGES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])
-"""Flow on the face s1 - s3, and on the other one at the edges s2 = s3 and s1 = s2."""
+"""Flow on the second face at the edges s2 = s3 and s1 = s2; `_FACE` is that on face s1 - s3."""
 
 
 def tresca_return(trial: Array, before: Array, G: float, curve: Curve) -> Returned:
-    """Return to the face, and where that is not on it, to the edge.
+    """Return to the face or, where the result is not on it, to the edge.
 
     1. return to the face, flow (1, 0, -1): 4 G dp + R(p + dp) = s1 - s3
-    2. where that changes the order of the stresses, to the edge: flow on two faces by multipliers a
-       and b, dp = a + b, with the differences f1 and f2 of trial stresses on them:
+    2. if that changes the order of the stresses, return to the edge: flow on two faces with
+       multipliers a and b, dp = a + b. With the differences f1 and f2 of trial stresses on them:
        3 G dp + R(p + dp) = (f1 + f2) / 2 and a - b = (f1 - f2) / (2 G)
 
     Parameters
@@ -51,7 +51,7 @@ def tresca_return(trial: Array, before: Array, G: float, curve: Curve) -> Return
 
 
 def _on_edge(trial: Array, before: Array, G: float, curve: Curve) -> Returned:
-    """Return to the edge that the trial stress is nearer to."""
+    """Return to the nearer edge."""
     other = np.where(trial[0] + trial[2] > 2 * trial[1], _EDGES[0][:, None], _EDGES[1][:, None])
     first, second = trial[0] - trial[2], (other * trial).sum(axis=0)
     both, slope = grown(3 * G, 0.5 * (first + second), before, curve)

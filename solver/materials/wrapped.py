@@ -1,4 +1,4 @@
-"""A law around another one, whose members it passes on."""
+"""Base of laws that wrap another law and change some of its members."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 class Wrapped(Law):
-    """A law that is another one but for the members that a subclass defines.
+    """A law that takes from the wrapped law all members that a subclass does not define.
 
-    All other members of `Law` are those of the wrapped law. A subclass defines at least `respond`.
+    A subclass defines at least `respond`.
     """
 
     __slots__ = ()
@@ -29,15 +29,15 @@ class Wrapped(Law):
     law: Law
 
     def flow_stress(self, state: PlasticState) -> Array:
-        """Return that of the wrapped law."""
+        """Return the flow stress (n_points,) of the wrapped law [MPa]."""
         return self.law.flow_stress(state)
 
     def in_plane_stress(self) -> Law | None:
-        """Return None: in plane stress the whole is wrapped by `PlaneStress`, not the law in it."""
+        """Return None: `PlaneStress` then wraps this law, not the law inside it."""
         return None
 
 
-def _passed_on(name: str, member: object) -> Any:
+def _forwarded(name: str, member: object) -> Any:
     if isinstance(member, attribute):
         return property(lambda self: getattr(self.law, name), doc=member.__doc__)
 
@@ -51,4 +51,4 @@ def _passed_on(name: str, member: object) -> Any:
 
 for _name, _member in vars(Law).items():
     if not _name.startswith("_") and _name not in {*vars(Wrapped), "respond"}:
-        setattr(Wrapped, _name, _passed_on(_name, _member))
+        setattr(Wrapped, _name, _forwarded(_name, _member))

@@ -1,7 +1,7 @@
-"""Yield conditions by the word that scenes and scene files name them with.
+"""Yield conditions by the word that names them in scenes and scene files.
 
-A condition is a frozen dataclass whose fields are its parameters. With a hardening rule it gives
-the law of a material.
+A condition is a frozen dataclass whose fields are its parameters. Together with a hardening rule it
+gives the law of a material.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 class YieldCondition(ABC):
-    """At which stress a material yields, and in which direction.
+    """The stress at which a material yields, and the direction of flow.
 
     Attributes
     ----------
-    rules : hardening rules that go with it
+    rules : class of the hardening rules that it can be combined with
     """
 
     __slots__ = ()
@@ -40,16 +40,16 @@ class YieldCondition(ABC):
         Raises
         ------
         ModelError
-            naming the parameter that is wrong
+            naming the wrong parameter
         """
 
 
 YIELD_CONDITIONS: Parts[YieldCondition] = Parts("yield_condition")
-"""The conditions by word. The order is that of their parameters in files and tables."""
+"""The conditions by word. Files and tables list their parameters in this order."""
 
 
 class SmoothCondition(SmoothSurface, YieldCondition):
-    """A smooth convex surface, which subclasses give as a function of principal stresses."""
+    """A smooth convex surface that subclasses define as a function of principal stresses."""
 
     __slots__ = ()
 
@@ -68,7 +68,7 @@ class SmoothCondition(SmoothSurface, YieldCondition):
 @YIELD_CONDITIONS.word("mises")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MisesCondition(YieldCondition):
-    """The size of the deviator decides; it goes with every rule."""
+    """Yield by the size of the deviator; it can be combined with every hardening rule."""
 
     rules: ClassVar[type[Any]] = HardeningRule
 
@@ -80,7 +80,7 @@ class MisesCondition(YieldCondition):
 @YIELD_CONDITIONS.word("tresca")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrescaCondition(YieldCondition):
-    """The largest shear stress decides."""
+    """Yield by the largest shear stress."""
 
     def law(self, elasticity: Elasticity, yield_stress: float, rule: Any) -> Law:
         """Return Tresca's law with the curve of the rule."""

@@ -1,4 +1,4 @@
-"""The shape of a yield surface: at which stress a material yields, and in which direction."""
+"""Shapes of yield surfaces: the stress at which a material yields, and the direction of flow."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class YieldSurface(Protocol):
         """Return the derivative (n_components, n_points) of `equivalent` by Mandel stress."""
 
     def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the most work (n_points,) on the deviator of Mandel strain by stress inside.
+        """Return the largest work (n_points,) of a stress inside on the deviator of Mandel strain.
 
-        It is that of a surface whose tensile stress is 1.
+        The surface has the tensile stress 1.
         """
 
 
 @dataclass(frozen=True, slots=True)
 class VonMises:
-    """The von Mises surface: yield depends on the size of the deviator alone."""
+    """The von Mises surface: yield depends only on the size of the deviator."""
 
     def shear(self, tension: Tension) -> Tension:
         """Return k = tension / sqrt(3) [MPa]."""
@@ -62,10 +62,10 @@ class VonMises:
 
 @dataclass(frozen=True, slots=True)
 class Tresca:
-    """The Tresca surface: yield depends on the largest shear stress alone.
+    """The Tresca surface: yield depends only on the largest shear stress.
 
     In principal stresses it is a hexagonal prism. On its edges, where two principal stresses are
-    the same, any flow between the normals of the two faces is associated.
+    equal, any flow between the normals of the two faces is associated.
     """
 
     over_mises: ClassVar[float] = 2 / math.sqrt(3)
@@ -83,12 +83,12 @@ class Tresca:
         return self.of_principal(principal(stress)[0])
 
     def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return e1 e1 - e3 e3 (n_components, n_points), on an edge that of one of its faces."""
+        """Return e1 e1 - e3 e3 (n_components, n_points); on an edge, the normal of one face."""
         _, directions = principal(stress)
         return dyad(directions, 0, 0, len(stress)) - dyad(directions, 2, 2, len(stress))
 
     def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest principal value in size (n_points,) of the deviator of strain."""
+        """Return the largest absolute principal value (n_points,) of the deviator of strain."""
         values, _ = principal(deviator(strain))
         return np.asarray(np.abs(values).max(axis=0))
 
@@ -99,18 +99,22 @@ class Tresca:
         growth: NDArray[np.float64],
         unit: float,
     ) -> NDArray[np.float64]:
-        """Return by how much a flow is not associated (n_points,).
+        """Return the deviation (n_points,) of a flow from the associated flow rule, a strain.
 
-        In the principal directions of stress its components off the diagonal vanish, but where two
-        principal stresses are the same. Its principal values keep the volume, the largest is the
-        multiplier, the middle one vanishes, but on the edge that it points to, and stress does the
-        work of the flow stress on it.
+        For associated flow:
+
+        - its off-diagonal components in the principal directions of stress are zero, except
+          between two equal principal stresses
+        - its volume is zero, and its largest absolute principal value is the multiplier
+        - its middle principal value is zero, except on the edge that it points to
+        - stress does the work of the flow stress on it
 
         Parameters
         ----------
-        stress, flow : (n_components, n_points) Mandel, relative to the back stress; plastic strain
+        stress : (n_components, n_points) Mandel stress relative to the back stress [MPa]
+        flow : (n_components, n_points) increment of plastic strain, Mandel
         growth : (n_points,) multiplier
-        unit : stress whose difference counts as much as a strain of 1 [MPa]
+        unit : difference of stress that counts as much as a strain of 1 [MPa]
         """
         values, directions = principal(stress)
         high, middle, low = principal(flow)[0]

@@ -1,1 +1,1 @@
-"""Results of a walk: fields, figures, the audit."""
+"""Results of a run: fields, figures, the audit."""

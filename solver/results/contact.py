@@ -1,4 +1,4 @@
-"""What acts between surfaces: along the view of a scene, and on contact pairs by name."""
+"""Pressure, shear, gap and slip of contact: along a scene's view, and of contact pairs by name."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ PEAK_CONTACT_PRESSURE = declare(
 )
 PEAK_CONTACT_PRESSURE_S = declare(
     "peak_contact_pressure_s",
-    "distance along the surface from the middle of the contact of the largest pressure, among the "
+    "distance along the surface from the middle of the contact to the largest pressure, one of the "
     "positions s", "mm",
 )  # fmt: skip
 
 
 @output("contact", "s", "contact")
 def contact(run: FinishedRun) -> Values:
-    """Return pressure, shear and gap along the surface, half-width, and peak with its place."""
+    """Return pressure, shear and gap along s, half-width, and peak pressure with its position."""
     along = [run.tractions.along(c, run.view.s + centre) for c, centre in run.stages]
     width, peak = run.tractions.extent(run.loaded)
     loaded = along[run.view.stages.index(run.view.loaded)][0]
@@ -64,12 +64,13 @@ def contact(run: FinishedRun) -> Values:
 def contacts(
     results: Sequence[Sequence[ContactResult]], names: Sequence[str], samples: int
 ) -> Values:
-    """Return what acts on the slaves of contact pairs, at equal fractions of their lengths.
+    """Return pressure, shear, gap and slip of pairs at equal fractions of the slave's length.
 
     Parameters
     ----------
-    results : of each pair, that at each stage
-    samples : positions along each slave
+    results : for each pair, the result at each stage
+    names : names of the pairs
+    samples : number of positions along each slave
     """
     fraction = np.linspace(0.0, 1.0, samples)
     at = [fraction * pair[0].s[-1] for pair in results]

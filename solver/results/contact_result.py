@@ -1,4 +1,4 @@
-"""What acts between the surfaces of a contact pair, and where the contact ends."""
+"""Pressure, shear, gap and slip of a contact pair, and the ends of the contact."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactResult:
-    """What acts at the n vertices of the slave of a contact pair.
+    """Contact at the n vertices of the slave of a contact pair.
 
     Attributes
     ----------
     s : (n,) distance along the slave from its start [mm]
     X : (2, n) positions before loading [mm]
-    pressure : (n,) over the area before loading, to which the stress of the body refers [MPa]
-    shear : (n,) that the slave exerts on the master along s, over the same area [MPa]. Between a
-        lower and an upper body it is that on the lower one along x, whichever is the slave
-    pressure_deformed : (n,) over the deformed area, which both surfaces share: it does not depend
-        on which of them is the slave. Under small sliding it is ``pressure`` [MPa]
-    gap : (n,) NaN where no master faces the slave [mm]
-    slip : (n,) of the slave on the master along s [mm]
+    pressure : (n,) force per area before loading, as the stress of the body [MPa]
+    shear : (n,) shear of the slave on the master along s, per area before loading [MPa]. Between a
+        lower and an upper body it acts on the lower one along x, whichever is the slave
+    pressure_deformed : (n,) force per deformed area, which both surfaces share: it does not depend
+        on the choice of the slave. With small sliding it equals ``pressure`` [MPa]
+    gap : (n,) distance of the surfaces; NaN where no master faces the slave [mm]
+    slip : (n,) slip of the slave on the master along s [mm]
     closed : (n,) whether the bodies touch
     sticking : (n,) whether they touch without slip; nowhere without friction
     """
@@ -51,7 +51,7 @@ class ContactResult:
 
     @property
     def patches(self) -> list[tuple[float, float]]:
-        """From where to where along s the bodies touch [mm]."""
+        """Start and end along s of each patch in which the bodies touch [mm]."""
         return contact_patches(self.s, self.gap, self.closed)
 
     @property
@@ -60,9 +60,9 @@ class ContactResult:
         return sum(end - start for start, end in self.patches)
 
     def along(self, axis: Axis) -> ContactResult:
-        """Return the same in the order of a straight axis, ``s`` from its middle [mm].
+        """Return the result in the order of a straight axis, with ``s`` from its middle [mm].
 
-        Shear is that on the lower body along the axis.
+        Shear acts on the lower body along the axis.
         """
         s = axis.reached(self.X)
         order = np.argsort(s)
@@ -71,7 +71,7 @@ class ContactResult:
 
 
 def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResult:
-    """Return what acts at the vertices of the slave of a pair."""
+    """Return pressure, shear, gap and slip at the vertices of the slave of a pair."""
     interface, state, contact = system.interfaces[pair], at.state, at.state.contacts[pair]
     chain = interface.slave_surface
     X = chain.X[:, chain.vertices]
@@ -95,16 +95,16 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
 
 
 def contact_patches(s: Array, gap: Array, closed: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Return from where to where bodies touch, by the gaps beside each patch of closed points.
+    """Return start and end [mm] of each patch of contact, from the gaps beside its closed points.
 
-    Beyond a smooth edge of a contact the gap opens as the distance to the power 3/2. Its power 2/3
-    at two points beyond lies on a line that ends at the edge, whatever yields inside. Where the
-    surface ends, or nothing faces it, the edge is the last point that touches.
+    Outside a smooth contact the gap grows as the distance from its edge to the power 3/2, also if
+    the bodies yield inside. So a straight line through (gap)^(2/3) at two points is zero at the
+    edge. Where the surface ends, or no master faces it, the edge is the last closed point.
 
     Parameters
     ----------
     s : (n,) positions along the surface, growing [mm]
-    gap : (n,) NaN where it is not known [mm]
+    gap : (n,) NaN where unknown [mm]
     closed : (n,) whether the bodies touch
     """
     ends = np.flatnonzero(np.diff(np.pad(closed.astype(int), 1)))
@@ -115,7 +115,7 @@ def contact_patches(s: Array, gap: Array, closed: NDArray[np.bool_]) -> list[tup
 
 
 def _edge(s: Array, gap: Array, closed: NDArray[np.bool_], last: int, way: int) -> float:
-    """Return where contact ends beyond its last point in one direction, within an element."""
+    """Return the edge of contact beyond its last closed point in one direction (``way``) [mm]."""
     beyond, near, far = last + way * np.array([1, 2, 3])  # the hat of the first is partly closed
     if not 0 <= far < len(s) or closed[[beyond, near, far]].any():
         return float(s[last])

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from solver.results.run import FinishedRun, Values
 
 _NEAREST, _FARTHEST = 10.0, 0.03
-"""Range of the fit: elements at the corner, and half-widths from it."""
+"""Range of the fit: lower end in elements at the corner, upper end in half-widths."""
 _GRADED = 0.9
-"""Largest range of the fit / distance within which elements grow."""
+"""Largest ratio of the upper end of the fit to the distance within which elements grow."""
 _SHARE = 0.25
-"""Largest range of the fit / distance of another feature, or of the end of slip."""
+"""Largest ratio of the upper end of the fit to the distance of another feature or end of slip."""
 _NOTCH, _NOTCH_SHEAR = 0.364, 0.543
 """A corner that sticks is a notch of 270 degrees (Williams): difference of its first two powers,
-and outward shear / pressure of the first. In the second the two may have any sign."""
+and ratio of outward shear to pressure in the first term. In the second term signs are free."""
 _SEEN = (0.01, 0.1)
-"""Range in which the apparent power is taken / half-width."""
+"""Range of the apparent power, in half-widths."""
 
 
 @output("corner", "contact")
@@ -41,26 +41,29 @@ _SEEN = (0.01, 0.1)
 class Corner:
     """The power of the singularity with its error, its intensity, and the apparent power.
 
-    Contact pressure is fitted from ten elements from the corner on, as far as 0.03 half-widths, or
-    nine tenths of where elements grow, or a quarter of the way to another feature or to the end of
-    slip, where that is less. Where elements grow in proportion to the distance, their error is the
-    same share of the pressure everywhere, and has no part in its power. NaN where the corner has
-    lifted off, and where it sticks and the first term of the notch is not the largest in that
-    range. Stress in the half-plane would be a worse measure: a uniform stress along its surface,
-    which has no part in the pressure, is a term only 1 - p above the first.
+    Contact pressure is fitted from a distance of ten elements from the corner up to the least of
+
+    - 0.03 half-widths
+    - 0.9 of the distance within which elements grow in proportion to it: there their error is the
+      same share of the pressure everywhere, and does not change its power
+    - a quarter of the distance to another feature or to the end of slip
+
+    The result is NaN if the corner has lifted off, or if it sticks and the first term of the notch
+    is not the largest in that range. Stress in the half-plane is a worse measure: a uniform stress
+    along its surface, which does not change the pressure, is a term only 1 - p above the first.
     """
 
     half_width: Length = described(MISSING, "distance of the corner from the middle of the contact")
     mean_pressure: Stress = described(MISSING, "mean pressure on the contact")
     smallest_element: Length = described(MISSING, "element side at the corner")
     graded: Length = described(
-        MISSING, "distance from the corner within which elements grow in proportion to it"
+        MISSING, "distance from the corner within which element sides grow in proportion to it"
     )
     feature: Length = described(
-        1e6, "distance from the corner of what else shapes the stress, such as a groove"
+        1e6, "distance from the corner to another feature that changes the stress, such as a groove"
     )
     flush: bool = described(
-        False, "whether a corner that sticks is no notch: a straight side goes on beyond it"
+        False, "whether a straight side continues beyond the corner: if it sticks it is no notch"
     )
 
     def __post_init__(self) -> None:
@@ -98,12 +101,12 @@ class Corner:
         )
 
     def _next_feature(self, points: ContactResult, r: np.ndarray) -> float:
-        """Return the distance / half-width from the corner of what else shapes the field."""
+        """Return the distance from the corner to another feature or end of slip, in half-widths."""
         other = points.sticking != points.sticking[-1]
         return float(min([1.0, self.feature / self.half_width, *r[other]]))
 
 
 def _first_term_leads(points: ContactResult, r: np.ndarray, low: float) -> bool:
-    """Whether shear where the fit begins is more than half that of the first term of a notch."""
+    """Whether shear at the start of the fit exceeds half that of the first term of a notch."""
     near = int(np.argmin(np.abs(r - low)))
     return bool(points.shear[near] > _NOTCH_SHEAR / 2 * points.pressure[near])

@@ -1,4 +1,4 @@
-"""Fields at the nodes as files of other programs: VTU for ParaView."""
+"""Write fields at the nodes as VTU files for ParaView."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _CELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
-"""Nodes of an element -> cell of meshio. Corners, mid-sides and the middle have the same order in
-both."""
+"""Cell type of meshio by the number of nodes of an element. The nodes have the same order: corners,
+mid-sides, middle."""
 _PVD = "stages.pvd"
 
 
 def write_vtu(fields: MeshFields, folder: Path) -> Path:
-    """Write a .vtu for each stage and the .pvd that holds them together; return the latter.
+    """Write a .vtu for each stage and a .pvd that lists them; return the path of the .pvd.
 
-    They take the place of the stages that the folder had.
+    They replace the stages of an earlier call. Raises `ModelError` if ``folder`` is a file.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -48,7 +48,7 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
         whole = ElementTree.ElementTree(root)
         whole.write(Path(part) / _PVD, xml_declaration=True, encoding="utf-8")
         now = [each.attrib["file"] for each in stages]
-        for name in (*now, _PVD):  # all are written: nothing is left half-done
+        for name in (*now, _PVD):  # only when all files are written: the set is complete
             (Path(part) / name).replace(folder / name)
     for name in before - {*now}:
         (folder / name).unlink(missing_ok=True)
@@ -56,7 +56,7 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
 
 
 def _listed(path: Path) -> set[str]:
-    """Return the files beside a .pvd that it lists; none where there is no such file."""
+    """Return the names of the files that a .pvd lists; empty if there is no such file."""
     try:
         found = ElementTree.parse(path).iter("DataSet")
         return {Path(each.attrib["file"]).name for each in found}
@@ -65,20 +65,20 @@ def _listed(path: Path) -> set[str]:
 
 
 def vtu_of(fields: MeshFields, stage: str) -> bytes:
-    """Return the content of the .vtu of a stage."""
-    with tempfile.TemporaryDirectory() as folder:  # meshio writes to a path only
+    """Return the content of the .vtu file of a stage."""
+    with tempfile.TemporaryDirectory() as folder:  # meshio can only write to a path
         path = Path(folder) / "stage.vtu"
         to_meshio(fields, stage).write(path)
         return path.read_bytes()
 
 
 def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
-    """Return a stage as a mesh of meshio, all bodies in one.
+    """Return a stage as one mesh of meshio with all bodies.
 
-    The cell field ``body`` has their number. Displacement has three components for ParaView's
-    *Warp By Vector*; stress is in the fields ``stress_xx`` and so on. Numbers are in N, mm, MPa.
+    The cell field ``body`` is the number of the body. Displacement has three components for
+    ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and so on. Units: N, mm, MPa.
     """
-    import meshio  # only who writes needs it
+    import meshio  # imported here: only export needs it
 
     values = dict(fields.stages[stage])
     moved, stress = values.pop("displacement"), values.pop("stress")
@@ -97,5 +97,5 @@ def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
 
 
 def _in_space(vectors: Array) -> Array:
-    """Return vectors (n, 3) of (2, n), or of (3, n)."""
+    """Return vectors (2, n) or (3, n) as (n, 3), with z = 0 in two dimensions."""
     return np.pad(vectors.T, ((0, 0), (0, 3 - len(vectors))))

@@ -1,4 +1,4 @@
-"""The largest and smallest residual stress, by body and component, and where each of them is."""
+"""The largest and smallest residual stress of each body and component, with their positions."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 
 _OVER = ("body", "component")
 _ROUNDING, _SAME = 1e-9, 1e-6
-"""Stress / least yield stress that is rounding, and has no place; relative difference of it."""
+"""Ratio of stress to the least yield stress; up to it stress is rounding and has no position.
+Relative difference up to which stresses count as equal."""
 
 
 class Extreme(NamedTuple):
-    """Residual stress in the body and its place, and at its contact surface and its distance s."""
+    """Extreme residual stress in a body with its place, and at its contact surface with its s."""
 
     inside: Quantity
     place: tuple[Quantity, ...]
@@ -69,8 +70,8 @@ SMALLEST = Extreme(
 def residual_extremes(run: FinishedRun) -> Values:
     """Return the extreme residual stresses at the nodes of each body and of its contact surface.
 
-    Of nodes with the same stress, as on a track that a pass leaves alike along x, the one nearest
-    to the middle of the contact is taken; where there is no stress, none.
+    If several nodes have the same stress, as along x on a track after a pass, the node nearest to
+    the middle of the contact counts. The position is NaN if there is no stress.
     """
     laws = [run.system.full(name).body.material for name in run.system.names]
     least = [min(law.yield_stress, law.elasticity.youngs_modulus) for law in laws]
@@ -102,8 +103,9 @@ def _most(stress: Array, none: float, X: Array, away: Array) -> tuple[Array, Arr
     Parameters
     ----------
     stress : (n, n_nodes) [MPa]
+    none : stress up to which there is no position [MPa]
     X, away : positions of the nodes (n_axes, n_nodes), and their distance from the middle
-        (n_nodes,)
+        (n_nodes,) [mm]
     """
     most = stress.max(axis=1)
     same = stress >= most[:, None] - _SAME * np.abs(most[:, None])

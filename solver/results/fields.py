@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _MOST = 8
-"""Values of the last states that are kept."""
+"""Number of values that `Remembered` keeps."""
 T = TypeVar("T")
 
 
 class Solved(Protocol):
-    """A state that was found."""
+    """A converged state."""
 
     @property
     def state(self) -> State:
-        """Its unknowns."""
+        """The unknowns."""
 
 
 class Interpolation(Protocol):
-    """Interpolates nodal fields of a body at n positions; a `Sampler`, for one.
+    """Interpolates nodal fields of a body at n positions, as `Sampler` does.
 
     Attributes
     ----------
@@ -46,11 +46,11 @@ class Interpolation(Protocol):
     inside: NDArray[np.bool_]
 
     def __call__(self, nodal: Array) -> Array:
-        """Return values (..., n) of nodal fields (..., n_nodes), NaN outside of the body."""
+        """Return values (..., n) of nodal fields (..., n_nodes); NaN outside the body."""
 
 
 class Bodies(Protocol):
-    """Bodies of which states were found, each body a whole mesh: a `System`, for one."""
+    """Bodies with converged states, each body with its whole mesh, as in `System`."""
 
     @property
     def names(self) -> Sequence[str]:
@@ -58,13 +58,13 @@ class Bodies(Protocol):
 
     @property
     def n_unknowns(self) -> int:
-        """Displacement unknowns of all bodies."""
+        """Number of displacement unknowns of all bodies."""
 
     def full(self, name: str) -> Discretisation:
-        """Return a body."""
+        """Return a discretised body."""
 
     def positions(self, name: str) -> Array:
-        """Return where the points of a body are (n_axes, n_points) [mm]."""
+        """Return the positions (n_axes, n_points) of the points of a body [mm]."""
 
     def sampler(self, name: str, X: Array) -> Interpolation:
         """Return the interpolation of nodal fields of a body at positions (n_axes, n) [mm]."""
@@ -79,7 +79,7 @@ class Bodies(Protocol):
         """Return the displacements (n,) of a body [mm]."""
 
     def axle(self, converged: Any) -> RigidMotion | None:
-        """Return the motion of the first wheel, where there is one."""
+        """Return the motion of the first wheel, or None without a wheel."""
 
 
 class BodyValues(NamedTuple):
@@ -87,10 +87,10 @@ class BodyValues(NamedTuple):
 
     Attributes
     ----------
-    displacement : (n_axes, n), two axes or three [mm]
+    displacement : (n_axes, n) with two or three axes [mm]
     stress : (n_components, n) recovered, components xx, yy, zz, xy (, yz, zx) [MPa]
-    mises : (n,) von Mises stress, recovered from the integration points: that of recovered stress
-        would go beyond the strength [MPa]
+    mises : (n,) von Mises stress, recovered from its values at the integration points: computed
+        from the recovered stress it would exceed the strength [MPa]
     plastic_strain : (n,) equivalent plastic strain, recovered
     """
 
@@ -104,7 +104,7 @@ _POSITIVE = ("mises", "plastic_strain")
 
 
 class SystemFields:
-    """Fields of a system's bodies; those of the last states are kept."""
+    """Fields of a system's bodies; the fields of the last states are cached."""
 
     def __init__(self, system: Bodies) -> None:
         self.system = system
@@ -129,12 +129,15 @@ class SystemFields:
         )
 
     def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:
-        """Return positions (n_axes, n), von Mises stress and plastic strain at the points."""
+        """Return positions (n_axes, n) [mm], von Mises stress (n,) [MPa] and plastic strain (n,).
+
+        They belong to the integration points.
+        """
         found = self.system.response(body, at)
         return self.system.positions(body), von_mises(found.stress), found.state.accumulated
 
     def at_places(self, places: Places, states: Sequence[Solved]) -> list[BodyValues]:
-        """Return the fields at places of a body in each state; NaN outside of it."""
+        """Return the fields at places of a body in each state; NaN outside the body."""
         sampler = self.system.sampler(places.body, places.X)
         return [
             BodyValues(*(interpolated(sampler, values, name) for name in BodyValues._fields))
@@ -143,23 +146,23 @@ class SystemFields:
 
 
 def interpolated(sampler: Interpolation, values: BodyValues, name: str) -> Array:
-    """Return a field (..., n) of a body between its nodes, not below zero where it cannot be."""
+    """Return a field (..., n) interpolated between nodes; fields without sign stay not negative."""
     found = sampler(getattr(values, name))
     return not_below_zero(found) if name in _POSITIVE else found
 
 
 class Remembered(Generic[T]):
-    """Values of the last states, each computed once."""
+    """A cache of the values of the last states."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[Any, ...], tuple[State, T]] = {}
 
     def of(self, at: Solved, name: str, make: Callable[[], T]) -> T:
-        """Return the value of this name in a state; ``make`` computes it."""
+        """Return the value of this name in a state; ``make`` computes it if it is not cached."""
         key = (id(at.state), name)
         if key not in self._known:
             while len(self._known) >= _MOST:
                 del self._known[next(iter(self._known))]
-            # a state that is held keeps its identity; the tangents beside it would take much room
+            # keep the state, so that its id is not used again; tangents would need much memory
             self._known[key] = at.state, make()
         return self._known[key][1]

@@ -1,4 +1,4 @@
-"""Figures of every run: extreme values, and the cost of the run."""
+"""Numbers of every run: extreme values, and the cost of the run."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def extremes(run: FinishedRun) -> Values:
 
 
 def cost(run: FinishedRun) -> Values:
-    """Return the cost of the run."""
+    """Return counts of increments, iterations and unknowns, and the processor time."""
     tally = run.outcome.tally
     return {
         INCREMENTS: len(tally.iterations),

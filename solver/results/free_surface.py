@@ -1,36 +1,36 @@
 """Stress at a free surface without extrapolation.
 
 Recovered nodal stress is extrapolated to the surface from the integration points of the first
-elements. This is wrong where flow begins within an element. Two values need no extrapolation:
+elements. This is wrong if flow begins within an element. Two values need no extrapolation:
 
-- the stress at the first row of integration points, which is some way below the surface;
-- the stress by the conditions of a free surface. With t along the surface and n across it
-  ``sigma_nn = sigma_tn = 0``. Hooke's law for the other two components is then biaxial, and the
-  strain across the surface does not enter:
+- the stress at the first row of integration points, a small distance below the surface;
+- the stress from the conditions of a free surface. With t along the surface and n normal to it
+  ``sigma_nn = sigma_tn = 0``. Hooke's law for the other two components is then biaxial and does
+  not contain the strain normal to the surface:
 
       e_t = eps_t - ep_t,   e_z = eps_z - ep_z
       sigma_t = E / (1 - nu^2) (e_t + nu e_z)
       sigma_z = E / (1 - nu^2) (e_z + nu e_t)
 
-  ``eps_t`` follows from the displacements of the edge alone, ``eps_z`` is 0 in plane strain and
-  ``u_r / r`` with axisymmetry. In plane stress sigma_z = 0 and sigma_t = E e_t. The plastic strain
-  ``ep`` is that of the first row, so that the error is of first order in the side of the element:
+  ``eps_t`` follows from the displacements of the edge; ``eps_z`` is 0 in plane strain and
+  ``u_r / r`` in axisymmetry. In plane stress sigma_z = 0 and sigma_t = E e_t. The plastic strain
+  ``ep`` is taken from the first row, so the error is of first order in the side of the element:
   E / (1 - nu^2) times the change of ``ep_t + nu ep_z`` from the surface to that row.
 
-Where plastic strain is constant or zero below the surface, as after free rolling, both values are
-much better than the nodal one. Where it varies, strain at the surface and plastic strain of the
-first row are those of different depths, and the free-surface value is the worst of the three: a
-difference of 1e-3 is 220 MPa in steel. This happens under a braked wheel, where the value of the
-first row is best, and in a bore that yielded, where stress is smooth and the nodal value is best.
+If plastic strain is constant or zero below the surface, as after free rolling, both values are much
+better than the nodal one. If it varies, strain and plastic strain belong to different depths, and
+the free-surface value is the worst of the three: a difference of 1e-3 is 220 MPa in steel. This
+happens under a braked wheel, where the value of the first row is best, and in a bore that yielded,
+where stress is smooth and the nodal value is best.
 
 Both are taken in columns: a point of the first row and its foot, the point of the edge with the
-same coordinate along it. The derivative of a quadratic displacement is one order more exact at the
-two Gauss points of the edge than elsewhere, and the 2 x 2 points of an eight-node quadrilateral
-have their columns exactly there. Other integration rules do not, and lose this order.
+same coordinate along it. The derivative of a quadratic displacement is one order more accurate at
+the two Gauss points of the edge than elsewhere. The 2 x 2 points of an eight-node quadrilateral
+have their columns exactly there; other integration rules do not, and lose this order.
 
 References
 ----------
-J. Barlow, Int. J. Numer. Meth. Engng 10 (1976) 243-251: where strain is most exact in an element.
+J. Barlow, Int. J. Numer. Meth. Engng 10 (1976) 243-251: points of most accurate strain in elements.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _ONE_ROW = 1e-6
-"""Difference of reference coordinates up to which points are in one row: rounding of the rules."""
+"""Difference of reference coordinates; up to it points are in one row (rounding of the rules)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +65,10 @@ class FreeSurface:
     nodes : (n, 2 or 3) nodes of the edge above a column: start, end (, middle)
     N : (n, 2 or 3) shape functions of the edge at the foot of the column
     dN : (n, 2 or 3) their derivatives along the edge [1/mm]
-    X : (2, n) feet of the columns [mm], the first coordinate growing
-    tangent : (2, n) unit vectors along the edge, the body on their left
-    points : (n,) the points of the first row
-    depth : (n,) how far they are below the edge [mm]
+    X : (2, n) feet of the columns, in the order of the first coordinate [mm]
+    tangent : (2, n) unit vectors along the edge, with the body on the left
+    points : (n,) indices of the points of the first row
+    depth : (n,) depth of these points below the edge [mm]
     """
 
     part: Discretisation
@@ -90,10 +90,10 @@ class FreeSurface:
         reference = np.asarray(part.basis.elem.doflocs, dtype=float)
         a, b = (reference[(known == edges[:, k]).argmax(axis=0)] for k in (0, 1))
         # reference coordinates of the points, along each edge from its start and across it
-        along, apart = (b - a).T[:, :, None], np.asarray(part.basis.X)[:, None] - a.T[:, :, None]
+        along, offset = (b - a).T[:, :, None], np.asarray(part.basis.X)[:, None] - a.T[:, :, None]
         length = (along**2).sum(axis=0)
-        xi = 2 * (along * apart).sum(axis=0) / length - 1
-        across = np.abs(along[0] * apart[1] - along[1] * apart[0]) / np.sqrt(length)
+        xi = 2 * (along * offset).sum(axis=0) / length - 1
+        across = np.abs(along[0] * offset[1] - along[1] * offset[0]) / np.sqrt(length)
         edge, point = np.nonzero(across < across.min(axis=1, keepdims=True) + _ONE_ROW)
         nodes, xi = edges[edge], xi[edge, point]
         points = element[edge] * part.weights.shape[1] + point
@@ -115,7 +115,7 @@ class FreeSurface:
         return np.stack([tx**2 * xx + ty**2 * yy + SQRT2 * tx * ty * xy, zz])
 
     def strain(self, u: Array) -> Array:
-        """Return components t and z (2, n) of strain at the surface for displacements (n,)."""
+        """Return components t and z (2, n) of strain at the surface for displacements [mm]."""
         nodal = u.reshape(-1, 2)[self.nodes]
         along = np.einsum("nic,ni,cn->n", nodal, self.dN, self.tangent)
         if self.part.body.kinematics != "axisymmetric":
@@ -127,7 +127,7 @@ class FreeSurface:
 
         Parameters
         ----------
-        u : (n,) displacements [mm]
+        u : (n_unknowns,) displacements [mm]
         plastic_strain : (4, n_points) Mandel
         """
         elasticity = self.part.body.material.elasticity
@@ -137,10 +137,7 @@ class FreeSurface:
         return elasticity.biaxial_stress(elastic)
 
     def at(self, x: float, values: Array) -> Array:
-        """Return values (..., n) of the columns at ``x`` [mm]: linear between the nearest two.
-
-        Half way between them, as at a vertex between equal elements, it is their average.
-        """
+        """Return values (..., n) of the columns at ``x`` [mm], linear between the nearest two."""
         flat = np.atleast_2d(values)
         found = np.array([np.interp(x, self.X[0], each) for each in flat])
         return found.reshape(values.shape[:-1])

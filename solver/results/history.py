@@ -1,4 +1,4 @@
-"""What is kept of every increment: motions of rigid bodies, reactions, forces of contact."""
+"""Numbers stored after every increment: motions of rigid bodies, reactions, contact forces."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Observed:
 
     Attributes
     ----------
-    time : of the program; the load factor where loads have no amplitude
-    motions : of each rigid body
-    reactions : forces x, y [N] of the supports and prescribed displacements of each body; on a
-        rigid body all forces but contact, given ones and those that its motion needs, and their
-        moment about its centre [N mm]
-    contact : of each pair, the sums of normal and of tangential forces on the slave [N]
+    time : time of the program; the load factor if loads have no amplitude
+    motions : motion of each rigid body
+    reactions : forces x, y [N] and moment [N mm] by body. On a body with a mesh: the forces of
+        supports and prescribed displacements, moment NaN. On a rigid body: all forces except
+        contact, both given ones and those that its motion needs, and their moment about its centre
+    contact : sums of normal and of tangential forces on the slave of each pair [N]
     watched : numbers that outputs watch, over the dimension ``increment``
     """
 
@@ -43,7 +43,7 @@ class Observed:
 
 
 def observe(system: System, converged: Converged) -> Observed:
-    """Return what is kept of an increment."""
+    """Return the stored numbers of an increment."""
     state = converged.state
     motions, reactions = {}, {}
     for name, part, u, touch, forces in zip(
@@ -55,7 +55,7 @@ def observe(system: System, converged: Converged) -> Observed:
             x, y, turning = forces
             reactions[name] = (float(x), float(y), float(turning) * part.frame.radius)
         elif part.body.axle is None:  # type: ignore[union-attr]
-            # in equilibrium: this holds for a condensed body too, whose supports are inside
+            # by equilibrium, also for a condensed body, whose supported nodes are eliminated
             loads = system.full(name).external(state.time).reshape(-1, 2).sum(axis=0)
             x, y = -loads - touch.reshape(-1, 2).sum(axis=0)
             reactions[name] = (float(x), float(y), np.nan)
@@ -64,8 +64,8 @@ def observe(system: System, converged: Converged) -> Observed:
 
 
 def curve(history: Sequence[Observed], body: str) -> NDArray[np.float64]:
-    """Return the course of a rigid body.
+    """Return the history (7, n) of a rigid body.
 
-    Time, displacement x and y [mm], rotation [rad], forces x and y [N], moment [N mm] (7, n).
+    Rows: time, displacement x and y [mm], rotation [rad], forces x and y [N], moment [N mm].
     """
     return np.array([[o.time, *o.motions[body], *o.reactions[body]] for o in history]).T

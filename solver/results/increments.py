@@ -23,7 +23,7 @@ PART = declare("part", "body or rigid body", "", dims=("part",))
 
 _PART, _FORCE = ("part", "increment"), ("contact", "increment")
 INCREMENT_TIME = declare(
-    "increment_time", "time of the program: stages done, or load factor", dims=("increment",)
+    "increment_time", "time of the program: completed stages, or load factor", dims=("increment",)
 )
 REACTION = tuple(
     declare(f"reaction_{a}", f"force of supports and prescribed motions along {a}", "N", dims=_PART)
@@ -50,9 +50,14 @@ def over_increments(
 
     Parameters
     ----------
-    history : every increment, those that were cut in parts too
-    times : at which the increments of the program end, the beginning first
-    parts, pairs : names of all bodies, those without a mesh too, and of the contact pairs
+    history : all increments, including the parts of increments that were cut
+    times : times at which the increments of the program end, after the initial time
+    parts, pairs : names of all bodies, also those without a mesh, and of the contact pairs
+
+    Returns
+    -------
+    reactions [N] and motions [mm, rad] (n_parts, n_times), contact forces (n_pairs, n_times) [N];
+    NaN for increments that were not computed
     """
     kept = _in_order(history, times)
     lost = (np.nan, np.nan, np.nan)
@@ -81,7 +86,7 @@ def over_increments(
 
 
 def _in_order(history: Sequence[Observed], times: Sequence[float]) -> list[Observed | None]:
-    """Return the increment that ends at each of the times, None where it was not computed."""
+    """Return the increment that ends at each of the times, or None if it was not computed."""
     found: list[Observed | None] = []
     at = 0
     for time in times:

@@ -1,4 +1,4 @@
-"""What a ball does: force, approach, and the crater that it leaves."""
+"""Indentation by a ball: force, approach, and the crater that remains."""
 
 from __future__ import annotations
 
@@ -22,13 +22,11 @@ if TYPE_CHECKING:
 
 FORCE = declare("force", "force on the ball under load", "N")
 APPROACH = declare("approach", "displacement of the ball's centre under load", "mm")
-MEAN_CONTACT_PRESSURE = declare(
-    "mean_contact_pressure", "force / area of the contact under load", "MPa"
-)
+MEAN_CONTACT_PRESSURE = declare("mean_contact_pressure", "force per contact area under load", "MPa")
 CRATER_DEPTH = declare(
-    "crater_depth", "depth that is left where the contact was, at its middle", "mm"
+    "crater_depth", "depth of the crater after unloading, at the middle of the contact", "mm"
 )
-PILE_UP = declare("pile_up", "height of the pile-up that is left around the contact", "mm")
+PILE_UP = declare("pile_up", "height of the pile-up around the contact after unloading", "mm")
 PILE_UP_RADIUS = declare("pile_up_radius", "radius at which the pile-up is highest", "mm")
 SURFACE_DISPLACEMENT = declare(
     "surface_displacement",
@@ -50,7 +48,7 @@ _ON_AXIS = 1e-9
 @output("indentation", "contact", "s", "profile", "surfaces", "release")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Indentation:
-    """Force, approach, mean pressure under load, and how the surface of the profile's body moves.
+    """Force, approach, mean pressure under load, and the displacement of the profile's surface.
 
     The ball touches the origin, and its axis is x = 0. Force, approach and radius of the contact
     are those of every increment too.
@@ -63,7 +61,7 @@ class Indentation:
         check(self)
 
     def watch(self, system: Any, converged: Any) -> Values:
-        """Return what is kept of an increment."""
+        """Return force, approach and contact radius of an increment."""
         contact = converged.state.contacts[0]
         chain = system.interfaces[0].slave_surface
         x = chain.X[0, chain.vertices]
@@ -92,7 +90,7 @@ class Indentation:
         }
 
     def _moved(self, run: FinishedRun, converged: Solved) -> Array:
-        """Return how the surface of the profile's body has moved along y, over s [mm]."""
+        """Return the displacement along y of the surface of the profile's body, over s [mm]."""
         name = run.view.profile_body
         body = run.system.full(name)
         nodes = body.boundary_nodes(run.view.surfaces[name])
@@ -102,7 +100,7 @@ class Indentation:
         return np.asarray(np.interp(run.view.s, body.X[0, nodes], u) - centre)
 
     def _approach(self, system: Bodies, converged: Solved) -> float:
-        """Return by how much the centre of the ball has come nearer to what it is pressed on."""
+        """Return the displacement of the ball's centre towards the other body [mm]."""
         X = system.full(self.body).X
         axis = np.flatnonzero(np.abs(X[0]) <= _ON_AXIS * self.radius)
         axis = axis[np.argsort(X[1, axis])]

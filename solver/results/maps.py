@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from solver.results.run import FinishedRun, Values
 
 _MAP = ("y", "x")
-"""Dimensions of a map, up and across; a section has others, see `_on_map`."""
+"""Dimensions of a map: vertical, horizontal; a section has others, see `_on_map`."""
 
 RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("component", *_MAP))
 PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain after unloading", dims=_MAP)
@@ -51,7 +51,7 @@ HOOP_STRESS = declare(
 
 @output("maps", "map")
 def maps(run: FinishedRun) -> Values:
-    """Return maps around the contact: of bodies that are not released in every stage."""
+    """Return maps around the contact: all stages if the bodies are not unloaded at the end."""
     samples = run.samples
 
     def staged(name: str) -> np.ndarray:
@@ -80,7 +80,7 @@ def isochromatics(run: FinishedRun) -> Values:
 
 
 def _on_map(run: FinishedRun, values: Values) -> Values:
-    """Return values on the map, whose last two dimensions are the axes that the view has."""
+    """Return values on the map, with the axes of the view as the last two dimensions."""
     across, up = run.view.map_axes
     return {each.at(*each.dims[:-2], up, across): value for each, value in values.items()}
 

@@ -1,4 +1,4 @@
-"""Fields of all bodies at the nodes of their meshes: what other programs draw and evaluate."""
+"""Fields of all bodies at the nodes of their meshes, for drawing and for other programs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Nodes = NDArray[np.int64]
 
 NO_NODE = -1
-"""Fills the rows of faces and cells that have fewer nodes than others."""
+"""Fills the rows of faces and cells with fewer nodes than others."""
 
 _FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {
     3: ((0, 1, 2),),
@@ -27,7 +27,7 @@ _FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {
     8: ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
     9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
 }
-"""Nodes of an element -> triangles and quadrilaterals that use each of them."""
+"""Triangles and quadrilaterals that together use all nodes, by number of nodes of an element."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,11 +36,11 @@ class MeshFields:
 
     Attributes
     ----------
-    X : positions of the nodes before loading (n_axes, n_nodes)
-    bodies : body -> its element, the nodes of its cells (n_cells, k) counterclockwise (in two
-        coordinates): corners, mid-sides, middle
-    stages : stage -> displacement (n_axes, n_nodes), stress (n_components, n_nodes) with components
-        xx, yy, zz, xy (, yz, zx), mises (n_nodes,) and plastic_strain (n_nodes,)
+    X : (n_axes, n_nodes) positions of the nodes before loading
+    bodies : for each body its element and the nodes (n_cells, k) of its cells: corners, mid-sides,
+        middle; in two dimensions counterclockwise
+    stages : for each stage ``displacement`` (n_axes, n_nodes), ``stress`` (n_components, n_nodes)
+        with components xx, yy, zz, xy (, yz, zx), ``mises`` and ``plastic_strain`` (n_nodes,)
     """
 
     X: Array
@@ -51,7 +51,11 @@ class MeshFields:
     def faces(self) -> tuple[Nodes, Nodes]:
         """Triangles and quadrilaterals through all nodes, and the number of the body of each.
 
-        Elements with nodes between their corners are divided. A triangle ends with `NO_NODE`.
+        Elements with mid-side nodes are divided. The last node of a triangle is `NO_NODE`.
+
+        Returns
+        -------
+        (n_faces, 4) nodes and (n_faces,) numbers
         """
         faces, numbers = [], []
         for number, (_, cells) in enumerate(self.bodies.values()):
@@ -74,8 +78,8 @@ def mesh_fields(fields: SystemFields, states: Mapping[str, Solved]) -> MeshField
     bodies, first = {}, 0
     for name, whole in wholes.items():
         cells = whole.basis.element_dofs.T
-        if len(whole.X) == 2:  # in space they have no side that is seen
-            cells = _turned_left(cells, whole.X)
+        if len(whole.X) == 2:  # cells in three dimensions have no orientation to correct
+            cells = _counterclockwise(cells, whole.X)
         bodies[name] = (whole.body.element, first + cells)
         first += whole.X.shape[1]
     stages = {}
@@ -86,8 +90,8 @@ def mesh_fields(fields: SystemFields, states: Mapping[str, Solved]) -> MeshField
     return MeshFields(X=X, bodies=bodies, stages=stages)
 
 
-def _turned_left(cells: Nodes, X: Array) -> Nodes:
-    """Return the nodes of cells (n, k) counterclockwise, as other programs have them."""
+def _counterclockwise(cells: Nodes, X: Array) -> Nodes:
+    """Return the nodes of cells (n, k) in counterclockwise order, as other programs expect."""
     corners = 4 if cells.shape[1] in (4, 8, 9) else 3
     (x, y), ahead = X[:, cells[:, :corners]], np.roll(X[:, cells[:, :corners]], -1, axis=2)
     right = (x * ahead[1] - y * ahead[0]).sum(axis=1) < 0

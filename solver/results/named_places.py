@@ -1,4 +1,4 @@
-"""Places that have names, and all that is stored at them: lines, points, contacts, numbers."""
+"""Named places and the values stored at them: lines, points, contacts, requested numbers."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 class NamedPlaces(NamedTuple):
-    """Places that have names, besides the view of a scene, and the numbers requested of a run.
+    """Named places, in addition to the view of a scene, and the numbers requested of a run.
 
     Attributes
     ----------
-    lines, points : in the order of their dimensions
+    lines, points : places by name, in the order of their dimensions
     contacts : names of the contact pairs
-    numbers : requested of every run
-    samples : positions along each contact; none where it is stored along the view
+    numbers : numbers requested of every run
+    samples : number of positions along each contact; 0 if contact is stored along the view
     """
 
     lines: Mapping[str, Places]
@@ -34,14 +34,14 @@ class NamedPlaces(NamedTuple):
 
 
 def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float]) -> Values:
-    """Return all that is stored at places that have names, and after each increment.
+    """Return all values stored at named places, and after each increment.
 
     Parameters
     ----------
-    times : at which the increments of the program end, the beginning first; none where a run has
-        no increments
+    times : times at which the increments of the program end, after the initial time; empty if a
+        run has no increments
     """
-    from solver.results.contact_result import contact_result  # only who computes needs the solver
+    from solver.results.contact_result import contact_result  # needed only by runs
 
     system: Any = run.system
     fields = run.samples.fields

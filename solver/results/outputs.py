@@ -1,10 +1,10 @@
-"""Outputs that scene files ask for by a word.
+"""Outputs that scene files request by a word.
 
-An output says its word where it is defined, and what a scene must have for it. It is a function of
-a run, or a frozen dataclass that is called with a run and whose fields are its parameters; a field
-``body`` is the name of a body. Such a class may have ``watch(system, converged)``, which gives
-numbers of every increment (quantities over the dimension ``increment``), and ``warnings(run)``,
-which gives texts for the user.
+The definition of an output states its word and what a scene must have for it. An output is a
+function of a run, or a frozen dataclass that is called with a run; its fields are its parameters,
+and a field ``body`` is the name of a body. Such a class may have ``watch(system, converged)``,
+which returns numbers of every increment (quantities over the dimension ``increment``), and
+``warnings(run)``, which returns texts for the user.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from solver.errors import ModelError
 from solver.parts import load_own_parts, run_again
 
 Need = Literal["map", "profile", "s", "surfaces", "contact", "release"]
-"""A grid, depth profiles, positions along a surface, a contact surface of every body, a contact
-pair, a last stage that releases the bodies."""
+"""Needs of an output: a map grid, depth profiles, positions s along a surface, a contact surface of
+every body, a contact pair, a last stage that releases the bodies."""
 T = TypeVar("T", bound=Callable[..., Any])
 
 
 class NamedOutput(NamedTuple):
-    """What makes an output, and what a scene must have for it."""
+    """The function or class of an output, and what a scene must have for it."""
 
     make: Callable[..., Any]
     needs: tuple[Need, ...]
 
     @property
     def parametric(self) -> bool:
-        """Whether it is made of parameters."""
+        """Whether it has parameters."""
         return dataclasses.is_dataclass(self.make)
 
 
@@ -38,12 +38,12 @@ _OUTPUTS: dict[str, NamedOutput] = {}
 
 
 def output(word: str, *needs: Need) -> Callable[[T], T]:
-    """Return the decorator that gives an output its word.
+    """Return the decorator that registers an output under a word.
 
     Raises
     ------
     ModelError
-        when another one has the word
+        if another output has the word
     """
 
     def named(make: T) -> T:
@@ -57,9 +57,9 @@ def output(word: str, *needs: Need) -> Callable[[T], T]:
 
 
 def outputs() -> Mapping[str, NamedOutput]:
-    """Return word -> output, those of files of one's own too.
+    """Return the outputs by word, including those of the user's files.
 
-    Those of the package are complete when `solver.scenes` has been imported.
+    The outputs of the package are complete once `solver.scenes` has been imported.
     """
     load_own_parts()
     return _OUTPUTS

@@ -1,7 +1,7 @@
-"""Values along lines and at points that have names.
+"""Values along named lines and at named points.
 
-Lines are sampled at equal fractions of their length, so that runs whose lengths differ still have
-one index; the positions are stored beside.
+Lines are sampled at equal fractions of their length, so that runs with lines of different lengths
+share one index; the positions are stored too.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ POINT_MOVED = declare_along(
 def along_lines(
     fields: SystemFields, lines: Mapping[str, Places], states: Sequence[Solved]
 ) -> Values:
-    """Return stress and plastic strain along lines, all of as many points, in each state."""
+    """Return stress and plastic strain in each state along lines with equal numbers of points."""
     X = np.stack([line.X for line in lines.values()])
     distance = np.linalg.norm(np.diff(X, axis=2), axis=1)
     found = _states(fields, lines, states)
@@ -91,7 +91,7 @@ def at_points(
 def _states(
     fields: SystemFields, places: Mapping[str, Places], states: Sequence[Solved]
 ) -> dict[str, Array]:
-    """Return each field over places, states, its own components and points."""
+    """Return each field as an array over places, states, its components and points."""
     every = [fields.at_places(each, states) for each in places.values()]
     names = every[0][0]._fields
     return {

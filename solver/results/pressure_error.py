@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 PRESSURE_ERROR = declare(
     "pressure_error",
-    "error of contact pressure without friction against the closed form, over nine tenths of the "
-    "contact, / the pressure there; both in the mean square",
+    "relative error of contact pressure without friction against the closed form, in the mean "
+    "square over nine tenths of the contact",
 )
-_AWAY = 0.9  # of the half-width: where the error is taken
+_AWAY = 0.9  # end of the range of the error, in half-widths: the pressure is infinite at 1
 
 
 @output("pressure_error", "contact")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureError:
-    """The error against p(x) / p0 = 2 / (pi sqrt(1 - (x/a)^2)), p0 the mean pressure.
+    """The error against p(x) / p0 = 2 / (pi sqrt(1 - (x/a)^2)), with p0 the mean pressure.
 
-    NaN with friction, where there is no closed form.
+    It is NaN with friction, because there is no closed form.
     """
 
     half_width: Length = described(MISSING, "half-width a of the punch")

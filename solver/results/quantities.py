@@ -1,4 +1,4 @@
-"""The meaning of each number in a record, declared once, in the module that computes it.
+"""The name, meaning and unit of each number in a record, declared in the module that computes it.
 
 The data set, the captions of pictures and the pages read these declarations. `QUANTITIES` is
 complete when `solver.scenes` has been imported.
@@ -25,12 +25,12 @@ class Quantity:
     Attributes
     ----------
     name : name of the variable; the only dimension of a coordinate has the same name
-    long_name : what it is, in words
-    units : as the CF conventions write them
-    dims : its dimensions; none for one number per run
-    standard_name : name in the CF conventions, where there is one
+    long_name : meaning in words
+    units : unit as the CF conventions write it
+    dims : names of the dimensions; empty for one number per run
+    standard_name : standard name of the CF conventions, if there is one
     count : whether it is a whole number
-    flags : enumeration of its values, where they stand for words
+    flags : enumeration of its values, if they stand for words
     beside : more attributes of the CF conventions
     """
 
@@ -45,12 +45,12 @@ class Quantity:
 
     @property
     def coordinate(self) -> bool:
-        """Whether it is a dimension's own coordinate."""
+        """Whether it is the coordinate of a dimension."""
         return self.dims == (self.name,)
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """CF attributes."""
+        """Attributes of the variable by the CF conventions."""
         given = {
             "long_name": self.long_name,
             "units": self.units,
@@ -63,18 +63,18 @@ class Quantity:
         return known | dict(self.beside)
 
     def over(self, dimension: str) -> Quantity:
-        """Return the quantity with one more dimension, before its own."""
+        """Return the quantity with one more dimension in front."""
         return replace(self, dims=(dimension, *self.dims))
 
     def at(self, *dims: str) -> Quantity:
-        """Return the same quantity at places that have other dimensions."""
+        """Return the same quantity with other dimensions."""
         return replace(self, dims=dims)
 
 
 QUANTITIES: dict[str, Quantity] = {}
 IN_SPACE: dict[str, Quantity] = {}
-"""Those along the third axis, which only runs with three coordinates have: others may give these
-names to parameters, axes of a sweep and numbers of their own."""
+"""Quantities along the third axis, which only runs in three dimensions have: other scenes may use
+these names for parameters, axes of a sweep and requested numbers."""
 
 
 def declare(
@@ -92,7 +92,8 @@ def declare(
 
     Raises
     ------
-    ValueError : the name is declared already
+    ValueError
+        if the name is declared already
     """
     if name in QUANTITIES:
         known = QUANTITIES[name].long_name
@@ -113,11 +114,11 @@ def declare(
 def declare_along(
     name: str, long_name: str, units: str = "1", *, dims: tuple[str, ...] = ()
 ) -> tuple[Quantity, ...]:
-    """Declare a variable for each axis and return all of them: see `along_axes`.
+    """Declare a variable for each axis and return all of them; see `along_axes`.
 
     Parameters
     ----------
-    name, long_name : with ``{}`` where the name of the axis stands
+    name, long_name : with ``{}`` in place of the name of the axis
     """
     *plane, third = ((name.format(axis), long_name.format(axis)) for axis in AXES)
     return *(declare(*each, units, dims=dims) for each in plane), in_space(*third, units, dims=dims)
@@ -130,5 +131,5 @@ def in_space(name: str, long_name: str, units: str, **more: Any) -> Quantity:
 
 
 def along_axes(quantities: tuple[Quantity, ...], values: Any) -> dict[Quantity, Any]:
-    """Return what `declare_along` declared, of the axes that the array (n_axes, ...) has."""
+    """Return the values (n_axes, ...) by the quantities of `declare_along` for their axes."""
     return dict(zip(quantities, values, strict=False))

@@ -26,7 +26,7 @@ class Status(Enum):
 
     @property
     def solved(self) -> bool:
-        """Whether the run converged and passed its audit, small-strain theory apart."""
+        """Whether the run converged and passed its audit, with or without small strains."""
         return self in (Status.OK, Status.OUTSIDE_THEORY)
 
 
@@ -37,13 +37,13 @@ class Record:
     Attributes
     ----------
     parameters : the scene's parameter object of exactly this run
-    status, message : outcome; when it is not ``OK``, the reason and what to do
-    coordinates : dimension name -> values, floats (``x``, ``y``, ``depth``, ``s``, ``station``)
+    status, message : outcome; if it is not ``OK``, the reason and what to do
+    coordinates : values by name of dimension: floats (``x``, ``y``, ``depth``, ``s``, ``station``)
         or labels (``component``, ``stage``, ``body``)
-    fields : variable name -> (dimension names, values); NaN outside the bodies
-    scalars : variable name -> number, audit figures included
-    symmetric : whether the bodies are one half of what is symmetric about x = 0
-    mesh : () -> fields at the nodes of the bodies, of a complete run; to be called before the next
+    fields : names of dimensions and values by name of variable; NaN outside the bodies
+    scalars : numbers by name of variable, including figures of the audit
+    symmetric : whether the bodies are one half of a model symmetric about x = 0
+    mesh : function that returns the fields at the nodes of a complete run; call it before the next
         run is computed
     """
 
@@ -57,5 +57,5 @@ class Record:
     mesh: Callable[[], MeshFields] | None = field(default=None, compare=False)
 
     def with_one_mesh(self) -> Record:
-        """Return the record with fields at the nodes that are computed once."""
+        """Return the record with fields at the nodes computed only once."""
         return self if self.mesh is None else replace(self, mesh=cache(self.mesh))

@@ -29,11 +29,11 @@ _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement"
 _COMPONENTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 EXTREME = ("maximum", "minimum")
 OF_CONTACT = ("pressure", "shear", "gap", "slip")
-"""What is taken of a contact."""
+"""Fields of a contact of which a number can be requested."""
 
 
 def of_body(axes: int) -> tuple[str, ...]:
-    """Return what is taken of a body whose places have this many coordinates."""
+    """Return the fields of a body with this many axes of which a number can be requested."""
     stress = (f"stress.{name}" for name in components(2 * axes))
     moved = (f"displacement.{name}" for name in AXES[:axes])
     return (*stress, "mises", "plastic_strain", *moved)
@@ -41,19 +41,19 @@ def of_body(axes: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RequestedNumber:
-    """A number of every run; a maximum and a minimum with their place.
+    """A number requested of every run; a maximum or minimum also has a position.
 
     Attributes
     ----------
-    name : of the variable; those of the place end in ``_x``, ``_y`` (and ``_z``)
-    of : one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are those at
-        integration points, others at nodes
+    name : name of the variable; the position adds ``_x``, ``_y`` (and ``_z``)
+    of : the field, one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are
+        taken at integration points, other fields at nodes
     take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
-        along which the value is above zero; of a pressure that is the length of contact
-    stage : the state
-    body, line, contact : where: one of them
-    x, y, z : the box of the body where it is sought [mm]
-    description : what it is, in words
+        along which the value is above zero; for ``pressure`` it is the length of contact
+    stage : name of the state
+    body, line, contact : name of the place; exactly one of the three
+    x, y, z : ranges of a box in the body to which the number is restricted [mm]
+    description : meaning in words
     """
 
     name: str
@@ -70,7 +70,7 @@ class RequestedNumber:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The number and, of an extreme value, its place, of which a run gives its axes."""
+        """The number and, for an extreme value, its position along all axes; a run may have two."""
         places = {"body": self.body, "line": self.line, "contact": self.contact}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
@@ -94,17 +94,18 @@ class RequestedNumber:
         lines: Mapping[str, Places],
         contacts: Mapping[str, ContactResult],
     ) -> Values:
-        """Return the number of a run, NaN where the field is not known.
+        """Return the number of a run, with its position if it has one; NaN if the field is unknown.
 
         Parameters
         ----------
         at : the state at its stage
-        lines : those that ``line`` may name
-        contacts : what acts between the surfaces of each contact pair in that state
+        lines : lines by name
+        contacts : results of the contact pairs in that state, by name
 
         Raises
         ------
-        ModelError : the body has no such component, or no such coordinate
+        ModelError
+            if the body has no such component or no such axis
         """
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
             found: tuple[float, ...] = (contacts[self.contact].length,)
@@ -113,7 +114,7 @@ class RequestedNumber:
         return dict(zip(self.quantities, found, strict=False))
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:
-        """Return the number of values (n,) at places (n_axes, n), with its place if it has one."""
+        """Return the number from values (n,) at places (n_axes, n), with its position if any."""
         known = np.isfinite(values)
         if not known.any():
             return (np.nan,) * (1 + len(X) if self.take in EXTREME else 1)
@@ -133,7 +134,7 @@ class RequestedNumber:
         lines: Mapping[str, Places],
         contacts: Mapping[str, ContactResult],
     ) -> tuple[Array, Array]:
-        """Return the values it is taken of (n,), NaN outside of the box, and where they are."""
+        """Return the values (n,) of the field, NaN outside the box, and positions (n_axes, n)."""
         kind, _, part = self.of.partition(".")
         if self.contact is not None:
             self._check(OF_CONTACT)
@@ -145,7 +146,7 @@ class RequestedNumber:
         if self.line is not None:
             (values,) = fields.at_places(lines[self.line], [at])
             found = getattr(values, kind)
-        elif kind in ("mises", "plastic_strain"):  # recovered at nodes they may be beyond the law
+        elif kind in ("mises", "plastic_strain"):  # recovered nodal values may violate the law
             X, mises, strain = fields.at_points(at, body)
             found = mises if kind == "mises" else strain
         else:

@@ -1,4 +1,4 @@
-"""A finished run, as outputs see it."""
+"""A finished run, the input of all outputs."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class FinishedRun:
     samples : fields of its system at the positions of the scene's view
     tractions : pressure and shear on its lower body
     outcome : the result of its program
-    check : () -> its audit, of a complete run
-    notes : what the user must know of how it was computed
-    singular : points beside which its numbers are those of the mesh
-    source : what its record is compared with; None for the states of a system
+    check : function that returns the audit of a complete run
+    notes : messages to the user about the computation
+    singular : singular points, near which numbers depend on the mesh
+    source : source of the values with which the record is compared; None for states of a system
     """
 
     parameters: Any
@@ -51,12 +51,12 @@ class FinishedRun:
 
     @property
     def view(self) -> View:
-        """Where its results are taken."""
+        """The positions at which results are taken."""
         return self.samples.view
 
     @property
     def complete(self) -> bool:
-        """Whether the program was walked to its end."""
+        """Whether the program was run to its end."""
         return self.outcome.error is None
 
     @property
@@ -71,14 +71,14 @@ class FinishedRun:
 
     @property
     def stages(self) -> list[tuple[Solved, float]]:
-        """States whose contact is recorded, each with the x at which s is zero [mm]."""
+        """Stored states of contact, each with the x at which s is zero [mm]."""
         states = [(name, self.outcome.points[name]) for name in self.view.stages]
         following = self.view.following
         return [(c, self.tractions.centre(c) if name in following else 0.0) for name, c in states]
 
 
 Values = Mapping[Quantity, Any]
-"""What an output gives: a number or an array for each quantity, over its dimensions."""
+"""Result of an output: a number, or an array over its dimensions, for each quantity."""
 
 Output = Callable[[FinishedRun], Values]
 """Computes some quantities of a run."""

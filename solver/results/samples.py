@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 class Samples:
-    """Samples one system; the interpolation is set up once for all its runs.
+    """Samples one system at the positions of a view; interpolation is set up once for all runs.
 
     Raises
     ------
     ModelError
-        when the map of the view meets no body
+        if no point of the map is inside a body
     """
 
     def __init__(self, system: Bodies, view: View) -> None:
@@ -45,7 +45,7 @@ class Samples:
         self._surface = {name: system.sampler(name, surface) for name in view.surfaces}
 
     def on_map(self, name: str, at: Solved) -> Array:
-        """Return a field of the bodies on the map (..., up, across), named as in `BodyValues`."""
+        """Return a field of `BodyValues` on the map (..., vertical, horizontal)."""
         out: Array | None = None
         for body, sampler in self._map.items():
             here = interpolated(sampler, self.fields.at_nodes(at, body), name)
@@ -79,7 +79,7 @@ class Samples:
     def surface_mises(self, at: Solved, centre: float) -> Array:
         """Return von Mises stress along s at the surface of the profile body [MPa].
 
-        It is not above the largest at an integration point.
+        It is limited to the largest value at an integration point.
         """
         name = self.view.profile_body
         body = self.system.full(name)
@@ -94,5 +94,5 @@ class Samples:
 
 
 def _extent(view: View) -> list[float]:
-    """Return from where to where a map reaches across, and up [mm]."""
+    """Return the horizontal range and then the vertical range of a map [mm]."""
     return [float(end) for grid in view.map_grid for end in (grid.min(), grid.max())]

@@ -1,4 +1,4 @@
-"""A solution as a file: the model and its states, from which everything else is made anew."""
+"""Save a solution to a file: its model and states, from which all else is computed again."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _HEAD = b"residua solution "
-"""What the file begins with; the version of the solver follows, and the end of the line."""
+"""Start of the file; the version of the solver and the end of the line follow."""
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:
-    """Write what a solution is made of.
+    """Write the content of a solution.
 
     Raises
     ------
-    ModelError : the file cannot be written, or the model holds something that cannot be stored,
-        such as a function without a name
+    ModelError
+        if the file cannot be written, or the model contains an object that cannot be pickled, such
+        as a lambda
     """
     try:
         stored = pickle.dumps(dict(content))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         allowed = f"must hold no lambda and no function within a function: {error}"
         raise ModelError("model", "", allowed) from None
-    part = path.with_name(f"{path.name}.part")  # a file that is there stays until this is whole
+    part = path.with_name(f"{path.name}.part")  # an existing file stays until this is complete
     try:
         part.write_bytes(_HEAD + __version__.encode() + b"\n" + stored)
         part.replace(path)
@@ -41,11 +42,12 @@ def write(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Return what `write` has written.
+    """Return the content that `write` has written.
 
     Raises
     ------
-    ModelError : it is no such file, or another version of the solver wrote it
+    ModelError
+        if the file cannot be read, is not of this kind, or was written by another version
     """
     try:
         head, _, stored = path.read_bytes().partition(b"\n")
@@ -59,6 +61,6 @@ def read(path: Path) -> dict[str, Any]:
         raise ModelError("path", str(path), allowed)
     try:
         found: dict[str, Any] = pickle.loads(stored)
-    except Exception as error:  # a damaged stream raises anything
+    except Exception as error:  # a damaged file can raise any exception
         raise ModelError("path", str(path), f"is damaged: {error}") from None
     return found

@@ -1,16 +1,16 @@
-"""The shakedown state of a body that the same load passes again and again.
+"""The shakedown state of a body under repeated passes of the same load.
 
 ============================  ===============================================================
 elastic                       it never yields
 elastic shakedown             it yields at first; residual stress then keeps it elastic
-plastic shakedown             every cycle yields, and plastic strain comes back to where it was
-ratchetting                   every cycle leaves plastic strain behind
+plastic shakedown             every cycle yields, and plastic strain returns to its value
+ratchetting                   every cycle adds plastic strain
 undecided                     the cycles have not become steady
 ============================  ===============================================================
 
-The *signed* plastic strain tells a closed cycle from an open one; the accumulated strain tells
-whether there is flow at all. For each the bounds of its limit over many cycles are found, and a
-state is decided only if it is the same for all values within the bounds.
+The *signed* plastic strain distinguishes a closed cycle from an open one; the accumulated strain
+shows whether there is flow. For both the bounds of the limit over many cycles are computed. A state
+is decided only if it is the same for all values within the bounds.
 
 K.L. Johnson, Contact Mechanics (1985), section 9.2.
 """
@@ -29,28 +29,28 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 QUIET = 1e-3
-"""Accumulated plastic strain of a cycle, over the yield strain, below which nothing flows."""
+"""Ratio of plastic strain accumulated in a cycle to the yield strain; up to it nothing flows."""
 CLOSED = 0.05
-"""Ratio of the plastic strain left by a cycle to the strain accumulated in it, up to which the
-cycle is closed. Also the share of the largest accumulated strain, up to which that at a depth may
-be an interpolation error, and is left out."""
+"""Ratio of the plastic strain left by a cycle to the strain accumulated in it; up to it the cycle
+is closed. Also ratio of the accumulated strain at a depth to the largest; up to it the depth is
+left out, as the strain there may be an interpolation error."""
 STEADY = 0.02
-"""Relative change from cycle to cycle, up to which a sequence has reached its limit. Over the
-second half of the sequence twice this change is allowed."""
+"""Relative change from cycle to cycle; up to it a sequence has reached its limit. Over the second
+half of the sequence twice this change is permitted."""
 AT_REST = 2e-3
-"""Relative change from cycle to cycle, below which earlier values do not matter."""
+"""Relative change from cycle to cycle; up to it earlier values do not matter."""
 KEPT = 0.8
-"""Ratio of the last value of a sequence to its value half-way, below which its limit may be zero. A
+"""Ratio of the last value of a sequence to its value half-way; below it the limit may be zero. A
 decay as 1 / n^p has the ratio 1 / 2^p, however long it has lasted."""
 SLOWEST = 0.95
-"""Ratio of successive changes, above which no limit can be extrapolated."""
+"""Ratio of successive changes; above it no limit can be extrapolated."""
 KNOWN = 0.1
-"""Ratio of the distance between the bounds of a limit to the upper one, up to which their mean is
+"""Ratio of the distance between the bounds of a limit to the upper bound; up to it their mean is
 the limit."""
 
 
 class ShakedownState(IntEnum):
-    """The shakedown state, with the value it is stored as."""
+    """The shakedown state, with its stored value."""
 
     ELASTIC = 0
     ELASTIC_SHAKEDOWN = 1
@@ -77,13 +77,12 @@ class Limit:
 
     @classmethod
     def of(cls, sequence: Array) -> Limit:
-        """Return the limit of a sequence (n,) from its last four values, or three.
+        """Return the bounds of the limit of a sequence (n,) from its last four or three values.
 
-        A steady sequence has reached its limit. Otherwise the last two triples of values give
-        bounds each, and the limit may be anywhere between all of these: a geometric change is
-        extrapolated (Aitken's process), values that go up and down stay within their range, any
-        others may grow without bound or fall to zero. A sequence that has fallen too far since
-        half-way may also fall to zero.
+        A steady sequence has reached its limit. Otherwise each of the last two triples of values
+        gives bounds, and the limit is between the outermost: a geometric change is extrapolated
+        (Aitken's process), values that alternate stay within their range, others may grow without
+        bound or fall to zero. A sequence that has fallen much since half-way may also fall to zero.
         """
         if len(sequence) < 3:
             return cls(0.0, np.inf)
@@ -92,19 +91,19 @@ class Limit:
         if change <= STEADY * abs(last):
             return cls(last, last)
         triples = [sequence[i - 3 : i] for i in (len(sequence) - 1, len(sequence)) if i > 2]
-        low, high = np.transpose([_tends(*triple) for triple in triples])
+        low, high = np.transpose([_bounds(*triple) for triple in triples])
         kept = last >= KEPT * halfway
         return cls(float(low.min()) if kept else 0.0, float(high.max()))
 
     @property
     def value(self) -> float:
-        """The limit where it is known, else NaN."""
+        """The limit if its bounds are close, else NaN."""
         known = self.high - self.low <= KNOWN * self.high < np.inf
         return (self.low + self.high) / 2 if known else np.nan
 
 
-def _tends(first: float, second: float, third: float) -> tuple[float, float]:
-    """Return the bounds of the limit that follow from three successive values."""
+def _bounds(first: float, second: float, third: float) -> tuple[float, float]:
+    """Return the bounds of the limit from three successive values."""
     before, last = second - first, third - second
     if abs(last) <= AT_REST * abs(third):
         return third, third
@@ -124,10 +123,10 @@ def classify(
     Parameters
     ----------
     accumulated : (n_cycles, n_depths) equivalent plastic strain accumulated in a cycle
-    net : (n_cycles, n_depths) equivalent of the signed plastic strain a cycle leaves
-    yield_strain : yield stress / Young's modulus
-    hardens : whether linear hardening bounds plastic strain: ratchetting then must end some time,
-        and cycles that still leave plastic strain are undecided, however little they leave
+    net : (n_cycles, n_depths) equivalent of the signed plastic strain that a cycle leaves
+    yield_strain : ratio of yield stress to Young's modulus
+    hardens : whether linear hardening bounds plastic strain: ratchetting must then end, and cycles
+        that still add plastic strain, however little, are undecided
     """
     if not accumulated.any():
         return Shakedown(ShakedownState.ELASTIC, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The singular points of a model, stored with a run: numbers taken beside them are the mesh's."""
+"""The singular points of a model, stored with a run: near them numbers depend on the mesh."""
 
 from __future__ import annotations
 
@@ -19,11 +19,14 @@ SINGULAR_S = declare(
     "singular_s", "distance along the surface from its middle of the singular point", "mm",
     dims=_EACH,
 )  # fmt: skip
-SINGULAR_RADIUS = declare("singular_radius", "how far the singular point reaches", "mm", dims=_EACH)
+SINGULAR_RADIUS = declare(
+    "singular_radius", "radius around the singular point in which numbers depend on the mesh", "mm",
+    dims=_EACH,
+)  # fmt: skip
 
 
 def singular_points(run: FinishedRun) -> Values:
-    """Return places and radii of the singular points; nothing where there is none."""
+    """Return positions and radii of the singular points; empty if there are none."""
     if not run.singular:
         return {}
     X = np.array([point.at for point in run.singular]).T

@@ -1,10 +1,10 @@
-"""Power of a singular stress, fitted to values near a corner.
+"""Fit the power of a singular stress to values near a corner.
 
-Near a corner stress is a series of powers of the distance r from it, and the first, of power p
-below 1, is unbounded: stress ~ r^(p-1). A straight line through logarithms of values at finite
-distances has another slope, as the next term of the series is not small yet. It is therefore fitted
-too, with an exponent about 1 above the first: between 0.8 and 1.1 at the square corner of equal
-materials, without friction and with friction up to 0.4.
+Near a corner stress is a series of powers of the distance r from it. The first term is unbounded:
+stress ~ r^(p-1) with the power p below 1. A straight line through logarithms of values at finite
+distances has another slope, as the next term of the series is not small. This term is therefore
+fitted too, with an exponent about 1 above the first: between 0.8 and 1.1 at the square corner of
+equal materials, without friction and with friction up to 0.4.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 SINGULAR_POWER = declare(
-    "singular_power", "power p of the stress at the corner, which goes as r^(p-1)"
+    "singular_power", "power p of the stress at the corner, proportional to r^(p-1)"
 )
 SINGULAR_POWER_ERROR = declare("singular_power_error", "uncertainty of the singular power")
 SINGULAR_INTENSITY = declare(
     "singular_intensity",
-    "contact pressure / mean pressure of the singular term alone, one half-width from the corner",
+    "ratio of the singular term of contact pressure to mean pressure, one half-width from the "
+    "corner",
 )
 APPARENT_POWER = declare(
     "apparent_power",
-    "power that contact pressure seems to have, 0.01 to 0.1 half-widths from the corner",
+    "apparent power of contact pressure, 0.01 to 0.1 half-widths from the corner",
 )
 
 _OTHERS = (0.5, 1.5)
-"""Exponents of the next term that are tried too / that given."""
+"""Factors of the given exponent of the next term, tried to estimate the error."""
 _FEWEST = 5
-"""Points for three unknowns."""
+"""Least number of points for the three unknowns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Singularity:
-    """Stress ~ ``intensity * r^(power - 1)`` where r tends to 0, and the error of ``power``."""
+    """Stress ~ ``intensity * r^(power - 1)`` as r tends to 0, and the error of ``power``."""
 
     power: float
     error: float
@@ -57,25 +58,26 @@ def fit_singularity(
 ) -> Singularity:
     """Return the singular term of stress sampled near a corner.
 
-    1. Points at ``low <= r <= high`` count. ``low`` is to be ten elements or more, as elements
-       at the corner do not resolve the stress; ``high`` is to be small beside the distance of
-       whatever else shapes the field: an edge, a groove, the end of a zone of slip.
+    1. Points at ``low <= r <= high`` count. ``low`` should be ten elements or more, as elements
+       at the corner do not resolve the stress; ``high`` should be small compared with the distance
+       of any other feature: an edge, a groove, the end of a zone of slip.
     2. ``ln stress = ln C + (p - 1) ln r + b r^q`` with q = ``above`` is fitted by least squares.
-       A point weighs as much as the part of the axis of ln r that it stands for.
-    3. The error is the largest change of p when q is half as large or 1.5 times as large, or when
-       the inner or the outer third of the range, in ln r, is left out; or the standard error of
-       the fit, where larger. An error that elements make all over the range is not in it.
+       The weight of a point is its share of the axis of ln r.
+    3. The error is the largest change of p if q is half as large or 1.5 times as large, or if the
+       inner or the outer third of the range, in ln r, is left out; or the standard error of the
+       fit, if larger. It does not include an error of elements over the whole range.
 
     Parameters
     ----------
     r : (n,) distances from the corner
-    stress : (n,) of one sign; the unit is that of ``Singularity.intensity``
+    stress : (n,) stress of one sign, in the unit of ``Singularity.intensity``
     low, high : range of r of the fit
-    above : exponent of the next term of the series above the first, as far as it is known
+    above : estimate of the exponent of the next term minus that of the first
 
     Returns
     -------
-    Singularity : all NaN where the range holds fewer than five points, or stress of both signs
+    Singularity
+        all NaN if the range has fewer than five points, or stress of both signs
     """
     points = _logarithms(r, stress, low, high)
     if points is None:
@@ -96,17 +98,17 @@ def fit_singularity(
 
 
 def apparent_power(r: Array, stress: Array, low: float, high: float) -> float:
-    """Return the power that a straight line through logarithms gives, without a next term.
+    """Return the power of a straight line through logarithms, without a next term.
 
-    It is what one measures who sees the stress between ``low`` and ``high`` only. NaN where that
-    range holds fewer than five points, or stress of both signs.
+    It is what a measurement between ``low`` and ``high`` alone would give. NaN if that range has
+    fewer than five points, or stress of both signs.
     """
     points = _logarithms(r, stress, low, high)
     return float("nan") if points is None else float(1 + _fit(points, high)[0][1])
 
 
 def _logarithms(r: Array, stress: Array, low: float, high: float) -> Array | None:
-    """Return ln r, ln |stress| and weights (3, n) of the points in a range, where they will do."""
+    """Return ln r, ln |stress| and weights (3, n) in a range, or None if the fit is impossible."""
     within = (r >= low) & (r <= high)
     order = np.argsort(r[within])
     r, stress = r[within][order], stress[within][order]

@@ -1,4 +1,4 @@
-"""Closed forms of a Hertz pressure that slides: its stress, and the loads that shake down.
+"""Sliding Hertz contact: closed-form stress, and limits of elastic shakedown.
 
 K.L. Johnson, Contact Mechanics (1985), sections 4.6, 7.1 and 9.2.
 """
@@ -19,10 +19,10 @@ _X = np.linspace(-4.0, 4.0, 1601)
 
 
 def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Array, Array]:
-    """Return sigma_x, sigma_y and tau over p0 under a Hertz pressure that slides along +x.
+    """Return sigma_x, sigma_y and tau (n,) over p0 under a Hertz pressure that slides along +x.
 
-    ``x`` (n,) and ``depth`` are over the half-width; tension is positive, and the shear traction
-    on the half-space is ``friction`` times the pressure along +x (y and depth point down).
+    ``x`` (n,) and ``depth`` are in half-widths; tension is positive. The shear traction on the
+    half-space is ``friction`` times the pressure along +x (y and depth point down).
     E. McEwen, Phil. Mag. 40 (1949) 454-459; Johnson, eqs. (4.49), (7.8).
     """
     s = 1 - x**2 + depth**2
@@ -38,7 +38,7 @@ def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Arr
 
 
 def largest_shear(friction: float) -> tuple[float, float]:
-    """Return the largest shear / p0 below a sliding Hertz contact, and its depth / half-width."""
+    """Return the largest shear over p0 below a sliding Hertz contact, its depth in half-widths."""
 
     def least(depth: float) -> float:
         return -float(np.abs(sliding_contact(_X, depth, friction)[2]).max())
@@ -48,11 +48,11 @@ def largest_shear(friction: float) -> tuple[float, float]:
 
 
 def johnson_limit(friction: float) -> float:
-    """Return p0 / k up to which a sliding Hertz line contact shakes down elastically.
+    """Return the largest p0 / k at which a sliding Hertz line contact shakes down elastically.
 
-    Residual stress can take away the difference of normal stresses where the shear is largest,
-    but not the shear, which therefore decides: below the surface, or, from a friction of about
-    0.37 on, at it. Johnson, section 9.2 (maximum shear stress criterion).
+    Residual stress can remove the difference of normal stresses at the place of largest shear, but
+    not the shear itself, which sets the limit: below the surface, or at the surface if friction
+    exceeds about 0.37. Johnson, section 9.2 (maximum shear stress criterion).
     """
     return 1 / max(largest_shear(friction)[0], friction)
 
@@ -60,9 +60,9 @@ def johnson_limit(friction: float) -> float:
 def melan_limit(friction: float, poisson_ratio: float) -> float:
     """Return `johnson_limit` for von Mises' criterion in plane strain.
 
-    At each depth one residual stress (sigma_x, sigma_z) must bring all stresses met there inside
-    the yield surface (Melan). Below the surface both criteria agree; at the surface the stress
-    out of plane, which follows the two others, makes von Mises' limit the lower one.
+    At each depth one residual stress (sigma_x, sigma_z) must bring all stresses of the pass inside
+    the yield surface (Melan). Below the surface both criteria agree. At the surface von Mises'
+    limit is lower because of the out-of-plane stress, which depends on the two others.
     """
 
     def least(depth: float) -> float:

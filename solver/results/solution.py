@@ -1,4 +1,4 @@
-"""Solve a model of your own, and read its states."""
+"""Solve a model and read its states."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ _LOG = logging.getLogger("solver")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solution:
-    """A model after each stage of its loading: ``loaded`` and ``unloaded`` if none are given.
+    """The states of a model at the ends of its stages, by default ``loaded`` and ``unloaded``.
 
     Attributes
     ----------
     system : the model's parts and interfaces
     stages : the converged states at the ends of the stages, by name
-    tally : its cost
-    history : every increment in a few numbers, the state before the first one too
+    tally : cost of the run
+    history : a few numbers of the initial state and of every increment
     """
 
     system: System
@@ -69,7 +69,7 @@ class Solution:
 
     @property
     def unloaded(self) -> Converged:
-        """The state after unloading, bodies taken apart."""
+        """The state after unloading, with the bodies separated."""
         return self._at("unloaded")
 
     def _at(self, stage: str) -> Converged:
@@ -95,8 +95,8 @@ class Solution:
     def initial_stress(self, body: str) -> tuple[NDArray[np.float64], ...]:
         """Return positions (2, n) [mm], initial stress as given and in equilibrium (4, n) [MPa].
 
-        They are those of the integration points, components xx, yy, zz, xy. The difference is
-        what the body needed to be in balance before any load.
+        They belong to the integration points; components are xx, yy, zz, xy. The difference is the
+        stress that brings the body into equilibrium before any load.
         """
         system = self.system
         begun = Stepper(system, Control())
@@ -114,10 +114,11 @@ class Solution:
     def at(
         self, body: str, places: ArrayLike, stage: str = "unloaded"
     ) -> dict[str, NDArray[np.float64]]:
-        """Return fields at places (2, n) of a body [mm], NaN outside of it.
+        """Return fields at places (2, n) [mm] of a body; NaN outside the body.
 
         They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa], components xx, yy, zz, xy,
-        ``mises`` (n,) [MPa] and ``plastic_strain`` (n,).
+        ``mises`` (n,) [MPa] and ``plastic_strain`` (n,). Raises `ModelError` for an unknown body or
+        stage, or places of another shape.
         """
         X = np.asarray(places, dtype=float)
         if X.ndim != 2 or len(X) != 2:
@@ -128,7 +129,7 @@ class Solution:
         return found._asdict()
 
     def contact(self, pair: int = 0, stage: str = "loaded") -> ContactResult:
-        """Return what acts at the vertices of the slave of a pair.
+        """Return pressure, shear, gap and slip at the vertices of the slave of a pair.
 
         Its attributes are ``s``, ``X``, ``pressure``, ``shear``, ``pressure_deformed``, ``gap``,
         ``slip``, ``closed`` and ``sticking``, see `ContactResult`; ``length`` is the length of
@@ -141,7 +142,7 @@ class Solution:
         return self._observed(body, stage).motions[body]
 
     def reaction(self, body: str, stage: str = "loaded") -> tuple[float, float, float]:
-        """Return what acts on a rigid body besides contact: forces [N] and moment [N mm]."""
+        """Return the forces x, y [N] and moment [N mm] on a rigid body, without contact."""
         return self._observed(body, stage).reactions[body]
 
     def _observed(self, body: str, stage: str) -> Observed:
@@ -152,9 +153,9 @@ class Solution:
         return observe(self.system, self._at(stage))
 
     def to_vtu(self, folder: str | Path) -> Path:
-        """Write a .vtu for each stage into a folder, with fields at the nodes, for ParaView.
+        """Write fields at the nodes as one .vtu per stage into a folder, for ParaView.
 
-        Returns the .pvd file that holds them together; see `solver.results.export.to_meshio` for
+        Returns the path of the .pvd file that lists them; see `solver.results.export.to_meshio` for
         the names of the fields.
         """
         from solver.results.export import write_vtu
@@ -172,9 +173,9 @@ class Solution:
 
     @classmethod
     def load(cls, path: str | Path) -> Solution:
-        """Return the solution that `save` has written, with the same version of the solver.
+        """Return the solution that `save` has written with the same version of the solver.
 
-        The file is a pickle, which can run code: load only what you have saved yourself.
+        The file is a pickle, which can run code: load only files that you saved yourself.
         """
         content = saved.read(Path(path))
         return cls(system=System(content.pop("model")), **content)
@@ -182,7 +183,7 @@ class Solution:
     def audit(self, stage: str = "loaded") -> Audit:
         """Return the audit: figures of a state, violated conditions and warnings.
 
-        With the state under load goes the one after unloading.
+        The audit of the state under load includes the state after unloading.
         """
         after = self.stages.get("unloaded") if stage == "loaded" else None
         tally = self.tally
@@ -200,37 +201,40 @@ def solve(
     linear_solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
-    """Load a model to a multiple of its loads, take the bodies apart, and return both states.
+    """Load a model to a multiple of its loads, separate the bodies, and return both states.
 
     Parameters
     ----------
     load : load factor: multiple of all loads of the model
-    stages : ends of loading and increments in its place, for loads with amplitudes, which are
-        functions of time; the solution then has these states
-    control : increments and tolerances; twenty increments of loading when absent
+    stages : stages to solve instead of ``load``, for loads with amplitudes, which are functions of
+        time; the solution then has the states at their ends
+    control : increments and tolerances; by default twenty increments of loading
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
-    progress : called after each increment with the fraction of the increments that is done, up to
-        1; an exception that it raises stops the work. The logger ``solver`` tells each increment
-        at level INFO
+    progress : called after each increment with the completed fraction of the increments, up to 1;
+        an exception that it raises stops the computation. The logger ``solver`` reports each
+        increment at level INFO
 
     Numbers of the model that look like mistakes (`Model.doubts`) are warnings of the same logger.
 
     Raises
     ------
-    ModelError : bad input
-    LimitLoad : the structure has no equilibrium at this load
-    NotConverged : an increment failed although an equilibrium may exist
+    ModelError
+        if the input is wrong
+    LimitLoad
+        if the structure has no equilibrium at this load
+    NotConverged
+        if an increment failed although an equilibrium may exist
     """
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
     names = [stage.name for stage in stages]
     if len(set(names)) < len(names):
-        raise ModelError("stages", names, "must have names of their own")
+        raise ModelError("stages", names, "must have different names")
     control = control or PathControl(load_step=load / 20)
     program = Program(laps=(Lap(tuple(stages)),)) if stages else control.program(load)
     for body in () if stages else model.bodies:
         if any(load.amplitude is not None and load.varies for load in body.every_load):
-            allowed = "must be absent where no stages are given: solve raises a load factor"
+            allowed = "must be absent without stages: solve then increases a load factor"
             raise ModelError("amplitude", body.name, allowed)
     for doubt in model.doubts:
         _LOG.warning("%s", doubt)
@@ -249,7 +253,7 @@ def solve(
 
 
 class _IncrementCount:
-    """Counts increments, and tells how many of the program's are done; those that are cut more."""
+    """Counts increments and reports the completed share of the planned ones; cuts add to it."""
 
     def __init__(self, program: Program, progress: Callable[[float], None] | None) -> None:
         self._planned, self._done = program.count, 0

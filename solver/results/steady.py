@@ -1,4 +1,4 @@
-"""A steady pass as samples and outputs see it: the states of one body in the frame of the load."""
+"""Adapter of a steady pass to samples and outputs: states of one body in the frame of the load."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 _LOADED, _RELEASED = 0.0, 1.0
 _LEVEL = 1e-6
-"""Ratio of the difference of depth to the depth of the first row, up to which points and nodes are
-on one line."""
+"""Ratio of a difference of depth to the depth of the first row; up to it points and nodes are on
+one line."""
 _MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
 
 
@@ -42,7 +42,7 @@ class Standing:
     ----------
     state : displacements and internal variables; its time is 0 under the load and 1 after it
     response : stress at the points
-    touching : the contact with a wheel as the load sees it, None where there is none
+    touching : the contact with a wheel in the frame of the load, or None
     """
 
     state: State
@@ -51,12 +51,12 @@ class Standing:
 
 
 class TrackBody:
-    """The body of a track as one sees it who stands beside it.
+    """The body of a track in a fixed frame; the track itself is computed for a load along +x.
 
     Parameters
     ----------
-    track : whose load goes along +x
-    way : 1 if the load really goes along +x, -1 if all is mirrored
+    track : the track, with the load along +x
+    way : 1 if the load moves along +x, -1 if it moves along -x and all is mirrored
     """
 
     def __init__(self, track: Track, way: int) -> None:
@@ -65,12 +65,12 @@ class TrackBody:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the bodies: this one."""
+        """Name of the only body."""
         return (self._part.body.name,)
 
     @property
     def n_unknowns(self) -> int:
-        """Displacement unknowns."""
+        """Number of displacement unknowns."""
         return len(self._part.free)
 
     def full(self, name: str) -> Discretisation:
@@ -83,10 +83,10 @@ class TrackBody:
         return Sampler(self.full(name), X)
 
     def recovery(self, name: str) -> csr_array:
-        """Return the matrix (n_nodes, n) from values at points, and at the surface, to nodes.
+        """Return the matrix (n_nodes, n) from values at points and at the surface to nodes.
 
-        The nodes of the surface have values of their own: plastic strain, and stress with it, may
-        change too much between the first two rows of points to be extrapolated.
+        Nodes of the surface take the values at the surface: plastic strain, and thus stress, may
+        change too much between the first two rows of points for extrapolation.
         """
         del name
         part, first = self._part, self._first
@@ -101,17 +101,17 @@ class TrackBody:
 
     @cached_property
     def _first(self) -> NDArray[np.int64]:
-        """The points nearest to the surface."""
+        """Indices of the points nearest to the surface."""
         y = self._part.points[1].ravel()
         return np.flatnonzero(y > y.max() * (1 + _LEVEL))
 
     def positions(self, name: str) -> Array:
-        """Return where points are, then those at the surface above the first row (2, n) [mm]."""
+        """Return positions (2, n) of the points, then at the surface above the first row [mm]."""
         points = self.full(name).points.reshape(2, -1)
         return np.concatenate([points, points[:, self._first] * [[1.0], [0.0]]], axis=1)
 
     def response(self, name: str, converged: Standing) -> Response:
-        """Return stress and internal variables at the points, and then at the surface above."""
+        """Return stress and internal variables at the points, then at the surface above them."""
         del name
         return converged.response
 
@@ -121,17 +121,17 @@ class TrackBody:
         return state.u[0]
 
     def axle(self, converged: Standing) -> RigidMotion | None:
-        """Return the displacement of the axle, which stands at x = 0."""
+        """Return the displacement of the axle, which stays at x = 0, or None without a wheel."""
         touching = converged.touching
         return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
 
     def under_load(self, found: Pass) -> Standing:
-        """Return the state while the load of a pass is there."""
+        """Return the state under the load of a pass."""
         touching = found.loading if isinstance(found.loading, RollingContact) else None
         return self._seen(_LOADED, under_load(self.track, found), touching)
 
     def left_by(self, found: Pass) -> Standing:
-        """Return the state that a pass leaves."""
+        """Return the state after a pass."""
         return self._seen(_RELEASED, of_layers(self.track, found.law, found.after), None)
 
     def _seen(self, time: float, fields: TrackFields, touching: RollingContact | None) -> Standing:
@@ -155,7 +155,7 @@ class SteadyTractions:
 
     Parameters
     ----------
-    way : 1 if the wheel goes along +x, -1 if it goes back
+    way : 1 if the wheel moves along +x, -1 if it moves back
     """
 
     def __init__(self, way: int) -> None:

@@ -1,4 +1,4 @@
-"""Where the contact sticks under load."""
+"""Size of the stick zone of the contact under load."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from solver.results.run import FinishedRun, Values
 
 STICK_HALF_WIDTH = declare(
-    "stick_half_width", "half-width of the part of the contact that sticks under load", "mm"
+    "stick_half_width", "half-width of the stick zone of the contact under load", "mm"
 )
 STICK_FRACTION = declare(
-    "stick_fraction", "half-width that sticks / half-width of the contact, under load"
+    "stick_fraction", "ratio of the half-width of the stick zone to that of the contact, under load"
 )
 
 
 @output("stick", "contact")
 def stick(run: FinishedRun) -> Values:
-    """Return how much of the contact sticks: nothing without friction, NaN without contact."""
+    """Return the size of the stick zone: zero without friction, NaN without contact."""
     points = run.tractions.points(run.loaded)
     if points is None:
         return {STICK_HALF_WIDTH: np.nan, STICK_FRACTION: np.nan}
@@ -33,10 +33,10 @@ def stick(run: FinishedRun) -> Values:
 
 
 def stick_half_width(points: ContactResult, *, symmetric: bool) -> float:
-    """Return the half-width of the part that sticks [mm].
+    """Return the half-width of the stick zone [mm].
 
-    Its ends are half-way between the last point that sticks and the first that slips, so that they
-    are known to half an element. Where no point sticks it is narrower than an element: 0.
+    Its ends are half-way between the last point that sticks and the first that slips, so they are
+    accurate to half an element. If no point sticks, the zone is narrower than an element: 0.
     """
     stuck = np.flatnonzero(points.sticking)
     if not len(stuck):

@@ -1,4 +1,4 @@
-"""Pressure and shear on the lower body of a run: of contact, or prescribed."""
+"""Pressure and shear on the lower body of a run, from contact or prescribed."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class SurfaceTractions(Protocol):
     """Pressure and shear on the lower body, whose surface runs along x."""
 
     def along(self, converged: Any, x: Array) -> tuple[Array, Array, Array]:
-        """Return pressure, shear along +x [MPa] and gap [mm] at positions x (n,).
+        """Return pressure, shear along +x [MPa] and gap [mm], each (n,), at positions x (n,) [mm].
 
-        NaN beyond the surface. The gap is NaN also for bodies taken apart and for a prescribed
-        pressure.
+        They are NaN beyond the surface. The gap is also NaN for separated bodies and for a
+        prescribed pressure.
         """
 
     def extent(self, converged: Any) -> tuple[float, float]:
@@ -39,16 +39,16 @@ class SurfaceTractions(Protocol):
         """Return the tangential force along +x [N]."""
 
     def centre(self, converged: Any) -> float:
-        """Return where the load is along x [mm]."""
+        """Return the position of the load along x [mm]."""
 
     def points(self, converged: Any) -> ContactResult | None:
-        """Return what acts at the points of a contact along x; None where there is none."""
+        """Return the result at the vertices of a contact along x; None without contact."""
 
 
 class PairTractions:
-    """The first contact pair of a system, along ``axis``.
+    """Tractions of the first contact pair of a system along ``axis``.
 
-    ``symmetric`` means that the other half of the contact is not computed.
+    ``symmetric`` means that only one half of the contact is computed.
     """
 
     def __init__(self, system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> None:
@@ -73,7 +73,7 @@ class PairTractions:
             left, right = beyond
             return np.asarray(np.interp(x, found.s, values, left=left, right=right))
 
-        # zero pressure beyond the surface of the pair, where the surface of the body goes on
+        # beyond the pair pressure is zero if the surface of the body continues
         free = np.where(self._goes_on, 0.0, np.nan)
         chain = self._system.interfaces[0].slave_surface
         first, last = self._axis.reached(chain.X[:, chain.vertices[[0, -1]]])
@@ -108,7 +108,7 @@ class PairTractions:
 
 
 class PrescribedTractions:
-    """A travelling pressure; its surface repeats itself after ``period``, unless that is 0."""
+    """A travelling pressure; the surface is periodic with ``period`` [mm], unless it is 0."""
 
     def __init__(self, travelling: TravellingPressure, period: float) -> None:
         self._travelling = travelling
@@ -141,7 +141,7 @@ class PrescribedTractions:
 
 
 class NoTractions:
-    """No contact and no travelling pressure: such a scene lists no output of contact."""
+    """Neither contact nor travelling pressure: such a scene has no outputs of contact."""
 
     def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
         """See `SurfaceTractions`."""
@@ -170,7 +170,7 @@ class NoTractions:
 
 
 def tractions_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> SurfaceTractions:
-    """Return what acts between the bodies of a system, or on one of them."""
+    """Return the tractions between the bodies of a system, or on one of them."""
     if system.interfaces:
         return PairTractions(system, symmetric=symmetric, axis=axis)
     for body in system.model.bodies:

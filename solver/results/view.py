@@ -1,4 +1,4 @@
-"""Where the results of a scene are taken."""
+"""The positions at which the results of a scene are taken."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ BODY = declare("body", "body", "", dims=("body",))
 
 
 class Places(NamedTuple):
-    """Places in a body: (2, n), or (3, n) where the body has three coordinates [mm]."""
+    """Places in a body: positions (2, n), or (3, n) in three dimensions [mm]."""
 
     body: str
     X: Array
@@ -48,9 +48,9 @@ class Places(NamedTuple):
 class Axis(NamedTuple):
     """The straight line along a contact surface before loading.
 
-    ``origin`` is its middle [mm], ``along`` the unit vector in which s grows. Both have as many
-    coordinates as places of the bodies: with two the lower body is on the right of the line, with
-    three below it, down along y.
+    ``origin`` is its middle [mm], ``along`` the unit vector in which s grows. Both have the number
+    of coordinates of the bodies: with two the lower body is to the right of the line, with three it
+    is below the line (-y).
     """
 
     origin: tuple[float, ...] = (0.0, 0.0)
@@ -63,41 +63,41 @@ class Axis(NamedTuple):
         return (0.0, -1.0, 0.0) if z else (y, -x)
 
     def place(self, s: Array, depth: Array) -> Array:
-        """Return positions (n_axes, n) at ``s`` along the surface and a depth below it [mm]."""
+        """Return positions (n_axes, n) at ``s`` along the surface and ``depth`` below it [mm]."""
         ways = np.multiply.outer(np.array(self.along), s)
         ways = ways + np.multiply.outer(np.array(self.down), depth)
         return np.asarray(ways + np.array(self.origin)[:, None])
 
     def reached(self, X: Array) -> Array:
-        """Return how far along the surface positions (n_axes, n) are (n,) [mm]."""
+        """Return the coordinate s (n,) along the surface of positions (n_axes, n) [mm]."""
         return np.asarray(np.array(self.along) @ (X - np.array(self.origin)[:, None]))
 
 
 ALONG_X = Axis()
 """The axis of a horizontal surface at y = 0, the lower body below it."""
 ACROSS_TRACK = Axis((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-"""The axis across a horizontal track along x, at x = 0: that of a section in z and y."""
+"""The axis along z, at x = 0, across a horizontal track along x: that of a section in z and y."""
 NOWHERE = np.zeros(0)
-"""The positions of a grid that a view does not have."""
+"""Positions of a grid that a view does not have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """Where the results of a scene are taken; independent of its mesh, so that runs compare.
+    """The positions of the results of a scene; they do not depend on its mesh, so runs compare.
 
     Attributes
     ----------
     x, y : map grid, along the contact surface from its middle and above it [mm]
-    z : in the place of x for a section across the track, whose ``axis`` is `ACROSS_TRACK` [mm]
-    depth, station : profiles go down to ``depth`` below the surface at s = ``station`` [mm]
+    z : map grid instead of x for a section across the track, with ``axis`` `ACROSS_TRACK` [mm]
+    depth, station : profiles are at s = ``station``, at each ``depth`` below the surface [mm]
     s : positions along the contact surface from its centre [mm]
-    axis : the line that s and x run along
-    profile_body : the body whose profiles are taken
-    surfaces : body -> boundary that is its contact surface, in the order of the dimension
-    stages : states whose contact is recorded, by the names of the program's stages
-    loaded, unloaded : those of them that are taken as the states under load and after release;
-        ``unloaded`` is empty where the bodies are not released
-    following : those of them in which ``s`` is zero where the load is, not at x = 0
+    axis : the line of s and x
+    profile_body : the body of the profiles
+    surfaces : boundary that is the contact surface of each body, in the order of the dimension
+    stages : names of the program's stages whose states are stored
+    loaded, unloaded : the stages taken as the states under load and after release; ``unloaded`` is
+        empty if the bodies are not released
+    following : the stages in which ``s`` is zero at the load, not at x = 0
     symmetric : whether the bodies are one half of a model symmetric about s = 0
     """
 
@@ -118,18 +118,18 @@ class View:
 
     @property
     def map_axes(self) -> tuple[str, str]:
-        """Names of the axes of the map: that across, and that up."""
+        """Names of the axes of the map: horizontal, vertical."""
         return ("z" if self.z.size else "x"), "y"
 
     @property
     def map_grid(self) -> tuple[Array, Array]:
-        """Positions on the axes of the map: across, and up [mm]."""
+        """Positions on the axes of the map: horizontal, vertical [mm]."""
         across, up = (getattr(self, name) for name in self.map_axes)
         return across, up
 
     @property
     def coordinates(self) -> dict[str, Any]:
-        """The record's coordinates; of a grid without points there is none."""
+        """The record's coordinates; grids without points are left out."""
         grids = {
             "x": self.x,
             "y": self.y,

@@ -1,1 +1,1 @@
-"""Results read, printed and drawn."""
+"""Read, print and draw results."""

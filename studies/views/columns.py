@@ -1,4 +1,4 @@
-"""Text in columns: aligned, under stacked headings, in blocks that fit a terminal."""
+"""Text in aligned columns, under stacked headings, in blocks that fit a terminal."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 _HEADING = 9
-"""Characters after which a heading goes on in the next line."""
+"""Largest width of a heading in characters; longer ones continue in the next line."""
 _WIDTH = 120
-"""Characters after which a table goes on below, with the axes repeated."""
+"""Largest width of a table in characters; wider ones continue below, with the axes repeated."""
 _GAP = "  "
 
 
 def value_text(value: Any) -> str:
-    """Return a value as a table shows it, numbers with four digits."""
+    """Return a value as text, numbers with four digits and NaN as "-"."""
     if isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float | np.floating):
@@ -26,7 +26,7 @@ def value_text(value: Any) -> str:
 
 
 def stacked(headings: Sequence[str]) -> list[list[str]]:
-    """Return headings in as many lines as the longest needs, the last line full."""
+    """Return the lines of wrapped headings, which are aligned at the bottom."""
     parts = [textwrap.wrap(text, _HEADING, break_long_words=False) for text in headings]
     deepest = max(map(len, parts))
     return [
@@ -35,7 +35,10 @@ def stacked(headings: Sequence[str]) -> list[list[str]]:
 
 
 def in_blocks(lines: Sequence[Sequence[str]], keys: int, right: int) -> str:
-    """Return a table in blocks that fit the terminal, the first `keys` columns in each of them."""
+    """Return a table in blocks that fit the terminal, each with the first `keys` columns.
+
+    The first `right` columns are set flush left, the others flush right.
+    """
     widths = _widths(lines)
     blocks = [list(range(keys))]
     for column in range(keys, len(widths)):
@@ -54,7 +57,7 @@ def _widths(lines: Sequence[Sequence[str]]) -> list[int]:
 
 
 def aligned(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
-    """Return columns as wide as their widest entry, set flush right from column `right` on."""
+    """Return columns as wide as their widest entry, flush right from column `right` on."""
     widths = _widths(lines)
     first = len(widths) if right is None else right
     return "\n".join(

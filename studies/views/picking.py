@@ -1,4 +1,4 @@
-"""One run, or a part of the sweep, picked out of a data set."""
+"""Select one run, or a part of the sweep, from a data set."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from studies.views.reading import find_study, open_netcdf
 
 
 def flags(variable: xr.DataArray) -> dict[int, str]:
-    """Return what the values of a variable mean, nothing for one that is no flag.
+    """Return the meanings of a variable's values; empty if it is not a flag.
 
-    The outcomes of runs are words; they have numbers where they are drawn.
+    The outcomes of runs are stored as words and numbered for drawing.
     """
     if variable.name == "status":
         return dict(enumerate(STATUSES))
@@ -30,14 +30,14 @@ def flags(variable: xr.DataArray) -> dict[int, str]:
 
 
 def sweep_axes(dataset: xr.Dataset) -> list[str]:
-    """Return the sweep dimensions of a data set, those of size one included."""
+    """Return the sweep dimensions of a data set, including those of size one."""
     return [str(name) for name in dataset["status"].dims]
 
 
 def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the coordinates that tell runs apart, each with its sweep dimension.
+    """Return the coordinates that distinguish runs, each with its sweep dimension.
 
-    These are the dimensions themselves, and after them what linked axes set.
+    These are the dimensions themselves, then the parameters that linked axes set.
     """
     axes = {axis: axis for axis in sweep_axes(dataset)}
     return axes | {
@@ -49,17 +49,17 @@ def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def select(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> xr.Dataset:
-    """Return the part of a data set where the sweep has the wanted values, all axes kept.
+    """Return the part of a data set where the sweep has the selected values; all axes are kept.
 
     Parameters
     ----------
-    dataset : of a study or of a run
-    selection : axis, or parameter set by a linked axis -> wanted value
+    dataset : data set of a study or of a run
+    selection : value for each selected axis, or parameter set by a linked axis
 
     Raises
     ------
     StudyError
-        when an axis or a value is unknown
+        if an axis or a value is unknown
     """
     coordinates = sweep_coordinates(dataset)
     for name, value in selection.items():
@@ -74,15 +74,14 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
 
     Parameters
     ----------
-    dataset : of a study or of a run
-    selection : axis, or parameter set by a linked axis -> wanted value. On an axis that is not
-        named, the largest number or the first label is taken: usually the run with the most
-        residual stress
+    dataset : data set of a study or of a run
+    selection : value for each selected axis, or parameter set by a linked axis. On other axes the
+        largest number or the first label is taken: usually the run with the most residual stress
 
     Raises
     ------
     StudyError
-        when an axis or a value is unknown, or no run that matches succeeded
+        if an axis or a value is unknown, or no selected run succeeded
     """
     axes = sweep_axes(dataset)
     chosen = select(dataset, selection or {})
@@ -101,12 +100,12 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
 def runs_over(
     dataset: xr.Dataset, axis: str, selection: Mapping[str, str | float], field: str
 ) -> xr.Dataset:
-    """Return for each value of an axis the run that `one_run` takes; failed ones are left out.
+    """Return the run that `one_run` selects for each value of an axis; failed runs are left out.
 
     Raises
     ------
     StudyError
-        when there is no such axis or value, no run succeeded, or the grids of the field differ
+        if there is no such axis or value, no run succeeded, or the grids of the field differ
     """
     if axis not in sweep_axes(dataset):
         raise StudyError("over", axis, f"must be one of {', '.join(sweep_axes(dataset))}")
@@ -135,12 +134,12 @@ def _same(grid: xr.DataArray, axis: str) -> bool:
 
 
 def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
-    """Return the file of a run: `path` itself, or that of the run `one_run` takes of a study.
+    """Return the file of a run: `path` itself, or the run that `one_run` selects from a study.
 
     Raises
     ------
     StudyError
-        when there is no such run
+        if there is no such run
     """
     found = find_study(path)
     beside = found.with_name("study.json")
@@ -148,7 +147,7 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
         return found
     store = Store(found.resolve().parents[2])
     study = Study.known(json.loads(beside.read_text(encoding="utf-8")), store.scene)
-    if study.id != found.parent.name:  # then its runs have other ids, too
+    if study.id != found.parent.name:  # then the ids of its runs differ too
         allowed = "was computed by another version of the solver: give the file of a run"
         raise StudyError("path", str(path), allowed)
     with open_netcdf(found) as dataset:
@@ -158,7 +157,13 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
 
 
 def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
-    """Return where a coordinate has the wanted value, or raise a `StudyError` that lists it."""
+    """Return the indices (n,) at which a coordinate has a value.
+
+    Raises
+    ------
+    StudyError
+        if it has no such value; the message lists its values
+    """
     values = axis.to_numpy()
     try:
         same = (
@@ -175,7 +180,7 @@ def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
 
 
 def _own_grid(run: xr.Dataset) -> xr.Dataset:
-    """Return a run on its own grid, where the study's runs have different ones."""
+    """Return a run with its own grid as the index, if the grids of the study's runs differ."""
     for name in [str(name) for name in run.dims]:
         if name in run.coords and name not in run.indexes:
             there = run[name].notnull().to_numpy()

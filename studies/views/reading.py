@@ -1,4 +1,4 @@
-"""Stored results found, and opened as labelled data sets."""
+"""Find stored results and open them as labelled data sets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from studies.storage.frame import FRACTION
 from studies.storage.store import ENGINE, Store
 
 _WAIT = 60.0
-"""Seconds to wait for a service."""
+"""Timeout of a request to a service [s]."""
 
 
 def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
@@ -25,14 +25,14 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
     Parameters
     ----------
     path : a ``dataset.nc``, the directory of a study, an output directory, or the URL of a study
-        of a service that asks for no key, such as ``http://localhost:8000/studies/<id>``
-    name : of the study, where the directory holds several; of those with this name the last
-        computed is opened
+        of a service that requires no key, such as ``http://localhost:8000/studies/<id>``
+    name : name of the study, if the directory has several; of those with this name the one
+        computed last is opened
 
     Raises
     ------
     StudyError
-        when there is no data set (of this name), or studies of several names
+        if there is no data set (of this name), or there are studies with different names
     """
     if isinstance(path, str) and path.startswith(("http://", "https://")):
         if name is not None:
@@ -42,7 +42,7 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
 
 
 def find_study(path: Path | str, name: str | None = None) -> Path:
-    """Return the data set that `open_study` opens."""
+    """Return the path of the data set that `open_study` opens."""
     found = find_datasets(path)
     names = {each: _name(each) for each in found}
     known = ", ".join(sorted(set(names.values())))
@@ -57,7 +57,7 @@ def find_study(path: Path | str, name: str | None = None) -> Path:
 
 
 def _fetched(url: str) -> xr.Dataset:
-    """Return the data set of a study on a service, read whole."""
+    """Return the data set of a study from a service, completely read."""
     import httpx
 
     whole = url if url.endswith(".nc") else f"{url.rstrip('/')}/dataset.nc"
@@ -72,7 +72,7 @@ def _fetched(url: str) -> xr.Dataset:
 
 
 def _refusal(answer: Any) -> str:
-    """Return what a service says of what it does not give."""
+    """Return status and reason of an answer with an error."""
     try:
         return f"{answer.status_code} {answer.json()['detail']}"
     except (ValueError, TypeError, KeyError):
@@ -80,7 +80,7 @@ def _refusal(answer: Any) -> str:
 
 
 def _name(dataset: Path) -> str:
-    """Return the name of the study that a data set is of; its directory's where it has none."""
+    """Return the name of a data set's study, or of its directory if there is none."""
     try:
         content = json.loads(dataset.with_name("study.json").read_text(encoding="utf-8"))
         return str(content["name"])
@@ -91,8 +91,13 @@ def _name(dataset: Path) -> str:
 def open_netcdf(path: Path | str) -> xr.Dataset:
     """Open the file of a run or of a study; arrays are read when they are used.
 
-    Where runs have grids of different length, ``depth`` is a coordinate over the sweep, and
-    ``depth_fraction`` the index: ``dataset.sel(depth_fraction=0.1, method="nearest")``.
+    If runs have grids of different length, ``depth`` is a coordinate over the sweep and
+    ``depth_fraction`` is the index: ``dataset.sel(depth_fraction=0.1, method="nearest")``.
+
+    Raises
+    ------
+    StudyError
+        if it is not a netCDF file
     """
     try:
         dataset = xr.open_dataset(path, engine=ENGINE)
@@ -102,9 +107,9 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
 
 
 def _indexed(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a data set with the fractions of grids that differ as its indexes.
+    """Return a data set whose indexes are the fractions of grids that differ between runs.
 
-    Outcomes are words, also where an earlier version of the solver wrote their numbers.
+    Outcomes are converted to words if an earlier version of the solver stored numbers.
     """
     if "status" in dataset and dataset["status"].dtype.kind == "i":
         words = np.array(str(dataset["status"].attrs["flag_meanings"]).split(), dtype=object)
@@ -116,7 +121,13 @@ def _indexed(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def find_datasets(path: Path | str) -> list[Path]:
-    """Return the data sets `path` stands for: itself, a study's, or those of all studies in it."""
+    """Return the data sets at `path`: itself, that of a study, or those of all studies in it.
+
+    Raises
+    ------
+    StudyError
+        if there are none
+    """
     found = present_datasets(path)
     if not found:
         begun = "; ".join(begun_studies(path))
@@ -126,7 +137,7 @@ def find_datasets(path: Path | str) -> list[Path]:
 
 
 def present_datasets(path: Path | str) -> list[Path]:
-    """Return what `find_datasets` does, or nothing."""
+    """Return the paths of `find_datasets`; empty if there are none."""
     path = Path(path)
     if path.is_file():
         return [path]
@@ -137,7 +148,7 @@ def present_datasets(path: Path | str) -> list[Path]:
 def begun_studies(path: Path | str) -> list[str]:
     """Return a line for each study in `path` (or `path` itself) that has no data set yet.
 
-    The data set of a study is written when the work on it ends, also when Ctrl-C ended it.
+    The data set of a study is written when its computation ends, also after Ctrl-C.
     """
     path = Path(path).resolve()
     files = [*path.glob("study.json"), *sorted(path.glob("studies/*/study.json"))]
@@ -146,7 +157,7 @@ def begun_studies(path: Path | str) -> list[str]:
 
 
 def _progress(file: Path) -> str:
-    """Return the name of a study, and how many of its runs are finished."""
+    """Return the name of a study and the number of its finished runs."""
     study, store = None, Store(file.parents[2])
     try:
         content = json.loads(file.read_text(encoding="utf-8"))

@@ -1,6 +1,6 @@
-"""What `residua run` leaves beside a data set: the table of its runs, and a picture of one.
+"""The report that `residua run` writes beside a data set: the table of runs and a picture of one.
 
-Both are kept as long as the data set is the one that they were made of.
+Both are kept until the data set changes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SHOWN = 100
-"""Most runs that a report lists; `residua show` prints all."""
+"""Largest number of runs that a report lists; `residua show` prints all."""
 
 _NAME = "report"
 _TEXT = "report.txt"
@@ -29,13 +29,13 @@ _TEXT = "report.txt"
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a study came to.
+    """The result of a study as text and files.
 
     Attributes
     ----------
-    text : its runs, their messages, and in the last line how many there are
-    files : the text, and the picture where a run succeeded
-    anew : whether they were written now, not kept
+    text : the runs and their messages; the last line counts them
+    files : the file of the text, and of the picture if a run succeeded
+    anew : whether they were written now; false if they were kept
     """
 
     text: str
@@ -44,7 +44,7 @@ class Report:
 
 
 def prepare() -> None:
-    """Import what a report needs; it takes a second, in which workers compute."""
+    """Import the modules that a report needs; it takes a second while workers compute."""
     import xarray as xr
 
     import studies.storage.combine
@@ -55,12 +55,12 @@ def prepare() -> None:
 
 
 def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
-    """Return the report of a study that was carried out, made anew where its data set was."""
+    """Return the report of a finished study, written again if its data set has changed."""
     made = Made(study, store)
     of = made.digest(outcome.dataset.name)
     if files := made.kept(_NAME, of):
         return Report(files[0].read_text(encoding="utf-8"), files, anew=False)
-    from studies.views.reading import open_study  # with tables and pictures, a second to import
+    from studies.views.reading import open_study  # with tables and pictures it takes a second
 
     with open_study(outcome.dataset) as dataset:
         text = _text(study, outcome, dataset)
@@ -79,15 +79,15 @@ def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
 
 
 def _warned(dataset: xr.Dataset) -> str:
-    """Return how many runs succeeded with a warning, which their details show."""
+    """Return a text with the number of runs that succeeded with a warning; empty if none did."""
     warned = (dataset["status"] == OK) & (dataset["message"] != "")
     return f"; {int(warned.sum())} with a warning" if warned.any() else ""
 
 
 def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
-    """Draw the residual stress of the run with most of it, or the stress where none is released.
+    """Draw the residual stress of the run of `one_run`, or the stress if bodies are not unloaded.
 
-    Nothing when no run succeeded.
+    Nothing is drawn if no run succeeded.
     """
     from studies.views.picking import one_run
     from studies.views.plots.fields import usual_field

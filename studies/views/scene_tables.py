@@ -1,4 +1,4 @@
-"""Text tables of scenes and their parameters, without the libraries that read data sets."""
+"""Text tables of scenes and their parameters; they do not import libraries to read data sets."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def scenes_table() -> str:
 
 
 def scene_table(name: str) -> str:
-    """Return a line for each parameter of a scene: default, what is allowed, what it means.
+    """Return a line for each parameter of a scene: default, allowed values, meaning.
 
-    ``name`` is that of a scene, or the path of a scene file.
+    ``name`` is the name of a scene or the path of a scene file.
     """
     scene = scene_named(name, beside(Path()))
     known = parameters_of(scene).values()

@@ -1,4 +1,4 @@
-"""The solution of a model of one's own as a data set."""
+"""The solution of a user's model as a data set."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _UNITS = {"displacement": "mm", "stress": "MPa", "mises": "MPa", "plastic_strain
 
 
 def to_xarray(solution: Solution) -> xr.Dataset:
-    """Return fields at all nodes over stages, with the body and the position of each node.
+    """Return fields at all nodes and stages, with the body and the position [mm] of each node.
 
     Variables: ``displacement`` (stage, axis, node) [mm], ``stress`` (stage, component, node) [MPa],
-    ``mises`` [MPa] and ``plastic_strain`` (stage, node).
+    ``mises`` (stage, node) [MPa] and ``plastic_strain`` (stage, node).
     """
     fields = solution.mesh_fields()
     axes = AXES[: len(fields.X)]

@@ -1,4 +1,4 @@
-"""Text tables: the runs of a study, and one run."""
+"""Text tables of the runs of a study and of one run."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ FIGURES: Mapping[str, str] = {
     "cut_increments": "cut",
     "cpu_seconds": "cpu",
 }
-"""Variables a table of runs shows, where the scene gives them, and their headings. One over bodies
+"""Variables in a table of runs, if the scene has them, and their headings. A variable over bodies
 and components has a column for the first component of each body."""
 
 
@@ -54,20 +54,20 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_]
 _AWAY = "audit_plastic_strain"
 _MARK = "*"
 _FOOTNOTE = (
-    f"\n{_MARK} taken at a singular point, where strain has no bound: a number of the mesh, which "
-    "need not settle\n  as the mesh is refined\n"
+    f"\n{_MARK} taken at a singular point, where strain is unbounded: the number depends on the "
+    "mesh and need not\n  converge as the mesh is refined\n"
 )
 
 NAMED = 4
-"""Most runs that are named for a message; the rest are counted."""
+"""Largest number of runs that are named for a message; further ones are counted."""
 
 
 def runs_table(dataset: xr.Dataset) -> str:
-    """Return a line for each run: where it lies in the sweep, its status, its main figures.
+    """Return a line for each run: its values of the sweep, its status, its main figures.
 
-    Beside the labels of a linked axis stands what they set. Residual stresses and plastic strain
-    are what contact left; increments, and those cut if any, tell how hard it was to find. What was
-    taken at a singular point is marked.
+    The labels of a linked axis are followed by the parameters they set. Residual stress and plastic
+    strain are those after unloading. Increments, and cut increments if there are any, show how hard
+    the run was to solve. Numbers taken at a singular point are marked.
     """
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
     keys = sum(name == axis for name, axis in places.items())
@@ -92,14 +92,14 @@ def runs_table(dataset: xr.Dataset) -> str:
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:
-    """Return the texts of a column, those of numbers at a singular point marked."""
+    """Return the texts of a column, with a mark on numbers taken at a singular point."""
     end = np.where(spoiled, _MARK, " " if spoiled.any() else "")
     texts = np.vectorize(value_text, otypes=[object])(values)
     return np.asarray(texts + end.astype(object))
 
 
 def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray, xr.DataArray]]:
-    """Yield each figure that the runs have: heading, values, which are at a singular point."""
+    """Yield each figure of the runs: heading, values, whether each is taken at a singular point."""
     for name in _own(dataset):
         yield name.replace("_", " "), dataset[name], _spoiled(dataset, name)
     for name, heading in FIGURES.items():
@@ -112,12 +112,12 @@ def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray, xr.DataAr
             one = {"body": k, "component": 0}
             each = values.isel(one, missing_dims="ignore")
             words = {c: str(each[c].item()) for c in ("body", "component") if c in each.coords}
-            told = heading.format(**words).replace("_", " ")
-            yield told, each, spoiled.isel(one, missing_dims="ignore")
+            text = heading.format(**words).replace("_", " ")
+            yield text, each, spoiled.isel(one, missing_dims="ignore")
 
 
 def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return where a figure was taken at a singular point, as far as its place is known."""
+    """Return whether a figure was taken at a singular point; false if its position is unknown."""
     if "singular" not in dataset.dims:
         return xr.zeros_like(dataset[name], dtype=bool)
     if name == "max_plastic_strain":
@@ -133,7 +133,7 @@ def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _own(dataset: xr.Dataset) -> list[str]:
-    """Return the outputs that a scene file declares, without their places."""
+    """Return the outputs that a scene file declares, without the positions of extreme values."""
     rank = dataset["status"].dims
     names = [str(name) for name, each in dataset.data_vars.items() if each.dims == rank]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
@@ -143,9 +143,9 @@ def _own(dataset: xr.Dataset) -> list[str]:
 
 
 def messages(dataset: xr.Dataset) -> str:
-    """Return each kind of message once: outcome, text, how many runs have it, and which.
+    """Return each kind of message once: outcome, text, number of runs, and their places.
 
-    Messages that differ in their numbers alone are of one kind, which tells their range.
+    Messages that differ only in numbers are of one kind; the ranges of the numbers are shown.
     """
     axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     status, text = (dataset[name].to_numpy() for name in ("status", "message"))
@@ -166,7 +166,7 @@ def messages(dataset: xr.Dataset) -> str:
 
 
 def _ranged(words: str, numbers: Sequence[Sequence[str]]) -> str:
-    """Return the words with their numbers, or the range of these over the runs."""
+    """Return the text with its numbers, or with their ranges if they differ between runs."""
     every = []
     for column in zip(*numbers, strict=True):
         least, most = min(column, key=float), max(column, key=float)
@@ -176,7 +176,7 @@ def _ranged(words: str, numbers: Sequence[Sequence[str]]) -> str:
 
 
 def _listed(places: Sequence[str]) -> str:
-    """Return how many runs there are, and the first of them."""
+    """Return the number of runs, and the places of the first ones."""
     if not places[0]:
         return "the only run"
     more = f"; and {len(places) - NAMED} more" if len(places) > NAMED else ""
@@ -208,7 +208,7 @@ def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _figure(variable: xr.DataArray) -> str:
-    """Return the single value of a variable; what a flag means instead of its number."""
+    """Return the single value of a variable as text; a flag as its meaning."""
     return flags(variable).get(variable.item()) or value_text(variable.item())
 
 

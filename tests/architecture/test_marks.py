@@ -17,7 +17,7 @@ from solver.mesh import grid
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import steady_passes
 from tests.architecture.sources import PROJECT, ROOT, tracked
-from tests.marks import DEAR, FOLDERS, HERE, LONG, of_folder
+from tests.marks import EXPENSIVE, FOLDERS, HERE, LONG, of_folder
 
 
 def pulled() -> object:
@@ -81,13 +81,13 @@ def test_a_page_may_do_both() -> None:
 
 def test_the_quick_check_leaves_out_every_mark() -> None:
     marks = {each.partition(":")[0] for each in PROJECT["tool"]["pytest"]["ini_options"]["markers"]}
-    assert marks == {*DEAR, "pages"}
+    assert marks == {*EXPENSIVE, "pages"}
     (left_out,) = re.findall(r'pytest .*-m "(.*)"', (ROOT / "Makefile").read_text())
     assert set(left_out.split(" and ")) == {f"not {mark}" for mark in marks}
 
 
 def test_marks_of_folders_are_known_and_their_folders_exist() -> None:
-    assert {mark for marks in FOLDERS.values() for mark in marks} <= DEAR.keys()
+    assert {mark for marks in FOLDERS.values() for mark in marks} <= EXPENSIVE.keys()
     for folder, marks in FOLDERS.items():
         assert of_folder(HERE / folder / "test_any.py") == marks
         assert list((HERE / folder).glob("test_*.py"))

@@ -18,8 +18,8 @@ pytestmark = pytest.mark.solves
 
 STEEL = Material(youngs_modulus=1.95e5, poisson_ratio=0.3, yield_stress=350.0)
 IN_GPA = (
-    "lower.youngs_modulus = 195: 195000 MPa was probably meant, 195 GPa; yield at a strain of 1.79 "
-    "is that of no metal (yield_stress = 350 MPa, youngs_modulus = 195 MPa)"
+    "lower.youngs_modulus = 195: 195000 MPa was probably meant, 195 GPa; no metal has a yield "
+    "strain of 1.79 (yield_stress = 350 MPa, youngs_modulus = 195 MPa)"
 )
 
 
@@ -40,7 +40,7 @@ def blocks(material: Material, gap: float = 0.0) -> Model:
         (195.0, 350.0, "lower.youngs_modulus = 195: 195000 MPa was probably meant, 195 GPa"),
         (2e5, 3.5e8, "lower.yield_stress = 3.5e+08: 350 MPa was probably meant, 3.5e+08 Pa"),
         (2e5, 3.5e5, "lower.yield_stress = 350000: 350 MPa was probably meant, 350000 kPa"),
-        (3.0, 350.0, "lower.youngs_modulus = 3: must be in MPa, as the yield stress"),
+        (3.0, 350.0, "lower.youngs_modulus = 3: must be in MPa, like the yield stress"),
     ],
 )
 def test_the_number_in_another_unit_is_named_with_what_was_meant(
@@ -48,7 +48,7 @@ def test_the_number_in_another_unit_is_named_with_what_was_meant(
 ) -> None:
     material = replace(STEEL, youngs_modulus=stiffness, yield_stress=strength)
     (text,) = doubts({"lower": material})
-    assert text.startswith(f"{told}; yield at a strain of {strength / stiffness:.3g}")
+    assert text.startswith(f"{told}; no metal has a yield strain of {strength / stiffness:.3g}")
 
 
 @pytest.mark.parametrize(

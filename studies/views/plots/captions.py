@@ -1,4 +1,4 @@
-"""What figures call values, quantities and runs."""
+"""Texts of figures for values, quantities and runs."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def value_text(coordinate: xr.DataArray) -> str:
 
 
 def named(name: str, value: Any, unit: str = "") -> str:
-    """Return a quantity and its value in words; what is true or false by its name alone."""
+    """Return a quantity and its value in words; true is the name, false the name after "not"."""
     if isinstance(value, bool):
         return words(name) if value else f"not {words(name)}"
     return f"{words(name)} {_text(value, unit)}"
 
 
 def label(variable: xr.DataArray) -> str:
-    """Return what an axis shows, with its unit."""
+    """Return the meaning of a variable with its unit, for an axis."""
     return _measured(variable.attrs.get("long_name", str(variable.name)), variable)
 
 
@@ -44,15 +44,15 @@ def short_label(variable: xr.DataArray) -> str:
 
 
 def capitalised(text: str) -> str:
-    """Return text with its first letter as a capital, the others as they are."""
+    """Return text with its first letter as a capital and the others unchanged."""
     return text[:1].upper() + text[1:]
 
 
 def setting(run: xr.Dataset) -> str:
-    """Return the scene and what tells this run from others, in words.
+    """Return the scene and what distinguishes this run from others, in words.
 
-    That is where it lies on the axes of the sweep, and its parameters other than the scene's
-    defaults. The two-dimensional state is named in any case.
+    These are its values on the axes of the sweep, and the parameters that differ from the scene's
+    defaults. The two-dimensional state is always named.
     """
     scene = run.attrs["scene"]
     known = parameters_of(scene_of(run.attrs))
@@ -78,7 +78,7 @@ def setting(run: xr.Dataset) -> str:
 
 
 def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the defaults of the parameters of a run; of several runs, those that they declare."""
+    """Return the default parameters of a run; for several runs, the defaults that they declare."""
     scene = scene_of(run.attrs)
     known = parameters_of(scene)
     swept = {
@@ -88,12 +88,12 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
     }
     try:
         return defaults(scene, {**given, **swept})
-    except ModelError:  # only what is swept makes the parameters go together
+    except ModelError:  # the parameters are consistent only with the swept values
         return {name: parameter.default for name, parameter in known.items()}
 
 
 def wrapped(text: str, width: float, points: int) -> str:
-    """Return text in lines that fit `width` inches at a font size."""
+    """Return text in lines that fit `width` [in] at a font size [points]."""
     return textwrap.fill(text, int(width * 72.0 / (0.52 * points)), break_long_words=False)
 
 

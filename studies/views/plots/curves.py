@@ -1,4 +1,4 @@
-"""One value a run, drawn over one swept number, or over labels: a curve for each of the rest."""
+"""Draw one value per run over one swept number or labels, with a curve for each other value."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ from studies.views.plots.runs import Kind, absent, known_values, standing, style
 _MARKS = "osD^vPh*"
 _SIZE = (8.0, 4.6)
 _ABREAST = 60
-"""Letters of all labels that have place side by side."""
+"""Largest number of letters of horizontal labels."""
 _FOOT = 0.03
-"""Height of the marks of runs without a value / height of the figure."""
+"""Position of the marks of runs without a value, as a share of the height of the axes."""
 
 
 def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
-    """Return `field` over the number that is swept, with a curve for each combination of the rest.
+    """Return `field` over the swept number, with a curve for each combination of the other axes.
 
-    Where only labels are swept they stand side by side. Runs without a value are marked below, by
-    their status.
+    If only labels are swept, they are on the horizontal axis. Runs without a value are marked at
+    the bottom by their status.
 
     Parameters
     ----------
-    dataset : of a study
-    field : one of its variables with one value a run
+    dataset : data set of a study
+    field : one of its variables with one value per run
 
     Raises
     ------
     StudyError
-        when nothing varies, or more than `MOST_LINES` curves would be drawn
+        if nothing varies, no run has a value, or more than `MOST_LINES` curves would be drawn
     """
     numbers, labels = standing(dataset)
     if not numbers and not labels:
@@ -61,7 +61,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
             field,
             f"would take {curves} curves, at most {MOST_LINES} are drawn: select values of {rest}",
         )
-    style_of(dataset, field)  # where no run has a value: say so
+    style_of(dataset, field)  # raises an error if no run has a value
     sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
     numeric = is_number(across)
@@ -101,7 +101,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
 
 
 def _scale(axes: Axes, field: xr.DataArray, values: xr.DataArray) -> None:
-    """Name the axis that goes up: a number with its unit, or the meanings of flags that occur."""
+    """Label the vertical axis: a number with its unit, or the meanings of flags that occur."""
     meanings: Mapping[int, str] = flags(field)
     if not meanings:
         axes.set_ylabel(capitalised(short_label(field)))

@@ -1,4 +1,4 @@
-"""What of a data set can be drawn: its variables, by what they lie over, and parts of them."""
+"""The variables of a data set that can be drawn, by their dimensions, and parts of them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
 
 Window = Sequence[float]
-"""Part of a map: from where to where across, and up [mm]."""
+"""Part of a map: horizontal range, vertical range [mm]."""
 
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
-"""Dimensions that lines run over, one of them."""
+"""Dimensions along which lines are drawn; a line has one of them."""
 DRAWN = (*AXES, *ALONG)
-"""Dimensions that one figure of a run runs over: two axes of a map, or one of `ALONG`."""
+"""Dimensions within one figure of a run: two axes of a map, or one of `ALONG`."""
 
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
-    """Return the numbers and flags that have one value a run, and its outcome."""
+    """Return the numbers and flags with one value per run, and ``status``."""
     sweep = dataset["status"].dims
     return [
         str(name)
@@ -32,7 +32,7 @@ def sweep_fields(dataset: xr.Dataset) -> list[str]:
 
 
 def labelled_fields(dataset: xr.Dataset) -> list[str]:
-    """Return the variables with one number a run for each label, such as body or component."""
+    """Return the variables with one number per run and label, such as body or component."""
     sweep = set(dataset["status"].dims)
     return [
         str(name)
@@ -50,9 +50,9 @@ def map_fields(dataset: xr.Dataset) -> list[str]:
 
 
 def map_axes(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> tuple[str, ...]:
-    """Return the dimensions of a field that are coordinates: of a map that across, and that up.
+    """Return the dimensions of a field that are coordinates; for a map: horizontal, vertical.
 
-    An axis of the sweep is none, whatever its name.
+    Axes of the sweep do not count, whatever their names.
     """
     own = (name for name in reversed(values.dims) if name not in sweep)
     return tuple(str(name) for name in own if name in AXES)
@@ -64,7 +64,7 @@ def line_fields(dataset: xr.Dataset) -> list[str]:
 
 
 def usual_field(dataset: xr.Dataset) -> str:
-    """Return what is drawn by default: residual stress, or stress where no body is released."""
+    """Return the field drawn by default: residual stress, or stress if bodies are not unloaded."""
     maps = map_fields(dataset)
     return next((name for name in (_RESIDUAL, _STRESS) if name in maps), _RESIDUAL)
 
@@ -76,7 +76,10 @@ def check_field(field: str, known: list[str]) -> None:
 
 
 def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:
-    """Return one component of a tensor, the first by default; a scalar field as it is."""
+    """Return one component of a tensor, by default the first; a scalar field unchanged.
+
+    Raises `StudyError` for an unknown component, or a component of a scalar.
+    """
     if "component" not in values.dims:
         if component is not None:
             raise StudyError("component", component, f"{values.name} is a scalar: leave it out")
@@ -88,20 +91,20 @@ def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:
 
 
 def is_half(run: xr.Dataset) -> bool:
-    """Whether one half of symmetric bodies was computed, as its scene declares."""
+    """Whether only one half of symmetric bodies was computed."""
     return bool(run.attrs.get(SYMMETRIC, 0))
 
 
 def focus(run: xr.Dataset, zoom: float) -> float:
-    """Return the place along the surface that a zoom is about [mm]: the centre of the contact.
+    """Return the position along the surface about which to zoom [mm]: the centre of the contact.
 
-    Where one half of symmetric bodies was computed, this centre is the end of the grid: then it is
-    the edge of the contact.
+    If one half of symmetric bodies was computed, the centre is the end of the grid; then it is the
+    edge of the contact.
 
     Raises
     ------
     StudyError
-        when it is the edge, and the run does not know it
+        if it is the edge, and the run has no ``contact_half_width``
     """
     if not is_half(run):
         return 0.0
@@ -113,13 +116,13 @@ def focus(run: xr.Dataset, zoom: float) -> float:
 
 
 def empty_window(window: Window, across: str, up: str) -> StudyError:
-    """Return what is wrong with a window that shows nothing of a map over these axes."""
+    """Return the error for a window that contains no part of a map over these axes."""
     a, b = across, up
     ends = f"{a}0 {a}1 {b}0 {b}1 [mm] with {a}0 < {a}1, {b}0 < {b}1"
-    allowed = f"must be {ends}, and hold two points or more"
+    allowed = f"must be {ends}, and contain two points or more"
     return StudyError("window", list(window), allowed)
 
 
 def too_close(zoom: float) -> StudyError:
-    """Return what is wrong with a zoom that shows nothing."""
-    return StudyError("zoom", zoom, "must be a length [mm] that holds two points or more")
+    """Return the error for a zoom that contains no points."""
+    return StudyError("zoom", zoom, "must be a length [mm] that contains two points or more")

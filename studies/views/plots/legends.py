@@ -1,4 +1,4 @@
-"""How lines are distinguished, by colour and style, and what explains them: a legend or a bar."""
+"""Colours and styles of lines, and the legend or colour bar that explains them."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from studies.views.plots.captions import capitalised, short_label
 
 MOST_LINES = 12
-"""Most lines that a legend tells apart; the values of a number have a bar of colours beyond."""
+"""Largest number of lines in a legend; more values of a number have a colour bar instead."""
 
 STYLES: Sequence[Any] = ("-", "--", ":", "-.", (0, (8, 2, 1, 2, 1, 2)), (0, (1, 4)))
-"""Dashes that can be distinguished."""
+"""Line styles that can be distinguished."""
 
 _TICKS = 7
-"""Values named at a bar of colours."""
+"""Number of labels of a colour bar."""
 
 
 def is_number(coordinate: xr.DataArray) -> bool:
-    """Tell whether the values of a coordinate have an order."""
+    """Whether a coordinate is numeric, so that its values have an order."""
     return coordinate.dtype.kind in "fiu"
 
 
 def colours_of(coordinate: xr.DataArray) -> Sequence[Any]:
-    """Return a colour for each value of a coordinate: in their order, where it is a number."""
+    """Return a colour for each value of a coordinate; the colours of numbers follow their order."""
     if is_number(coordinate):
         rank = np.argsort(np.argsort(coordinate.to_numpy()))
         return list(colormaps["viridis"](np.linspace(0.0, 0.85, coordinate.size)[rank]))
@@ -38,12 +38,12 @@ def colours_of(coordinate: xr.DataArray) -> Sequence[Any]:
 
 
 def has_bar(coordinate: xr.DataArray) -> bool:
-    """Tell whether the values of a coordinate are explained by a bar of colours."""
+    """Whether a colour bar explains the values of a coordinate."""
     return is_number(coordinate) and coordinate.size > MOST_LINES
 
 
 def add_bar(axes: Axes, coordinate: xr.DataArray) -> None:
-    """Draw the colours of a number's values below the axes, each as wide as the next."""
+    """Draw a colour bar of a coordinate's values below the axes, with cells of equal width."""
     order, colours = np.argsort(coordinate.to_numpy()), colours_of(coordinate)
     cells = BoundaryNorm(np.arange(order.size + 1) - 0.5, order.size)
     shown = np.linspace(0, order.size - 1, _TICKS).round().astype(int)
@@ -56,9 +56,9 @@ def add_bar(axes: Axes, coordinate: xr.DataArray) -> None:
 
 
 def add_legend(axes: Axes, headings: Sequence[str], *, styles: bool = False) -> None:
-    """Explain the lines beside the axes, headed by what their names are values of.
+    """Add a legend beside the axes, headed by the names of the quantities.
 
-    `styles`: the dashes alone, where a bar explains the colours.
+    With `styles` it explains only the line styles: a bar explains the colours.
     """
     known = {name: line for line, name in zip(*axes.get_legend_handles_labels(), strict=True)}
     legend = axes.legend(

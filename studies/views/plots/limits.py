@@ -1,4 +1,4 @@
-"""Shakedown limits of sliding line contact, drawn over computed states."""
+"""Draw shakedown limits of sliding line contact over computed states."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _POINTS = 51
 
 
 def draw_shakedown_limits(axes: Axes, panel: xr.Dataset, outermost: bool) -> Sequence[Line2D]:
-    """Draw p0 / k up to which a body without hardening shakes down, and return the lines.
+    """Draw the largest p0 / k at which a body without hardening shakes down; return the lines.
 
-    They hold for a shear of friction times pressure: nothing is drawn unless all contacts slide.
+    The limits hold for shear = friction * pressure: nothing is drawn unless all contacts slide.
 
     Parameters
     ----------
-    axes : friction goes across, load ratio p0 / Re up
-    panel : the runs on them
-    outermost : whether the scale of p0 / k on the right gets its label
+    axes : axes with friction horizontal and load ratio p0 / Re vertical
+    panel : the runs on these axes
+    outermost : whether the scale of p0 / k on the right has a label
     """
     friction = panel["friction"]
     slides = (friction == 0.0) | (_parameter(panel, "traction") == 1.0)
@@ -56,12 +56,12 @@ def _over_yield(pressure: Any) -> Any:
 
 @cache
 def _limits(most: float, poisson_ratio: float) -> np.ndarray:
-    """Return friction up to `most`, and both limits of p0 / k: (3, n)."""
+    """Return friction up to `most` and both limits of p0 / k (3, n)."""
     friction = np.linspace(0.0, most, _POINTS)
     both = [(johnson_limit(mu), melan_limit(mu, poisson_ratio)) for mu in friction]
     return np.stack([friction, *np.transpose(both)])
 
 
 def _parameter(panel: xr.Dataset, name: str) -> Any:
-    """Return a parameter of the runs: a coordinate where it is swept, else its single value."""
+    """Return a parameter of the runs: a coordinate if it is swept, else its single value."""
     return panel[name] if name in panel.coords else json.loads(panel.attrs["parameters"])[name]

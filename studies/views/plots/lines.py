@@ -1,4 +1,4 @@
-"""Lines of one run: profiles along depth, what acts on the contact surface, and its course."""
+"""Lines of one run: depth profiles, contact along the surface, and histories over increments."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from studies.views.plots.legends import (
 from studies.views.plots.maps import entitle
 
 _DECAYED = 0.02
-"""Depth is shown to where nothing larger than this part of the peak is left."""
+"""Depth is shown as far as values exceed this share of the peak."""
 _EACH = len(STYLES)
-"""Most values that are drawn of a dimension of the field."""
+"""Largest number of values drawn of a dimension of the field."""
 _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth")
 _DISTANCE = "distance"
@@ -48,17 +48,26 @@ def line_figure(
     zoom: float | None = None,
     over: str | None = None,
 ) -> Figure:
-    """Return `field` over a length or increments, with a line for each of the rest.
+    """Return `field` over a length or increments, with a line for each value of other dimensions.
 
-    The rest are passes, stations, stages, bodies, contacts.
+    These are passes, stations, stages, bodies and contacts. If there are more passes than lines can
+    be distinguished, the first, the last and some between are drawn; then of several stations only
+    the middle one.
 
-    Of more passes than can be distinguished the first, the last and some between are drawn, and of
-    several stations then the middle one.
+    Parameters
+    ----------
+    run : data set of one run, or of one run for each value of ``over``
+    field : variable along one of `ALONG`
+    component : component of a stress tensor; by default the first
+    zoom : show only this length on either side of the contact's centre (of its edge, if half of the
+        bodies was computed) or below the surface [mm]; by default depth ends where values have
+        decayed
+    over : axis of the sweep that ``run`` still has; each of its values has lines
 
-    `zoom` shows only that length on either side of the contact's centre (of its edge, where half
-    of the bodies was computed), or below the surface [mm]. Without it, depth ends where the values
-    have decayed. With `over`, the axis of the sweep that `run` still has, each of its values has
-    lines.
+    Raises
+    ------
+    StudyError
+        if there is no such field or component, no value, or too many lines
     """
     run = run if over else one_run(run)
     check_field(field, line_fields(run))
@@ -71,7 +80,7 @@ def line_figure(
     if not values.size:
         raise StudyError("field", field, "has no value in the run selected")
     sizes = values.sizes
-    values = _told_apart(values, [name for name in values.dims if name != along], over)
+    values = _distinguishable(values, [name for name in values.dims if name != along], over)
     others = [name for name in values.dims if name != along]
     at = _DISTANCE if _DISTANCE in values.coords else along
     if zoom is not None:
@@ -117,21 +126,23 @@ def line_figure(
 
 
 def _placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
-    """Return values along lines or contact surfaces with the distance from their start [mm]."""
+    """Return values, with the distance [mm] from the start of a line or contact as a coordinate."""
     distance = run.get(f"{str(values.name).partition('_')[0]}_s")
     there = distance is not None and set(distance.dims) <= set(values.dims)
     return values.assign_coords({_DISTANCE: distance}) if there else values
 
 
-def _told_apart(values: xr.DataArray, others: Sequence[Hashable], over: str | None) -> xr.DataArray:
-    """Return as many lines as can be distinguished; dimensions with one value left are dropped.
+def _distinguishable(
+    values: xr.DataArray, others: Sequence[Hashable], over: str | None
+) -> xr.DataArray:
+    """Return as many lines as can be distinguished; dimensions with one value are dropped.
 
     Each value of the axis `over` keeps its lines.
     """
     barred = over is not None and has_bar(values[over])
     if over and not barred and (count := values.sizes[over]) > MOST_LINES:
         allowed = (
-            f"has {count} values, of which {MOST_LINES} can be told apart: select some of them"
+            f"has {count} values, of which {MOST_LINES} can be distinguished: select some of them"
         )
         raise StudyError("over", over, allowed)
     own = [name for name in others if name != over]
@@ -147,13 +158,13 @@ def _told_apart(values: xr.DataArray, others: Sequence[Hashable], over: str | No
 
 
 def _heading(drawn: xr.DataArray, sizes: Mapping[Hashable, int]) -> str:
-    """Return the name of a dimension, and of how many values those drawn are some."""
+    """Return the name of a dimension; if some values are not drawn, with both counts."""
     name, all_of_them = words(str(drawn.name)), sizes[drawn.name]
     return name if drawn.size == all_of_them else f"{name} ({drawn.size} of {all_of_them})"
 
 
 def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
-    """Return the number of points down to where nothing worth showing is left."""
+    """Return the number of points down to the depth at which values have decayed."""
     largest = abs(values).max(others).to_numpy()
     shown = np.flatnonzero(largest > _DECAYED * largest.max())
     return int(shown[-1]) + 2 if shown.size else values.sizes["depth"]

@@ -28,11 +28,11 @@ SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
 _OUTSIDE = "0.86"
 _PERCENT, _WORTHWHILE = 99.8, 1.5
-"""Next to a sharp corner stress grows without bound: colours end at this percentile of the map,
-where its largest value is that many times larger."""
+"""Colours end at this percentile of the map if the largest value is this many times larger: near a
+sharp corner stress is unbounded."""
 
 _NOTHING = 1e-3
-"""Stress that is rounding [MPa]."""
+"""Stress up to which it is rounding [MPa]."""
 
 _AREA, _LONGEST = 26.0, 8.0
 """Area of a map and its longest side [in]."""
@@ -47,23 +47,23 @@ def map_figure(
     zoom: float | None = None,
     window: Window | None = None,
 ) -> Figure:
-    """Return a map of `field` over the bodies, whole where half of them was computed.
+    """Return a map of `field` over the bodies, with both halves if one half was computed.
 
     Parameters
     ----------
     run : data set of one run
-    field : variable over two coordinates, such as ``y`` and ``x``, the last of them across; by
-        default the residual stress, or the stress where the bodies are not released; of several
+    field : variable over two coordinates, such as ``y`` and ``x``, the last of them horizontal; by
+        default the residual stress, or the stress if the bodies are not unloaded; of several
         stages the last is drawn
-    component : of a stress tensor; the first one by default
-    zoom : show only what lies within this distance of the contact's centre, or of its edge where
-        half of the bodies was computed [mm]
-    window : show only this part: from where to where across, and up, such as (x0, x1, y0, y1) [mm]
+    component : component of a stress tensor; by default the first
+    zoom : show only the part within this distance of the contact's centre, or of its edge if half
+        of the bodies was computed [mm]
+    window : show only this part: horizontal and vertical range, such as (x0, x1, y0, y1) [mm]
 
     Raises
     ------
     StudyError
-        when the data set has no such field or component, or there are no points in what is shown
+        if the data set has no such field or component, or the part has no points
     """
     run = one_run(run)
     field = field or usual_field(run)
@@ -92,7 +92,7 @@ def map_figure(
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     seen = edge > 0.0 and bottom <= 0.0 <= top
     ends = [end for end in (-edge, edge) if seen and left <= end <= right]
-    if ends:  # from above: a line would hide the stress at the surface
+    if ends:  # marks above the surface: a line would hide the stress at the surface
         axes.plot(
             ends, [0.0] * len(ends), linestyle="none", marker=CARETDOWN, color="k",
             label="edge of contact under load",
@@ -116,11 +116,11 @@ def map_figure(
 
 
 def whole(values: xr.DataArray) -> xr.DataArray:
-    """Return a map of both halves of bodies that are symmetric about x = 0, from the half x >= 0.
+    """Return a map of both halves of bodies symmetric about x = 0, from the half x >= 0.
 
-    Of a section it is z, whichever goes across. Shear across this line, or this axis, changes sign
-    on the other side. A column on it stays one. Where the map begins away from it, what lies
-    between the halves is not known.
+    For a section the horizontal axis is z. Shear with one index across the line of symmetry changes
+    sign. A column on the line is not repeated. If the map begins away from the line, values between
+    the halves are NaN.
     """
     across, _ = map_axes(values)
     values = values.isel({across: values[across].to_numpy() >= 0.0})
@@ -136,7 +136,7 @@ def whole(values: xr.DataArray) -> xr.DataArray:
 
 
 def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.DataArray:
-    """Return the part of a map in a window, or raise the error for one that shows nothing."""
+    """Return the part of a map in a window, or raise the error ``nothing`` if it is empty."""
     across, up = map_axes(values)
     x, y = (values[name].to_numpy() for name in (across, up))
     x0, x1, y0, y1 = window
@@ -147,7 +147,7 @@ def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.Dat
 
 
 def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
-    """Return where colours end, and a note on the values beyond."""
+    """Return the largest value of the colours, and a note on values beyond it."""
     known = np.isfinite(values.to_numpy())
     there, area = values.to_numpy()[known], _areas(values)[known]
     size = np.abs(there) if signed else there
@@ -168,13 +168,13 @@ def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
 
 
 def _areas(values: xr.DataArray) -> np.ndarray:
-    """Return the area of each point of a map, whose points lie closer where stress is steep."""
+    """Return the area of each point of a map; points are closer where stress changes rapidly."""
     dx, dy = (np.gradient(values[name].to_numpy()) for name in map_axes(values))
     return np.abs(np.multiply.outer(dy, dx))
 
 
 def _percentile(values: np.ndarray, area: np.ndarray) -> float:
-    """Return what `_PERCENT` of the area does not exceed."""
+    """Return the value that is not exceeded on `_PERCENT` of the area."""
     order = np.argsort(values)
     share = np.cumsum(area[order]) / area.sum()
     return float(values[order][np.searchsorted(share, _PERCENT / 100.0)])
@@ -188,7 +188,7 @@ def _size(values: xr.DataArray) -> tuple[float, float]:
 
 
 def _fit(sheet: Figure, axes: Axes) -> None:
-    """Give the figure the size of all that is drawn, the axes keeping theirs."""
+    """Fit the size of the figure to all that is drawn, without changing the size of the axes."""
     size = sheet.get_size_inches()
     sheet.draw_without_rendering()
     ink = sheet.get_tightbbox().padded(0.1)
@@ -199,7 +199,7 @@ def _fit(sheet: Figure, axes: Axes) -> None:
 
 
 def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
-    """Set the title, and below it what tells the run from others, in lines of `width` inches."""
+    """Set the title, and below it what distinguishes the run, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
     component = str(values["component"].item()) if "component" in values.coords else ""
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")

@@ -1,4 +1,4 @@
-"""The figure that suits a field: over the sweep, or a map or lines of one run."""
+"""Choose the figure of a field: over the sweep, or a map or lines of one run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from studies.views.plots.maps import map_figure
 from studies.views.plots.sweep import sweep_figure
 
 _COARSEST, _FINEST = 50, 600
-"""Dots per inch."""
+"""Range of the resolution in dots per inch."""
 
 
 def picture(
@@ -43,22 +43,22 @@ def picture(
 
     Parameters
     ----------
-    dataset : of a study or of a run
-    field : a variable with one value a run (for each body, component or point), or one over the
+    dataset : data set of a study or of a run
+    field : a variable with one value per run (for each body, component or point), or over the
         bodies, their surface or depth
-    component : of a stress tensor; the first one by default
-    zoom : show only what lies within this distance of the contact's centre or edge, or of the
+    component : component of a stress tensor; by default the first
+    zoom : show only the part within this distance of the contact's centre or edge, or of the
         surface [mm]
-    selection : axis of the sweep, parameter set by a linked axis, or dimension of the field, such
-        as ``pass`` -> wanted value
-    window : of a map, show only this part
-    over : of lines, the axis of the sweep of which each value has a line
-    resolution : dots per inch; that of the screen by default
+    selection : value for each selected axis of the sweep, parameter set by a linked axis, or
+        dimension of the field, such as ``pass``
+    window : for a map: show only this part
+    over : for lines: axis of the sweep; each of its values has a line
+    resolution : dots per inch; by default that of the figure
 
     Raises
     ------
     StudyError
-        when there is no such field, component, axis or value, or nothing to show
+        if there is no such field, component, axis or value, or nothing to show
     """
     maps, lines, singles = map_fields(dataset), line_fields(dataset), sweep_fields(dataset)
     labelled = labelled_fields(dataset)
@@ -71,7 +71,7 @@ def picture(
         _refuse(given | {"component": None}, f"{field} has one value a run: leave it out")
         figure = sweep_figure(_labelled(dataset, field, component, selection or {}), field)
     else:
-        one_run(dataset)  # where no run succeeded there are no fields: say why
+        one_run(dataset)  # without a successful run there are no fields: report the reason
         check_field(field, [*maps, *lines, *singles, *labelled])
         if field in maps:
             _refuse({"over": over}, f"{field} is a map of one run: leave it out")
@@ -90,7 +90,7 @@ def picture(
 
 
 def _refuse(given: Mapping[str, object], allowed: str) -> None:
-    """Refuse what makes no sense for a field."""
+    """Raise a `StudyError` for the first option that is given: it does not apply to the field."""
     for name, value in given.items():
         if value is not None:
             raise StudyError(name, value, allowed)
@@ -99,9 +99,9 @@ def _refuse(given: Mapping[str, object], allowed: str) -> None:
 def _labelled(
     dataset: xr.Dataset, field: str, component: str | None, selection: Mapping[str, str | float]
 ) -> xr.Dataset:
-    """Return the part of a study that is selected, with `field` at one label of each kind.
+    """Return the selected part of a study, with `field` at one value of each of its dimensions.
 
-    Of labels that are not selected it is the first, of numbers the last.
+    By default it is the first label or the last number.
     """
     values = component_of(dataset[field], component)
     swept = sweep_coordinates(dataset)
@@ -117,7 +117,7 @@ def _labelled(
 
 
 def _known(selection: Mapping[str, object], names: list[str]) -> None:
-    """Refuse to select by what does not exist."""
+    """Raise a `StudyError` if the selection has an unknown name."""
     for name, value in selection.items():
         if name not in names:
             raise StudyError(name, value, one_of(name, names))
@@ -126,9 +126,9 @@ def _known(selection: Mapping[str, object], names: list[str]) -> None:
 def _part(
     dataset: xr.Dataset, field: str, selection: Mapping[str, str | float], over: str | None = None
 ) -> xr.Dataset:
-    """Return one run of those selected, or one for each value of the axis `over`.
+    """Return one of the selected runs, or one for each value of the axis `over`.
 
-    It is cut along the field's own dimensions.
+    The selection is also applied to the field's own dimensions.
     """
     swept = sweep_coordinates(dataset)
     drawn = {*swept.values(), *DRAWN, "component"}

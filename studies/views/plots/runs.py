@@ -1,4 +1,4 @@
-"""The runs of a study as figures see them: what stands for the axes, and how a run is marked."""
+"""The runs of a study in figures: the quantities on the axes, and the marks of runs."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _CATEGORIES = (
     ("o", "#56B4E9"), ("s", "#0072B2"), ("D", "#E69F00"), ("^", "#D55E00"),
     ("P", "#999999"), ("v", "#CC79A7"), ("h", "#009E73"), ("*", "#000000"),
 )  # fmt: skip
-"""Marker and colour by flag value: colours that every kind of eye distinguishes (Okabe and Ito)."""
+"""Marker and colour by flag value; the colours suit colour-blind readers (Okabe and Ito)."""
 POINTS = 8.0
 """Size of a mark [points]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind:
-    """Runs that are drawn alike."""
+    """Runs that are drawn with the same mark."""
 
     name: str
     marker: str
@@ -40,7 +40,7 @@ class Kind:
     def draw(
         self, axes: Axes, x: np.ndarray, y: np.ndarray, transform: Transform | None = None
     ) -> Line2D:
-        """Draw marks; without a transform in the numbers of the axes."""
+        """Draw marks at x, y (n,), by default in data coordinates."""
         face = self.colour if self.filled else "none"
         (line,) = axes.plot(
             x, y, linestyle="", marker=self.marker, markersize=POINTS, color=self.colour,
@@ -52,7 +52,7 @@ class Kind:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """How values are drawn: flags by kind; other numbers, where there are no flags, by colour."""
+    """Style of values: flags by kind; numbers, if there are no flags, by colour."""
 
     flags: Mapping[int, Kind]
     norm: Normalize
@@ -65,14 +65,14 @@ _ABSENT = {
     "limit_load": Kind(name="no equilibrium", marker="s", filled=False),
     OUTSIDE_THEORY: Kind(name="outside small-strain theory", marker="^", filled=False),
 }
-"""Runs without a value by status; others are `_FAILED`."""
+"""Marks of runs without a value by status; all others have `_FAILED`."""
 
 
 def standing(dataset: xr.Dataset) -> tuple[list[xr.DataArray], list[xr.DataArray]]:
-    """Return what stands for each axis that varies: numbers, the usual ones first; and the others.
+    """Return the quantity shown for each axis that varies: numbers, usual ones first; then labels.
 
-    A number stands for an axis where it tells its values apart: the axis itself, or a parameter
-    that a linked axis sets.
+    A number can be shown for an axis if it distinguishes all its values: the axis itself, or a
+    parameter that a linked axis sets.
     """
     several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     every = [_standing(dataset, axis) for axis in several]
@@ -81,14 +81,14 @@ def standing(dataset: xr.Dataset) -> tuple[list[xr.DataArray], list[xr.DataArray
 
 
 def _standing(dataset: xr.Dataset, axis: str) -> xr.DataArray:
-    """Return the first number that has another value at each point of an axis, or the axis."""
+    """Return the first number that has different values at all points of an axis, or the axis."""
     known = [dataset[name] for name, over in sweep_coordinates(dataset).items() if over == axis]
-    apart = [
+    distinct = [
         each
         for each in known
         if each.dtype.kind in "fiu" and len(np.unique(each)) == dataset.sizes[axis]
     ]
-    return min(apart, key=_rank, default=dataset[axis])
+    return min(distinct, key=_rank, default=dataset[axis])
 
 
 def _rank(quantity: xr.DataArray) -> int:
@@ -97,7 +97,7 @@ def _rank(quantity: xr.DataArray) -> int:
 
 
 def known_values(dataset: xr.Dataset, field: str) -> xr.DataArray:
-    """Return a field where runs succeeded, NaN elsewhere; the number of the status of every run."""
+    """Return a field where runs succeeded, NaN elsewhere; ``status`` as numbers for all runs."""
     status = dataset["status"]
     if field == "status":
         numbers = {name: float(code) for code, name in flags(status).items()}
@@ -107,7 +107,10 @@ def known_values(dataset: xr.Dataset, field: str) -> xr.DataArray:
 
 
 def style_of(dataset: xr.Dataset, field: str) -> Style:
-    """Return how a field is drawn; numbers that change sign have zero in the middle."""
+    """Return the style of a field; for numbers of both signs zero is in the middle of the colours.
+
+    Raises `StudyError` if no run has a value.
+    """
     known = known_values(dataset, field).to_numpy()
     known = known[np.isfinite(known)]
     if not known.size:
@@ -126,7 +129,7 @@ def style_of(dataset: xr.Dataset, field: str) -> Style:
 
 
 def absent(known: np.ndarray, status: np.ndarray) -> dict[Kind, np.ndarray]:
-    """Return where runs have no value, by why: those that there are."""
+    """Return for each reason that occurs the runs without a value, as arrays of bool."""
     found = {_ABSENT.get(name, _FAILED): np.zeros_like(known) for name in STATUSES}
     for name in STATUSES:
         found[_ABSENT.get(name, _FAILED)] |= ~known & (status == name)

@@ -1,4 +1,4 @@
-"""One value a run, drawn over two swept numbers: categories as markers, numbers as colours."""
+"""Draw one value per run over two swept numbers: categories as markers, numbers as colours."""
 
 from __future__ import annotations
 
@@ -25,37 +25,36 @@ MOST_PANELS = 6
 OVERLAYS: Mapping[tuple[str, str, str], Callable[[Axes, xr.Dataset, bool], Sequence[Line2D]]] = {
     ("shakedown_state", "load_ratio", "friction"): draw_shakedown_limits,
 }
-"""What theory adds to a field with one number going up and one across: draws on a panel, the last
-of its row or not, and returns its lines."""
+"""Theory drawn over a field, by field, vertical and horizontal quantity. The function gets the
+axes, the runs of the panel and whether it is the last of its row; it returns the lines."""
 
 _PANEL = (3.4, 3.1)
 """Width and height of a panel [in]."""
 _DENSE, _CONTOURS = 6, 12
-"""Values of both numbers from which on contours are drawn, and how many."""
+"""Least number of values of both quantities for contours; number of contours."""
 _LEGEND = 3.2
-"""Width of the legend, with the axis beside it [in]."""
+"""Width of the legend and the colour bar [in]."""
 
 
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     """Return `field` over two swept numbers, in a panel for each combination of the other axes.
 
-    Over one number, or over labels alone, it is drawn as curves: see `curve_figure`.
+    Over one number, or only over labels, it is drawn as curves: see `curve_figure`.
 
-    A number stands for an axis where it tells its values apart: the axis itself, or a parameter
-    that a linked axis sets. The first number goes up and the second across, load ratio and
-    friction before others. Flags are drawn as categories, other numbers as colours, and runs
-    without a value by their status.
+    The number of an axis is the axis itself, or a parameter of a linked axis that distinguishes all
+    its values. The first number is vertical and the second horizontal; load ratio and friction come
+    first. Flags are drawn as categories, other numbers as colours, and runs without a value by
+    their status.
 
     Parameters
     ----------
-    dataset : of a study
-    field : one of its variables with one value a run
+    dataset : data set of a study
+    field : one of its variables with one value per run
 
     Raises
     ------
     StudyError
-        when nothing is swept, more than `MOST_PANELS` panels would be drawn, or no
-        run has a value
+        if nothing is swept, more than `MOST_PANELS` panels would be drawn, or no run has a value
     """
     if len(standing(dataset)[0]) < 2:
         return curve_figure(dataset, field)
@@ -101,7 +100,7 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
 
 
 def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
-    """Return the number going up, that across, then the axes of which each value has a panel."""
+    """Return the vertical and the horizontal number, then the axes whose values have panels."""
     numbers = standing(dataset)[0][:2]
     used = {each.dims for each in numbers}
     several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
@@ -120,7 +119,7 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
 def _draw(
     axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], style: Style
 ) -> list[Line2D]:
-    """Draw the runs of a panel; return marks to explain: of flags, and of what is absent."""
+    """Draw the runs of a panel; return marks for the legend: of flags and of runs without value."""
     up, across = places
     every = known_values(panel, field), panel["status"], panel[up], panel[across]
     values, status, y, x = (each.to_numpy().ravel() for each in xr.broadcast(*every))
@@ -139,7 +138,7 @@ def _draw(
 def _contours(
     axes: Axes, panel: xr.Dataset, field: str, places: tuple[str, str], style: Style
 ) -> bool:
-    """Fill between contours where the sweep is dense, not where runs have no value; tell if so."""
+    """Draw filled contours if the sweep is dense; return whether it is."""
     up, across = (panel[name] for name in places)
     low, high = style.norm.vmin, style.norm.vmax
     if min(up.size, across.size) < _DENSE or low is None or high is None or low == high:

@@ -97,7 +97,7 @@ def test_labels_of_an_axis_have_lines_until_they_cannot_be_told_apart(count: int
     laws = [f"law_{number}" for number in range(count)]
     dataset = swept([0.2], [0.1], laws)
     if count > 12:
-        with pytest.raises(StudyError, match=f"has {count} values, of which 12 can be told"):
+        with pytest.raises(StudyError, match=f"{count} values, of which 12 can be distinguished"):
             picture(dataset, "contact_pressure", over="hardening")
     else:
         sheet = picture(dataset, "contact_pressure", over="hardening")
