@@ -50,6 +50,8 @@ SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 NAMED = re.compile(r"`((?:solver|studies|service|residua|tests|data|docs|examples)/[a-z0-9_./-]*)`")
+PLACE = re.compile(r"`((?:\w+/)*\w+\.py)`: ((?:`[\w.]+`(?:, )?)+)")
+"""A file and what it holds, as in "`file.py`: `function`, `Class.method`"."""
 RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 FEWER = {
     "ball.toml": ("load_ratio", [1.5, 6.0]),
@@ -300,6 +302,20 @@ def test_a_broken_link_is_found(tmp_path: Path) -> None:
 def test_files_named_in_a_page_exist(page: Path) -> None:
     named = NAMED.findall((ROOT / page).read_text())
     assert not [name for name in named if not (ROOT / name).exists()]
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in TEXTS if PLACE.search((ROOT / p).read_text())], ids=str
+)
+def test_functions_named_in_a_page_stand_in_the_files_named_with_them(page: Path) -> None:
+    for file, names in PLACE.findall((ROOT / page).read_text()):
+        sources = [
+            (ROOT / path).read_text() for path in tracked() if f"/{path}".endswith(f"/{file}")
+        ]
+        assert sources, file
+        for name in re.findall(r"\w+", names):
+            stands = re.compile(rf"(?:def|class) {name}\b|^ *{name}(?:: [^=]+)? =", re.MULTILINE)
+            assert any(map(stands.search, sources)), f"{file}: {name}"
 
 
 def test_the_page_of_the_architecture_has_every_layer_in_its_place() -> None:
