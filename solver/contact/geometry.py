@@ -214,38 +214,32 @@ def _integrate(
     weight: NDArray[np.float64],
 ) -> Pairing:
     """Sum the integration points into rows, one per slave vertex."""
-    k = slave.edges.shape[1]
-    Ns = shape_functions(xi, k)
-    Nm = shape_functions(eta, master.edges.shape[1])
+    rows, vertex = len(slave.edges) + 1, np.stack([edge, edge + 1])
     bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
-    hats, deformed_hats = (
-        np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight * _area_per_xi(slave, x, edge, xi)
-        for x in (slave.X, xs)
-    )
-    t = np.stack([-n[1], n[0]])
+    hats, deformed_hats = (bare * _area_per_xi(slave, x, edge, xi) for x in (slave.X, xs))
 
-    rows = len(slave.edges) + 1
-    area, deformed, gap, facing = np.zeros((4, rows))
-    on_slave = np.zeros((2, rows, len(slave.nodes), 2))
-    on_master = np.zeros((2, rows, len(master.nodes), 2))
-    for end, hat in enumerate(hats):
-        vertex = edge + end
-        np.add.at(area, vertex, hat)
-        np.add.at(deformed, vertex, deformed_hats[end])
-        np.add.at(facing, vertex, bare[end])
-        np.add.at(gap, vertex, hat * distance)
+    def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.bincount(vertex.ravel(), values.ravel(), rows), dtype=float)
+
+    area, deformed, gap, facing = map(summed, (hats, deformed_hats, hats * distance, bare))
+    t = np.stack([-n[1], n[0]])
+    sides = []
+    for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
+        N = shape_functions(at, surface.edges.shape[1])
+        size = len(surface.nodes)
+        place = (vertex[..., None] * size + surface.edges[own]).ravel()
+        value = sign * hats[..., None] * N
+        block = np.empty((2, rows, size, 2))
         for kind, direction in enumerate((n, -t)):
-            for target, N, nodes, sign in (
-                (on_slave, Ns, slave.edges[edge], -1.0),
-                (on_master, Nm, master.edges[partner], 1.0),
-            ):
-                value = sign * (hat * N.T)[..., None] * direction.T
-                np.add.at(target[kind], (vertex[:, None], nodes), value.swapaxes(0, 1))
+            for axis, along in enumerate(direction):
+                each = np.bincount(place, (value * along[:, None]).ravel(), rows * size)
+                block[kind, :, :, axis] = each.reshape(rows, size)
+        sides.append(block)
 
     full = at_vertices(slave.lengths * slave.depth(slave.X[:, slave.edges[:, :2]]).mean(axis=1) / 2)
     covered = area > _MIN_COVERED * full
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
-    flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in (on_slave, on_master)]
+    flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in sides]
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
