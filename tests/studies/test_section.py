@@ -13,7 +13,7 @@ import xarray as xr
 from scipy.interpolate import RegularGridInterpolator
 from scipy.sparse import eye_array
 
-from solver import ModelError
+from solver import Material, ModelError
 from solver.results.export import to_meshio
 from solver.results.extremes import residual_extremes
 from solver.results.fields import SystemFields
@@ -37,6 +37,7 @@ from tests.studies.conftest import compute_here
 from tests.studies.fakes import Canned
 from tests.studies.plots.test_maps import mesh_of
 
+STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=350.0)
 Z, Y = np.linspace(-3.0, 3.0, 7), np.linspace(-4.0, 0.0, 5)
 
 
@@ -76,7 +77,8 @@ class Rail:
         top = np.flatnonzero(self.space[1] == 0.0)
         return SimpleNamespace(
             X=self.X, period=0.0, basis=SimpleNamespace(element_dofs=self.cells.T),
-            body=SimpleNamespace(element="quad4"), boundary_nodes=lambda boundary: top,
+            body=SimpleNamespace(element="quad4", material=STEEL),
+            boundary_nodes=lambda boundary: top,
         )  # fmt: skip
 
     def sampler(self, name: str, X: np.ndarray) -> Any:

@@ -149,7 +149,8 @@ FILE_FAULTS: dict[str, FileFault] = {
         told=f"{MAP} has the dimensions",
     ),
     "a variable too many": FileFault(
-        fault=written(lambda run: run.assign(other=run["plastic_work"])), told="other does not"
+        fault=written(lambda run: run.assign(other=run["plastic_work"])),
+        told="other is not expected",
     ),
     "a variable that is not listed": FileFault(fault=not_listed, told="list of its variables"),
     # words
