@@ -103,7 +103,7 @@ def test_a_drum_slides_in_its_belt_where_the_rope_formula_says() -> None:
 
 def test_stages_have_names_of_their_own() -> None:
     twice = (Stage(name="on", target=1.0), Stage(name="on", target=2.0))
-    with pytest.raises(ModelError, match=r"stages = .*names of their own"):
+    with pytest.raises(ModelError, match=r"stages = .*different names"):
         pushed(2.0, stages=twice)
     with pytest.raises(ModelError, match="stage = 'loaded': must be one of fitted, pushed"):
         pushed(2.0, friction=0.3).contact()
