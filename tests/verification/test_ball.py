@@ -14,6 +14,8 @@ from tests.reference.flattening import HertzBall, PlasticBall, first_yield
 
 BALL = scene_named("ball")
 RE, E, NU, R = 410.0, 2.0e5, 0.3, 10.0
+LOADED = {"unload_steps": 1}
+"""For what is asked under load."""
 
 
 @cache
@@ -27,7 +29,7 @@ def pressed(**own: Any) -> Record:
 @pytest.mark.parametrize("yielding", ["half_space", "ball"])
 @pytest.mark.parametrize("stiffness", [1.0, 20.0])
 def test_an_elastic_ball_is_the_contact_of_hertz(yielding: str, stiffness: float) -> None:
-    own = {"load_ratio": 1.4, "yielding": yielding, "ball_stiffness": stiffness}
+    own = {"load_ratio": 1.4, "yielding": yielding, "ball_stiffness": stiffness} | LOADED
     found = pressed(accuracy="standard", load_step=0.25, **own).scalars
     modulus = E / (1 - NU**2) / (1 if yielding == "ball" else 1 + 1 / stiffness)
     force = np.pi**3 * R**2 * (1.4 * RE) ** 3 / (6 * modulus**2)
@@ -43,19 +45,20 @@ def test_the_half_space_first_yields_at_the_pressure_of_the_closed_form() -> Non
     ratio, _ = first_yield(NU)
     assert ratio == pytest.approx(1.613, abs=1e-3)
     for load, yields in ((0.97 * ratio, False), (1.03 * ratio, True)):
-        found = pressed(load_ratio=load, accuracy="standard", load_step=0.25)
+        found = pressed(load_ratio=load, accuracy="standard", load_step=0.25, **LOADED)
         assert (found.scalars["max_plastic_strain"] > 0) == yields
 
 
 def test_a_contact_that_yields_all_over_has_the_mean_pressure_of_an_indentation() -> None:
     own: dict[str, Any] = {"load_ratio": 14.0, "ball_stiffness": 20.0, "load_step": 0.1}
-    found = pressed(accuracy="standard", **own).scalars
+    found = pressed(accuracy="standard", **own, **LOADED).scalars
     assert 2.8 * RE < found["mean_contact_pressure"] < 3.1 * RE
 
 
 @pytest.mark.parametrize("load_ratio", [1.66, 2.0, 3.0, 4.5, 6.5, 8.5, 10.0])
 def test_a_ball_is_flattened_as_published(load_ratio: float) -> None:
-    found = pressed(load_ratio=load_ratio, yielding="ball", element_size=1 / 16).scalars
+    own = {"load_ratio": load_ratio, "yielding": "ball", "element_size": 1 / 16} | LOADED
+    found = pressed(**own).scalars
     published = PlasticBall(radius=R, youngs_modulus=E, poisson_ratio=NU, yield_stress=RE)
     w, force = found["approach"], found["force"]
     critical = published.kogut_etsion_critical().interference

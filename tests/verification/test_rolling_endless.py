@@ -308,7 +308,10 @@ def test_a_run_without_a_steady_pass_is_rolled_by_increments_and_says_so(monkeyp
     assert many.status is Status.NOT_CONVERGED, "that many would take too long"
 
 
-HEAVY = {"element_size": 7.5, "load_ratio": 10.0, "hardening": "isotropic", "hardening_ratio": 0.1}
+HEAVY = {
+    "element_size": 7.5, "growth": 1.6, "load_ratio": 10.0,
+    "hardening": "isotropic", "hardening_ratio": 0.1,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("traction", [-0.98, 0.99])
@@ -338,7 +341,7 @@ def test_a_wheel_that_is_turned_by_more_than_full_slip_bears_spins():
 
 def test_what_hardens_has_no_limit_but_leaves_small_strain_theory():
     record = roll(
-        element_size=9.0, load_ratio=6.0, friction=0.05, traction=-0.9,
+        element_size=9.0, growth=1.6, load_ratio=6.0, friction=0.05, traction=-0.9,
         hardening="mixed", hardening_ratio=0.005,
     )  # fmt: skip
     assert record.status is Status.OUTSIDE_THEORY

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from solver import System, Walker
-from solver.loading.control import Control
+from solver.loading.control import Control, Tolerances
 from solver.scenes.rolling_model import model
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on
@@ -29,6 +29,8 @@ LAWS = {
 }  # fmt: skip
 LENGTHS = (100.0, 200.0, 400.0)
 YIELD = RollingParameters().yield_stress
+ENOUGH = Control(tolerances=Tolerances(residual=1e-4))
+"""With a residual of 1e-8, stress of a track of 100 mm is the same to 0.002 MPa."""
 AVERAGED = 1 / 20
 """Half the part of a track around its middle, over which stress is averaged / length."""
 SAME = 0.05
@@ -49,7 +51,7 @@ def with_ends(law, length, depth):
     steps = {"advance_step": SIDE, "press_steps": 2, "unload_steps": 1}
     p = RollingParameters(**FREE, **LAWS[law], **steps, track=length)
     system = System(model(p))
-    (outcome,) = Walker(system, Control()).walk([p.schedule.program])
+    (outcome,) = Walker(system, ENOUGH).walk([p.schedule.program])
     assert outcome.error is None
     stress = system.response("half_space", outcome.last).stress[0]
     x, y = system.full("half_space").points.reshape(2, -1)
