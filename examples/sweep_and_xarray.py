@@ -16,7 +16,7 @@ STUDY = Study.from_dict(
         "name": "friction-and-load",
         "scene": "punch",
         "parameters": {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"},
-        "sweep": {"load_ratio": [0.5, 0.7, 0.9], "friction": [0.0, 0.1, 0.3]},
+        "sweep": {"load_ratio": [0.5, 0.7, 0.9], "friction": [0.0, 0.3]},
     }
 )
 
@@ -35,7 +35,7 @@ def look() -> None:
         # has one value; squeeze removes it.
         runs = dataset.squeeze("hardening")
         assert runs.sizes["load_ratio"] == 3
-        assert runs.sizes["friction"] == 3
+        assert runs.sizes["friction"] == 2
 
         # A variable with one value per run is a table over the sweep. Its attributes have the unit.
         tension = runs["peak_residual_tension"]

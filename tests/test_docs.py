@@ -4,14 +4,16 @@ The blocks of a page run from top to bottom in one empty directory that holds a 
 studies and scene files of `data`, the studies on the coarsest meshes and with the values that the
 pages look at; so do those of every page that has any. What an earlier page has computed by the
 same command is there already. ``python`` blocks are programs, each in a file of its own, as workers
-import it; in ``console`` blocks each line ``$ residua …`` runs and must succeed. A block
-after ``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
-minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that
-script, which is. Links lead to files and headings that exist, and so do the files a page names.
+import it; in ``console`` blocks each line ``$ residua …`` runs and must succeed, a study on one
+worker. A block after ``<!-- no-test -->`` is left out, which only those may be that need a server
+or compute for minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand
+in that script, which is. Links lead to files and headings that exist, and so do the files a page
+names.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -21,6 +23,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -42,10 +45,12 @@ import shlex, sys
 from residua.cli import main
 for line in sys.argv[1:]:
     print("$ residua", line, flush=True)
-    if code := main(shlex.split(line)):
+    alone = ["--workers", "1"] if line.startswith("run ") else []
+    if code := main([*shlex.split(line), *alone]):
         sys.exit(code)
 """
-"""Commands one after the other in one process: each by itself would import for seconds."""
+"""Commands one after the other in one process: each by itself would import for seconds, and so
+would a second process of a study."""
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -54,9 +59,9 @@ PLACE = re.compile(r"`((?:\w+/)*\w+\.py)`: ((?:`[\w.]+`(?:, )?)+)")
 """A file and what it holds, as in "`file.py`: `function`, `Class.method`"."""
 RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 FEWER = {
-    "ball.toml": ("load_ratio", [1.5, 6.0]),
-    "elastic-punch.toml": ("friction", [0.0, 0.4]),
-    "shaft-hub.toml": ("friction", [0.0, 0.2]),
+    "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
+    "elastic-punch.toml": {"friction": [0.0, 0.4]},
+    "shaft-hub.toml": {"friction": [0.0, 0.2], "loading": ["interference"]},
 }
 """Axes of studies, and those of their values that the pages look at, with one more."""
 TWO_SCREENS = 110
@@ -135,11 +140,13 @@ def coarse(study: str) -> str:
     return f'{head}[parameters]\naccuracy = "draft"\n{rest}'
 
 
-def shortened(study: str, axis: str, values: list[float]) -> str:
-    """Return a study file with fewer values of an axis."""
-    text, times = re.subn(rf"^{axis} = \[.*\]$", f"{axis} = {values}", study, flags=re.MULTILINE)
-    assert times == 1
-    return text
+def shortened(study: str, axes: dict[str, list[Any]]) -> str:
+    """Return a study file with fewer values of some axes."""
+    for axis, values in axes.items():
+        line = f"{axis} = {json.dumps(values)}"
+        study, times = re.subn(rf"^{axis} = \[.*\]$", line, study, flags=re.MULTILINE)
+        assert times == 1
+    return study
 
 
 def results(page: list[Block]) -> dict[str, str]:
@@ -161,9 +168,9 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path, computed: dict[str, Pa
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
     for study in (tmp_path / "data" / "studies").iterdir():
         study.write_text(coarse(study.read_text()))
-    for name, axis in FEWER.items():
+    for name, axes in FEWER.items():
         study = tmp_path / "data" / "studies" / name
-        study.write_text(shortened(study.read_text(), *axis))
+        study.write_text(shortened(study.read_text(), axes))
     found = blocks((ROOT / page).read_text())
     for command, out in results(found).items():
         if command in computed:

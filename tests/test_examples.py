@@ -24,6 +24,7 @@ def test_there_are_examples() -> None:
 def run(arguments: list[str], folder: Path) -> None:
     paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    environment["RESIDUA_WORKERS"] = "1"  # of the service: each imports for seconds
     done = subprocess.run(
         [sys.executable, *arguments],
         cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False,
@@ -47,7 +48,7 @@ def test_the_cells_of_a_notebook_run_after_make_run(notebook: Path, tmp_path: Pa
     study = study.replace("[0.0, 0.1, 0.2, 0.3, 0.4]", "[0.0, 0.2]")
     study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
     (tmp_path / "punch.toml").write_text(study)
-    run(["-m", "residua", "run", "punch.toml", "--out", "out"], tmp_path)
+    run(["-m", "residua", "run", "punch.toml", "--out", "out", "--workers", "1"], tmp_path)
     cells = json.loads(notebook.read_text())["cells"]
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     assert not any(cell.get("outputs") for cell in cells), "a notebook is kept without its outputs"

@@ -14,7 +14,7 @@ from tests.solver.laws import HARDENING, LAWS, StoredCentre, steel
 every_law = pytest.mark.parametrize(("law", "n_components"), LAWS.values(), ids=LAWS)
 
 
-def random_history(law, n_components, n_points=1000, seed=1):
+def random_history(law, n_components, n_points=300, seed=1):
     """A state after two random plastic steps, and a strain that yields it further."""
     rng = np.random.default_rng(seed)
     state = law.initial(n_points, n_components)

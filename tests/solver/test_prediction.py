@@ -50,7 +50,7 @@ def test_what_is_carried_along_saves_iterations_and_changes_no_result(share, cha
 
 
 def test_a_branch_with_predictions_is_bit_for_bit_a_run_by_itself():
-    both = {"advance_step": 1.5, "direction": "back_and_forth"}
+    both = {"track": 12.0, "advance_step": 1.5, "direction": "back_and_forth"}
     system, (one, two) = walked((1, 2), **both)
     for passes, together in ((1, one), (2, two)):
         own, (alone,) = walked((passes,), **both)

@@ -123,11 +123,11 @@ def test_the_return_is_the_nearest_point_however_far_the_trial_stress(surface, s
 
 @pytest.mark.parametrize("surface", ANY)
 def test_many_small_steps_are_tended_to_at_first_order(surface):
-    law, turn = smooth(surface, "linear"), strained(200, 4e-3)
-    first = strained(200, 4e-3, seed=8)
+    law, turn = smooth(surface, "linear"), strained(60, 4e-3)
+    first = strained(60, 4e-3, seed=8)
 
     def after(steps):
-        state = law.initial(200, 6)
+        state = law.initial(60, 6)
         for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
             found = law.respond(share * first, state)
             state = found.state

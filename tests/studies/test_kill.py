@@ -76,7 +76,7 @@ def test_a_killed_parent_leaves_only_whole_runs_and_its_workers_die(
     assert not store.dataset_path(study.id).exists()
     begun_before = len(list(marks.iterdir()))
 
-    outcome = run_study(study, store, workers=2)
+    outcome = run_study(study, store, workers=1)
 
     assert outcome.counts == {"ok": RUNS}
     assert len(outcome.computed) == RUNS - len(done)
