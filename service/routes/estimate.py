@@ -9,7 +9,7 @@ from pydantic import WithJsonSchema
 
 from service.dependencies import TheExaminer
 from service.errors import REFUSED
-from service.routes.studies import SUBMISSION
+from service.routes.studies import SUBMISSION, taken_priority
 from service.strict import StrictRoute
 from studies import Estimate
 
@@ -25,5 +25,5 @@ async def estimate(
     `cpu_seconds` are low, likely and high. A study that asks for more than the service allows is
     refused as it is when it is submitted.
     """
-    content.pop("priority", None)
+    taken_priority(content)
     return (await examiner.examine(content)).estimate

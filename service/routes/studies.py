@@ -55,6 +55,20 @@ SUBMISSION["properties"]["priority"] = {
 }
 
 
+def taken_priority(content: dict[str, Any]) -> int:
+    """Take the priority out of a submission and return it.
+
+    Raises
+    ------
+    StudyError
+        for one that is not an integer in `PRIORITIES`
+    """
+    priority = content.pop("priority", 0)
+    if type(priority) is not int or priority not in PRIORITIES:
+        raise StudyError("priority", priority, "must be an integer >= -100 and <= 100")
+    return priority
+
+
 @router.post(
     "", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}, **REFUSED}
 )
@@ -67,9 +81,7 @@ async def submit(
     response: Response,
 ) -> StudySummary:
     """Accept a study; 200 when it is known already, whatever became of it."""
-    priority = content.pop("priority", 0)
-    if type(priority) is not int or priority not in PRIORITIES:
-        raise StudyError("priority", priority, "must be an integer >= -100 and <= 100")
+    priority = taken_priority(content)
     found = await examiner.examine(content)
     study = found.study
     await asyncio.to_thread(store.save_study, study)

@@ -57,9 +57,10 @@ def test_the_greater_priority_goes_first(mortal: Server) -> None:
     for study_id in ids.values():
         mortal.finished(study_id)
     assert ["0.92" in line for line in mortal.computed()[-2:]] == [True, False]
-    refused = mortal.client.post("/studies", json=study | {"priority": 1000})
-    assert refused.status_code == 422
-    assert refused.json()["errors"][0]["field"] == "priority"
+    for route in ("/studies", "/estimate"):
+        refused = mortal.client.post(route, json=study | {"priority": 1000})
+        assert refused.status_code == 422
+        assert refused.json()["errors"][0]["field"] == "priority"
 
 
 def test_the_death_of_the_workers_process_is_made_good(lively: Server) -> None:
