@@ -12,22 +12,23 @@ if TYPE_CHECKING:
 
 def shape_functions(xi: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return edge shape functions (..., count) at ``xi`` in [-1, 1]: both ends, then the middle."""
-    ends = ((1 - xi) / 2, (1 + xi) / 2) if count == 2 else (xi * (xi - 1) / 2, xi * (xi + 1) / 2)
-    return _last(xi, count, *ends, 1 - xi**2)
+    if count == 2:
+        return _side_by_side(xi, (1 - xi) / 2, (1 + xi) / 2)
+    return _side_by_side(xi, xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi**2)
 
 
 def shape_derivatives(xi: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the derivatives of `shape_functions` with respect to ``xi``."""
     if count == 2:
-        return _last(xi, count, -0.5, 0.5)
-    return _last(xi, count, xi - 0.5, xi + 0.5, -2 * xi)
+        return _side_by_side(xi, -0.5, 0.5)
+    return _side_by_side(xi, xi - 0.5, xi + 0.5, -2 * xi)
 
 
-def _last(
-    xi: NDArray[np.float64], count: int, *each: NDArray[np.float64] | float
+def _side_by_side(
+    xi: NDArray[np.float64], *each: NDArray[np.float64] | float
 ) -> NDArray[np.float64]:
-    """Return the first ``count`` values (..., count), side by side in the last axis."""
-    out = np.empty((*xi.shape, count))
-    for k in range(count):
-        out[..., k] = each[k]
+    """Return the values at each of ``xi`` (..., n) in a last axis; `numpy.stack` is slower."""
+    out = np.empty((*xi.shape, len(each)))
+    for k, values in enumerate(each):
+        out[..., k] = values
     return out

@@ -42,7 +42,7 @@ INCREMENT_RADIUS = declare(
     "increment_radius", "radius of the contact after each increment", "mm", dims=_EACH
 )
 _ON_AXIS = 1e-9
-"""Distance from the axis / radius that is rounding."""
+"""Ratio of the distance from the axis to the radius, up to which a node is on the axis."""
 
 
 @output("indentation", "contact", "s", "profile", "surfaces", "release")
