@@ -29,7 +29,7 @@ class YieldParameters:
     PARTS: ClassVar[tuple[Parts[Any], ...]] = ()
 
     accuracy: Accuracy = described(
-        "standard", "sets mesh and increments together, where they are not given"
+        "standard", "sets the mesh and the increments that are not given"
     )
     youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
     poisson_ratio: Poisson = described(0.3, "Poisson ratio")

@@ -1,4 +1,4 @@
-"""Build model and loading history from the tables of a scene file; collect all mistakes."""
+"""Build model and loading history from the tables of a scene file."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _NOT_OF_MODEL = (
 
 @dataclass
 class Builder:
-    """Builds model and loading history of a scene.
+    """Builds the model of a scene and collects all mistakes.
 
     Attributes
     ----------
@@ -231,25 +231,26 @@ class Builder:
             values.append((given or {}).get(stage.name, 0.0 if stage.release else usual))
         return Amplitude(np.arange(len(values), dtype=float), np.array(values))
 
-    def program(self) -> Program:
-        """Return the loading history."""
-        loading = self.scene.loading
-        if loading is not None:
-            step = loading.step or loading.factor
-            if loading.cycles is None:
-                return load_and_release(loading.factor, step, loading.release_increments)
-            return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
-        stages = tuple(
-            Stage(
-                name=stage.name,
-                target=float(k + 1),
-                steps=stage.increments,
-                apart=stage.release,
-                turns=k > 0,
-            )
-            for k, stage in enumerate(self.scene.stages)
+
+def program_of(scene: tables.SceneFile) -> Program:
+    """Return the loading history."""
+    loading = scene.loading
+    if loading is not None:
+        step = loading.step or loading.factor
+        if loading.cycles is None:
+            return load_and_release(loading.factor, step, loading.release_increments)
+        return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
+    stages = tuple(
+        Stage(
+            name=stage.name,
+            target=float(k + 1),
+            steps=stage.increments,
+            apart=stage.release,
+            turns=k > 0,
         )
-        return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
+        for k, stage in enumerate(scene.stages)
+    )
+    return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
 
 
 def _place(names: list[str]) -> Any:

@@ -49,13 +49,6 @@ Mistakes = dict[Where, StudyError | None]
 """Mistakes by place; None if the mistake that causes it is at another place."""
 
 
-class _Evaluated(NamedTuple):
-    """A tree whose expressions have been evaluated, and the mistakes of those without a value."""
-
-    tree: Any
-    mistakes: Mistakes
-
-
 class Readable(NamedTuple):
     """The readable part of a scene file.
 
@@ -249,7 +242,8 @@ class Description:
         given = self.content.get("derived")
         return {str(k): v for k, v in given.items()} if isinstance(given, Mapping) else {}
 
-    def _evaluated(self, values: Mapping[str, Any]) -> _Evaluated:
+    def _evaluated(self, values: Mapping[str, Any]) -> tuple[dict[str, Any], Mistakes]:
+        """Return the tables with values in place of expressions, and the mistakes."""
         mistakes: Mistakes = {}
         known = dict(values)
         for name, text in self._derived.items():
@@ -266,7 +260,7 @@ class Description:
         tree: dict[str, Any] = plain | _with_values((), rest, known, mistakes)
         if ACCURACY in tree:
             tree[ACCURACY] = self._levels(mistakes)
-        return _Evaluated(tree, mistakes)
+        return tree, mistakes
 
 
 def mesh_names(content: Mapping[str, Any]) -> list[str]:

@@ -23,7 +23,7 @@ from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
-from studies.scenes.building import Builder, friction_of, law_of
+from studies.scenes.building import Builder, friction_of, law_of, program_of
 from studies.scenes.checking import contradictions, failed_checks, unmet_needs
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of, in_one_increment, too_large
@@ -140,7 +140,7 @@ def _model(description: Description, parameters: Any) -> Model:
 
 
 def _program(description: Description, parameters: Any) -> Program:
-    return Builder(_tables(description, parameters), description.meshes).program()
+    return program_of(_tables(description, parameters))
 
 
 def _effort(description: Description, parameters: Any, values: Sequence[Any]) -> Effort:

@@ -423,7 +423,7 @@ ACCURACY = "accuracy"
 _ACCURACY = ParameterTable(
     default="standard",
     choices=get_args(Accuracy),
-    description="sets mesh and increments together, where they are not given",
+    description=_ALL[ACCURACY][1].metadata["description"],
 )
 
 
