@@ -163,7 +163,9 @@ class Coulomb(FrictionLaw):
 
     friction: Friction = described(0.0, "Coulomb friction coefficient")
     shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
-        0.0, "largest contact shear / shear yield stress of the weaker body; 0 sets no limit"
+        0.0,
+        "ratio of the largest contact shear to the shear yield stress of the weaker body; 0 sets "
+        "no limit",
     )
     cohesion: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
         0.0, "contact shear beyond friction * pressure; no more than the pressure itself"

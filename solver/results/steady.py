@@ -35,7 +35,7 @@ _MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class TrackState:
     """A state of the half-plane.
 
     Attributes
@@ -110,7 +110,7 @@ class TrackBody:
         points = self.full(name).points.reshape(2, -1)
         return np.concatenate([points, points[:, self._first] * [[1.0], [0.0]]], axis=1)
 
-    def response(self, name: str, converged: Standing) -> Response:
+    def response(self, name: str, converged: TrackState) -> Response:
         """Return stress and internal variables at the points, then at the surface above them."""
         del name
         return converged.response
@@ -120,21 +120,23 @@ class TrackBody:
         del name
         return state.u[0]
 
-    def axle(self, converged: Standing) -> RigidMotion | None:
+    def axle(self, converged: TrackState) -> RigidMotion | None:
         """Return the displacement of the axle, which stays at x = 0, or None without a wheel."""
         touching = converged.touching
         return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
 
-    def under_load(self, found: Pass) -> Standing:
+    def under_load(self, found: Pass) -> TrackState:
         """Return the state under the load of a pass."""
         touching = found.loading if isinstance(found.loading, RollingContact) else None
-        return self._seen(_LOADED, under_load(self.track, found), touching)
+        return self._state(_LOADED, under_load(self.track, found), touching)
 
-    def left_by(self, found: Pass) -> Standing:
+    def left_by(self, found: Pass) -> TrackState:
         """Return the state after a pass."""
-        return self._seen(_RELEASED, of_layers(self.track, found.law, found.after), None)
+        return self._state(_RELEASED, of_layers(self.track, found.law, found.after), None)
 
-    def _seen(self, time: float, fields: TrackFields, touching: RollingContact | None) -> Standing:
+    def _state(
+        self, time: float, fields: TrackFields, touching: RollingContact | None
+    ) -> TrackState:
         u, strain, inside, (above, at_surface) = fields
         strain = np.concatenate([strain, above], axis=1)
         plastic = inside.unpacked(np.concatenate([inside.packed, at_surface.packed], axis=1))
@@ -147,7 +149,7 @@ class TrackBody:
             stress = stress[:, points] * _MIRRORED
             plastic = plastic.at(points).mirrored
         response = Response(stress, np.zeros((4, 4, 0)), plastic, np.zeros(0, dtype=bool))
-        return Standing(State(time, (u,), (plastic,), ()), response, touching)
+        return TrackState(State(time, (u,), (plastic,), ()), response, touching)
 
 
 class SteadyTractions:
@@ -161,7 +163,7 @@ class SteadyTractions:
     def __init__(self, way: int) -> None:
         self._way = way
 
-    def along(self, converged: Standing, x: Array) -> tuple[Array, Array, Array]:
+    def along(self, converged: TrackState, x: Array) -> tuple[Array, Array, Array]:
         """See `SurfaceTractions`."""
         touching = converged.touching
         if touching is None:
@@ -178,7 +180,7 @@ class SteadyTractions:
             sampled(touching.gap, np.nan),
         )
 
-    def extent(self, converged: Standing) -> tuple[float, float]:
+    def extent(self, converged: TrackState) -> tuple[float, float]:
         """See `SurfaceTractions`."""
         touching = converged.touching
         assert touching is not None
@@ -187,16 +189,16 @@ class SteadyTractions:
         patches = contact_patches(touching.x[order], touching.gap[order], closed)
         return (patches[-1][1] - patches[0][0]) / 2, float(touching.pressure.max())
 
-    def force(self, converged: Standing) -> float:
+    def force(self, converged: TrackState) -> float:
         """See `SurfaceTractions`."""
         assert converged.touching is not None
         return -self._way * float(converged.touching.tangential.sum())
 
-    def centre(self, converged: Standing) -> float:
+    def centre(self, converged: TrackState) -> float:
         """See `SurfaceTractions`."""
         del converged
         return 0.0
 
-    def points(self, converged: Standing) -> None:
+    def points(self, converged: TrackState) -> None:
         """See `SurfaceTractions`."""
         del converged

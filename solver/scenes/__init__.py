@@ -11,7 +11,7 @@ import solver.results.increments
 import solver.results.indentation
 import solver.results.places
 import solver.results.pressure_error
-import solver.results.stick  # noqa: F401  (declare what scenes of files store)
+import solver.results.stick  # noqa: F401  (declare what scene files store)
 from solver.scenes.effort import Effort
 from solver.scenes.punch import PUNCH
 from solver.scenes.rolling import ROLLING

@@ -1,4 +1,4 @@
-"""How much work a loading path is, told before any mesh is made."""
+"""The work of a loading path: elements, unknowns and increments, counted without a mesh."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ class Effort:
 
     Attributes
     ----------
-    elements : of all bodies, those included that are condensed to their surface
+    elements : number in all bodies, also in those condensed to their surface
     unknowns : displacement unknowns that no support holds, as `System.n_unknowns` counts them
-    increments : of all its runs together, shared ones once, when none is cut; where passes end as
-        soon as the state is decided, the fewest
-    most_increments : the same where `Scene.refinement` halves them as often as it may, or where the
-        state is never decided
+    increments : number in all runs, shared ones counted once, if none is cut; the smallest number
+        if passes end when the shakedown state is decided
+    most_increments : the same with all halvings of `Scene.refinement`, or if the shakedown state is
+        never decided
     """
 
     elements: int
@@ -27,8 +27,8 @@ class Effort:
     most_increments: int
 
 
-class Lattice(NamedTuple):
-    """What a grid of rectangles has: elements, nodes in all, nodes along x and along y."""
+class GridSize(NamedTuple):
+    """Numbers of elements and nodes of a grid, and of nodes on one line along x and along y."""
 
     elements: int
     nodes: int
@@ -37,8 +37,8 @@ class Lattice(NamedTuple):
 
 
 @cache
-def per_place(element: str) -> tuple[str, int, int, int]:
-    """Return the cells of an element, and its nodes at a corner, on an edge and inside."""
+def node_layout(element: str) -> tuple[str, int, int, int]:
+    """Return the cells of an element, and its numbers of nodes per corner, per edge and inside."""
     from solver.mesh.elements import element_type  # scikit-fem takes a third of a second to import
 
     kind = element_type(element)
@@ -46,13 +46,13 @@ def per_place(element: str) -> tuple[str, int, int, int]:
     return kind.cells, shape.nodal_dofs, shape.facet_dofs, shape.interior_dofs
 
 
-def lattice(columns: int, rows: int, element: str) -> Lattice:
-    """Return what `solver.mesh.grid` makes of so many columns and rows of rectangles."""
-    cells, at_corner, on_edge, inside = per_place(element)
+def grid_size(columns: int, rows: int, element: str) -> GridSize:
+    """Return the size of the mesh that `solver.mesh.grid` makes of these columns and rows."""
+    cells, at_corner, on_edge, inside = node_layout(element)
     parts = 2 if cells == "tri" else 1  # triangles cut each rectangle along a diagonal
     corners, rectangles = (columns + 1) * (rows + 1), columns * rows
     edges = columns * (rows + 1) + rows * (columns + 1) + (parts - 1) * rectangles
-    return Lattice(
+    return GridSize(
         elements=parts * rectangles,
         nodes=at_corner * corners + on_edge * edges + inside * parts * rectangles,
         along=at_corner * (columns + 1) + on_edge * columns,

@@ -1,4 +1,4 @@
-"""The materials that scenes ask for, and the laws that their parameters stand for."""
+"""Parameters of materials and of friction in scenes, and the laws made from them."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from solver.parts import Parts
 @dataclass(frozen=True, slots=True, kw_only=True)
 @YIELD_CONDITIONS.fields
 class YieldParameters:
-    """Accuracy, elasticity, and at which stress a material yields, by any condition.
+    """Accuracy, elasticity and yield condition, with the parameters of all conditions.
 
-    It has no yield stress yet, which follows the parameters of conditions and hardening rules.
+    A subclass declares the yield stress, so that it follows the parameters of all hardening rules.
     """
 
     PARTS: ClassVar[tuple[Parts[Any], ...]] = ()
 
     accuracy: Accuracy = described(
-        "standard", "sets mesh and increments together, where they are not given"
+        "standard", "sets the mesh and the increments that are not given"
     )
     youngs_modulus: Stress = described(2.0e5, "Young's modulus E")
     poisson_ratio: Poisson = described(0.3, "Poisson ratio")
-    yield_condition: str = described("mises", "condition of first yield, and of flow")
+    yield_condition: str = described("mises", "yield condition, with associated flow")
 
     def __post_init__(self) -> None:
         check(self)
@@ -43,7 +43,7 @@ class YieldParameters:
 
     @property
     def idle(self) -> Mapping[str, str]:
-        """Parameters that no number depends on, each with the one whose word decides that."""
+        """Parameters without effect, each with the parameter whose word has no use for it."""
         each = ((parts, getattr(self, parts.kind)) for parts in self.PARTS)
         return {name: parts.kind for parts, word in each for name in parts.unused(word)}
 
@@ -55,7 +55,7 @@ class YieldParameters:
 @dataclass(frozen=True, slots=True, kw_only=True)
 @HARDENING.fields
 class HardeningParameters(YieldParameters):
-    """How a material yields and hardens, with the parameters of all hardening rules."""
+    """Yield condition and hardening rule, with the parameters of all rules."""
 
     hardening: str = described("none", "hardening rule of the yielding bodies")
 
@@ -69,7 +69,7 @@ class MaterialParameters(HardeningParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         YieldParameters.__post_init__(self)
-        self.material()  # refuses what does not go together
+        self.material()  # raises an error for parameters that do not fit together
 
     def material(self, stiffness: float = 1.0, *, elastic: bool = False) -> Law:
         """Return the law of the material, with ``stiffness`` times Young's modulus.
@@ -77,8 +77,8 @@ class MaterialParameters(HardeningParameters):
         Raises
         ------
         ModelError
-            naming the parameter, if those of the rule are wrong or do not go with the yield
-            condition
+            naming the parameter, if the hardening rule does not accept it or if the yield condition
+            does not allow the rule
         """
         rule = HARDENING.made(self.hardening, self)
         elasticity = Elasticity(
@@ -99,13 +99,13 @@ class MaterialParameters(HardeningParameters):
 @dataclass(frozen=True, slots=True, kw_only=True)
 @FRICTION.fields
 class ContactParameters(MaterialParameters):
-    """Elastic-plastic material, and a law of friction with the parameters of all laws."""
+    """An elastic-plastic material and a friction law, with the parameters of all friction laws."""
 
-    friction_law: str = described("coulomb", "law of friction")
+    friction_law: str = described("coulomb", "friction law")
 
     @property
     def friction_part(self) -> FrictionLaw:
-        """The law of friction."""
+        """The friction law."""
         return FRICTION.made(self.friction_law, self)
 
     @property
@@ -119,10 +119,5 @@ class ContactParameters(MaterialParameters):
         master: tuple[str, str],
         sliding: Literal["small", "finite"] = "small",
     ) -> ContactPair:
-        """Return a pair of boundaries with this friction; flat ones slide by little."""
-        return ContactPair(
-            slave=slave,
-            master=master,
-            friction=self.friction_part,
-            sliding=sliding,
-        )
+        """Return a contact pair with this friction law."""
+        return ContactPair(slave=slave, master=master, friction=self.friction_part, sliding=sliding)

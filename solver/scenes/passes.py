@@ -1,4 +1,4 @@
-"""Residual stress and plastic strain after each pass, and their change from cycle to cycle."""
+"""Residual stress and plastic strain after each pass, and their changes over a cycle."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ PASS_SURFACE_ADVANCE = declare(
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """One pass, under the stations of a view.
+    """Results of one pass at the stations of a view.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Trace:
     flow : (station, 4, depth) signed plastic strain, tensor components
     surface : (2, station) displacement of the surface [mm]
     creepage : 1 + R d(rotation) / d(advance) over the second half of the track
-    peak : largest equivalent plastic strain anywhere
+    peak : largest equivalent plastic strain in the half-space
     """
 
     stress: Array
@@ -76,7 +76,7 @@ class Trace:
 
     @classmethod
     def of(cls, samples: Samples, points: Mapping[str, Converged]) -> Trace:
-        """Take the trace of a pass from its states ``mid_track``, ``loaded`` and ``unloaded``."""
+        """Return the trace of a pass from its states ``mid_track``, ``loaded``, ``unloaded``."""
         left = points["unloaded"]
         return cls(
             samples.profile("stress", left).swapaxes(0, 1),
@@ -99,7 +99,7 @@ def _creepage(bodies: Bodies, first: Solved, last: Solved) -> float:
 
 
 def passes(traces: Sequence[Trace], cycle: int) -> Values:
-    """Return the variables over passes; an increment is that of the cycle ending with a pass."""
+    """Return the variables over passes; increments are those of the cycle that ends with a pass."""
     middle = len(traces[0].strain) // 2
     accumulated, left = _increments(traces, cycle)
     shear = 2 * left[:, 3]
@@ -122,8 +122,8 @@ def passes(traces: Sequence[Trace], cycle: int) -> Values:
 def shakedown_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shakedown:
     """Return the shakedown state that the passes tend to.
 
-    On a track with ends a body that yields stays undecided: the ends hold back the layer that
-    ratchetting moves, until the cycle seems closed.
+    On a track with ends a body that yields stays undecided: the ends constrain the layer that
+    ratchetting moves, so that the cycle seems closed.
     """
     cycle, yield_strain = parameters.cycle, parameters.yield_stress / parameters.youngs_modulus
     hardens = parameters.material().hardens
@@ -136,7 +136,7 @@ def shakedown_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shak
 
 
 def _increments(traces: Sequence[Trace], cycle: int) -> tuple[Array, Array]:
-    """Return accumulated (pass, depth) and signed (pass, 4, depth) strain of each cycle."""
+    """Return accumulated (pass, depth) and signed (pass, 4, depth) plastic strain of a cycle."""
     middle = len(traces[0].strain) // 2
     accumulated = np.stack([t.strain[middle] for t in traces])
     flow = np.stack([t.flow[middle] for t in traces])
@@ -144,12 +144,12 @@ def _increments(traces: Sequence[Trace], cycle: int) -> tuple[Array, Array]:
 
 
 def _differences(values: Array, cycle: int) -> Array:
-    """Return the change of values (pass, ...) over the last cycle, from zero at first."""
+    """Return the changes of values (pass, ...) over a cycle; values before the first are zero."""
     before = np.concatenate([np.zeros((cycle, *values.shape[1:])), values[:-cycle]])
     return values - before[: len(values)]
 
 
 def _equivalent(flow: Array) -> Array:
-    """Return the equivalent of signed strain (pass, 4, depth), tensor components."""
+    """Return the equivalent (pass, depth) of signed strain (pass, 4, depth), tensor components."""
     square = (flow[:, :3] ** 2).sum(axis=1) + 2 * flow[:, 3] ** 2
     return np.asarray(np.sqrt(2 / 3 * square))

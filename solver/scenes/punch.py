@@ -38,7 +38,7 @@ from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
 from solver.results.view import View
-from solver.scenes.effort import Effort, Lattice, lattice
+from solver.scenes.effort import Effort, GridSize, grid_size
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
 
@@ -52,15 +52,18 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "standard": {"smallest_element": 5e-4, "growth": 1.4, "load_step": 0.05},
     "fine": {"smallest_element": 1e-4, "growth": 1.2, "load_step": 0.025},
 }
-"""What an accuracy sets; errors: docs/accuracy.md."""
-_LARGEST, _PUNCH_LARGEST = 0.08, 0.25  # of a: elements under the punch, and up the punch
+"""Parameters of each accuracy; docs/accuracy.md has their errors."""
+_LARGEST, _PUNCH_LARGEST = 0.08, 0.25
+"""Ratios of the largest element side to a: along the contact, and along the height of the punch."""
 _MOST_ELEMENTS = 60_000
-_NEAREST = 0.005  # of a: the distance from the corner at which the first published number is read
-_MEETING = 1.5  # sides of an element: how far those reach that meet in the corner, sqrt(2)
+_NEAREST = 0.005
+"""Ratio of the distance from the corner of the first published number to a."""
+_DIAGONAL = 1.5
+"""Ratio of the diagonal of an element at the corner to its side, sqrt(2) rounded up."""
 
 
 class Lines(NamedTuple):
-    """Lines of the meshes [mm]: x under the punch and beyond it, y up the punch and down below."""
+    """Grid lines [mm]: x under the punch and beyond it, y of the punch and of the half-plane."""
 
     under: NDArray[np.float64]
     beyond: NDArray[np.float64]
@@ -72,23 +75,25 @@ class Lines(NamedTuple):
 class PunchParameters(ContactParameters):
     """Parameters of the punch (N, mm, MPa)."""
 
-    load_ratio: Ratio = described(0.5714, "mean pressure on the punch / yield stress")
+    load_ratio: Ratio = described(
+        0.5714, "ratio of the mean pressure on the punch to the yield stress"
+    )
     state: Literal["plane_stress", "plane_strain", "axisymmetric"] = described(
         "plane_stress", "two-dimensional state; axisymmetric is a flat-ended cylinder"
     )
     half_width: Length = described(50.0, "half-width a of the punch")
     punch_height: Annotated[float, Interval(ge=0.5, le=20.0), Unit("1")] = described(
-        2.0, "height of the punch / a"
+        2.0, "ratio of the height of the punch to a"
     )
     half_plane_size: Annotated[float, Interval(ge=2.0, le=1000.0), Unit("1")] = described(
-        40.0, "width and depth of the half-plane / a"
+        40.0, "ratio of width and depth of the half-plane to a"
     )
     punch_stiffness: Annotated[float, Interval(ge=1e-4, le=1e4), Unit("1")] = described(
-        1.0, "Young's modulus of the punch / that of the half-plane"
+        1.0, "ratio of Young's modulus of the punch to that of the half-plane"
     )
     elastic_punch: bool = described(False, "whether the punch never yields")
     smallest_element: Annotated[float, Interval(ge=1e-5, le=0.1), Unit("1")] = by_accuracy(
-        "smallest element side, at the corner / a"
+        "ratio of the smallest element side, at the corner, to a"
     )
     growth: Annotated[float, Interval(ge=1.05, le=3.0), Unit("1")] = by_accuracy(
         "ratio of neighbouring element sides away from the corner"
@@ -104,7 +109,7 @@ class PunchParameters(ContactParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ContactParameters.__post_init__(self)
-        elements = sum(each.elements for each in self.lattices("quad8"))
+        elements = sum(each.elements for each in self.grid_sizes("quad8"))
         if elements > _MOST_ELEMENTS:
             raise ModelError(
                 "smallest_element", self.smallest_element,
@@ -114,26 +119,26 @@ class PunchParameters(ContactParameters):
 
     @property
     def lines(self) -> Lines:
-        """Lines of the meshes: through the corner, and ever closer towards it."""
+        """Grid lines of both meshes; their spacing decreases towards the corner."""
         a = self.half_width
         return _lines(
             a, self.punch_height * a, self.half_plane_size * a, self.smallest_element * a,
             self.growth,
         )  # fmt: skip
 
-    def lattices(self, element: str) -> tuple[Lattice, Lattice]:
-        """Return what the grids of punch and half-plane have."""
+    def grid_sizes(self, element: str) -> tuple[GridSize, GridSize]:
+        """Return the sizes of the grids of punch and half-plane."""
         under, beyond, up, down = (len(each) - 1 for each in self.lines)
-        return lattice(under, up, element), lattice(under + beyond, down, element)
+        return grid_size(under, up, element), grid_size(under + beyond, down, element)
 
     @property
     def corner(self) -> SingularPoint:
-        """The corner of the punch.
+        """The corner of the punch, at which strain is unbounded.
 
-        Stress is judged from the nearest place at which the publication reads it. There strain
-        settles as the mesh is refined, inside it does not.
+        Its radius is the distance of the first published number: there strain converges as the mesh
+        is refined, nearer to the corner it does not.
         """
-        radius = max(_NEAREST, _MEETING * self.smallest_element) * self.half_width
+        radius = max(_NEAREST, _DIAGONAL * self.smallest_element) * self.half_width
         return SingularPoint(at=(self.half_width, 0.0), radius=radius)
 
     def usual(self) -> Mapping[str, float]:
@@ -158,7 +163,7 @@ def model(parameters: PunchParameters) -> Model:
     The middle is held along x, the bottom of the half-plane along y; the punch is held by contact
     alone.
     """
-    from solver.mesh.elements import element_type  # only who computes needs the solver
+    from solver.mesh.elements import element_type  # loads scikit-fem
 
     p, (under, beyond, up, down) = parameters, parameters.lines
     cells = element_type(p.element).cells
@@ -184,14 +189,13 @@ def model(parameters: PunchParameters) -> Model:
 
 
 def program(parameters: PunchParameters) -> Program:
-    """Return the history: the pressure is raised, then taken away with the punch."""
+    """Return the loading history: the pressure is raised, then removed with the punch."""
     return load_and_release(parameters.load_ratio, parameters.load_step, parameters.unload_steps)
 
 
 def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
-    """Return the work of loading up to each load ratio in turn, and of releasing each."""
-    element = parameters.element
-    punch, plane = parameters.lattices(element)
+    """Return the work of loading to each load ratio in turn and of releasing from each."""
+    punch, plane = parameters.grid_sizes(parameters.element)
     # an elastic punch is reduced to its contact surface; x is held on the line of symmetry
     own = 2 * punch.along - 1 if parameters.elastic_punch else 2 * punch.nodes - punch.up
     increments = _increments(tuple(load_ratios), parameters.load_step, parameters.unload_steps)
@@ -209,7 +213,7 @@ def _increments(load_ratios: tuple[float, ...], step: float, unload_steps: int) 
 
 
 def view(parameters: PunchParameters) -> View:
-    """Return where the results are taken: a function of dimensions, not of the mesh."""
+    """Return the positions of results, which depend on dimensions and not on the mesh."""
     a = parameters.half_width
     height = min(0.6, parameters.punch_height) * a
     within = _pixels(a, a)
@@ -229,7 +233,7 @@ def view(parameters: PunchParameters) -> View:
 
 
 def _pixels(length: float, a: float) -> NDArray[np.float64]:
-    """Return positions of the map away from the corner: as fine as the elements of ``standard``."""
+    """Return distances of map positions from the corner, as fine as elements of ``standard``."""
     return cells(length, smallest=5e-4 * a, ratio=1.1, largest=0.0125 * a)
 
 
@@ -249,15 +253,20 @@ MAX_PLASTIC_STRAIN = {
         "max_plastic_strain_half_plane", "largest equivalent plastic strain in the half-plane"
     ),
 }
-FREE_SURFACE = declare("audit_free_surface", "residual stress across the free side / yield stress")
-SELF_EQUILIBRIUM = declare("audit_self_equilibrium", "net residual force on a cut plane, relative")
+FREE_SURFACE = declare(
+    "audit_free_surface", "ratio of the residual stress normal to the free side to the yield stress"
+)
+SELF_EQUILIBRIUM = declare(
+    "audit_self_equilibrium",
+    "ratio of the residual normal force on a plane cut to yield stress times area",
+)
 _INSIDE = {"half_plane": _NEAREST, "punch": 0.028}
-"""Distance from the corner / a, at which residual stress is read, as in the publication."""
+"""Ratio of the distance from the corner at which the publication has residual stress to a."""
 
 
 def figures(run: FinishedRun) -> Values:
-    """Return the figures of the punch, those of the publication among them."""
-    from solver.results.audit.cut import cut_force  # only who computes needs the solver
+    """Return the figures of the punch, including those of the publication."""
+    from solver.results.audit.cut import cut_force  # loads scipy
 
     samples, system, unloaded = run.samples, run.system, run.unloaded
     a, s = run.parameters.half_width, run.view.s

@@ -101,7 +101,8 @@ DEPTH_OF_HIGHEST_PLASTIC_STRAIN = declare(
 )  # fmt: skip
 UNSTEADINESS = declare(
     "unsteadiness",
-    "largest difference of residual stress between stations / largest residual stress",
+    "ratio of the largest difference of residual stress between stations to the largest residual "
+    "stress",
 )
 LONGITUDINAL_FORCE = declare(
     "longitudinal_force", "longitudinal force on the track along x, mid-track", "N"
@@ -109,7 +110,7 @@ LONGITUDINAL_FORCE = declare(
 AXLE_HEIGHT = declare("axle_height", "displacement of the axle at mid-track", "mm")
 AXLE_ROTATION = declare(
     "axle_rotation",
-    "rotation of the wheel at mid-track, counter-clockwise, from how it is meshed there", "rad",
+    "rotation of the wheel at mid-track, counter-clockwise, from its mesh", "rad",
 )  # fmt: skip
 SHAKEDOWN_STATE = declare(
     "shakedown_state", "shakedown state that the passes tend to", flags=ShakedownState
@@ -123,21 +124,21 @@ STEADY_NET_INCREMENT = declare(
 
 
 def method(parameters: RollingParameters) -> Method:
-    """Return how the passes are computed: steadily, or by increments."""
+    """Return the method of the passes: steady on an endless track, else by increments."""
     if not parameters.endless:
         return by_increments
-    from solver.scenes.rolling_endless import without_ends  # only who computes needs the solver
+    from solver.scenes.rolling_endless import by_steady_passes  # loads scipy
 
-    return without_ends
+    return by_steady_passes
 
 
 def program(parameters: RollingParameters) -> Program:
-    """Return the passes."""
+    """Return the loading history of the passes."""
     return parameters.schedule.program
 
 
 def refinement(parameters: RollingParameters) -> StepRefinement | None:
-    """Return how the advance is halved until residual stress settles; None keeps it as given."""
+    """Return how the advance is halved until residual stress converges, or None."""
     tolerance = parameters.advance_tolerance * parameters.yield_stress
     return StepRefinement(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
 
@@ -148,7 +149,7 @@ def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
 
 
 def progress(run: FinishedRun) -> Values:
-    """Return the length rolled in the last pass, and the advance of its increments."""
+    """Return the length rolled in the last pass, the advance of its increments and its error."""
     if run.parameters.endless:
         return {}
     schedule, settled = run.parameters.schedule, run.outcome.settled
@@ -180,7 +181,7 @@ def profile_figures(run: FinishedRun) -> Values:
 
 
 def wheel(run: FinishedRun) -> Values:
-    """Return the longitudinal force at mid-track, and height and rotation of the wheel if any."""
+    """Return the longitudinal force at mid-track, and height and rotation of a wheel."""
     out: dict[Quantity, float] = {LONGITUDINAL_FORCE: run.tractions.force(run.loaded)}
     if (hub := run.system.axle(run.loaded)) is not None:
         out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
@@ -202,7 +203,7 @@ def surface(run: FinishedRun) -> Values:
 
 
 def cycles(run: FinishedRun) -> Values:
-    """Return the results of every pass, and the shakedown state that the cycles tend to."""
+    """Return the results of every pass, and the shakedown state that the passes tend to."""
     parameters = run.parameters
     found = shakedown_of(parameters, run.outcome.traces)
     return {
@@ -214,7 +215,7 @@ def cycles(run: FinishedRun) -> Values:
 
 
 def warnings(run: FinishedRun) -> tuple[str, ...]:
-    """Return a warning where the error by the advance is above its tolerance, or unknown."""
+    """Return a warning if the error by the advance is above its tolerance or unknown."""
     settled, tolerance = run.outcome.settled, refinement(run.parameters)
     if run.parameters.endless or tolerance is None or settled.error <= tolerance.tolerance:
         return ()
@@ -229,8 +230,6 @@ def warnings(run: FinishedRun) -> tuple[str, ...]:
     )
 
 
-_STRESS = (maps, surfaces, residual_extremes, profile_figures, surface)
-
 ROLLING = Scene(
     name="rolling",
     summary="elastic cylinder rolling on an elastic-plastic half-space, pass after pass",
@@ -240,7 +239,10 @@ ROLLING = Scene(
     model=model,
     program=program,
     view=view,
-    outputs=(*_STRESS, contact, extremes, wheel, cycles),
+    outputs=(
+        maps, surfaces, residual_extremes, profile_figures, surface, contact, extremes, wheel,
+        cycles,
+    ),
     costs=(cost, progress),
     trace=Trace.of,
     refinement=refinement,

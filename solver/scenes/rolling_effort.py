@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import track_lines
-from solver.scenes.effort import Effort, lattice
+from solver.scenes.effort import Effort, grid_size
 from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
 from solver.scenes.rolling_model import track_grid
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _ELEMENT = "quad8"
 _DECIDED = 3
-"""Passes after which a state may be decided."""
+"""Smallest number of passes after which a shakedown state may be decided."""
 
 
 def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
@@ -32,7 +32,7 @@ def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
     fixed = schedule.press * (1 + schedule.driven) + schedule.release
     rolled = 2 * schedule.half_steps
     n = int(max(passes))
-    # the first pass is repeated with increments halved once, twice, …; the last halving is kept
+    # the first pass is repeated for each halving; the other passes use the last halving
     times = [2**k for k in range(HALVINGS + 1 if parameters.advance_tolerance else 1)]
     first = sum(fixed + rolled * each for each in times)
     return Effort(
@@ -46,7 +46,7 @@ def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
 def _size(parameters: RollingParameters) -> tuple[int, int]:
     """Return the elements, and the unknowns of the half-space and of the wheel's rim.
 
-    A steady pass does not count those of the rim.
+    Those of the rim do not count in steady passes.
     """
     p = parameters
     if p.endless:
@@ -70,8 +70,8 @@ def _track(
     x, y = half_space_nodes(fine, far, a, h, growth, periodic)
     if not periodic:
         return _held(len(x), len(y))
-    track = lattice(len(x) - 1, len(y) - 1, _ELEMENT)
-    # the nodes of the right side are those of the left; the bottom is held
+    track = grid_size(len(x) - 1, len(y) - 1, _ELEMENT)
+    # the right side has the unknowns of the left one; the bottom is held
     return track.elements, 2 * (track.nodes - track.up) - 2 * (track.along - 1)
 
 
@@ -83,11 +83,12 @@ def _endless(a: float, h: float, growth: float) -> tuple[int, int]:
 
 
 def _held(columns: int, rows: int) -> tuple[int, int]:
-    """Return elements and unknowns of so many lines, x held at both sides, x and y at the bottom.
+    """Return elements and unknowns of a half-space of so many grid lines.
 
-    Its corners belong to both.
+    x is held at both sides, x and y at the bottom.
     """
-    track = lattice(columns - 1, rows - 1, _ELEMENT)
+    track = grid_size(columns - 1, rows - 1, _ELEMENT)
+    # at both lower corners x is held by the side and by the bottom
     return track.elements, 2 * track.nodes - 2 * track.up - 2 * track.along + 2
 
 
@@ -95,5 +96,5 @@ def _held(columns: int, rows: int) -> tuple[int, int]:
 def _wheel(radius: float, reach: float, h: float) -> tuple[int, int]:
     """Return the elements of the wheel, and the unknowns of its rim."""
     angle, rings = wheel_nodes(radius, reach, h)
-    ring = lattice(len(angle) - 1, len(rings) - 1, _ELEMENT)
-    return ring.elements, 2 * lattice(rim_elements(reach, h), 0, _ELEMENT).along
+    ring = grid_size(len(angle) - 1, len(rings) - 1, _ELEMENT)
+    return ring.elements, 2 * grid_size(rim_elements(reach, h), 0, _ELEMENT).along

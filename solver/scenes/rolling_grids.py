@@ -1,4 +1,4 @@
-"""The grids of wheel and track: where their nodes are along each of the two directions."""
+"""Grid lines of track and wheel."""
 
 from __future__ import annotations
 
@@ -14,23 +14,27 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_DEEP = 4.0  # depth down to which sides grow by `growth`, then faster / Hertz half-width
-_RECORDED = 30  # least recorded positions in a Hertz half-width
+_DEEP = 4.0
+"""Ratio of the depth in which element sides grow by ``growth`` to the Hertz half-width; below it
+they grow faster."""
+_RECORDED = 30
+"""Smallest number of positions of results in a Hertz half-width."""
 _ROUNDING = 1e-12
-_HUB = 0.3  # radius of the rigid hub / R
+_HUB = 0.3
+"""Ratio of the radius of the rigid hub to that of the wheel."""
 
 
 def half_space_nodes(
     fine: float, far: float, a: float, h: float, growth: float, periodic: bool
 ) -> tuple[Array, Array]:
-    """Return x and y of the half-space's nodes [mm].
+    """Return x and y of the grid lines of the half-space [mm].
 
     Parameters
     ----------
     fine : half the length with elements of side ``h`` [mm]
     far : depth, and width beyond the fine length if not ``periodic`` [mm]
     a : Hertz half-width [mm]
-    growth : ratio of neighbouring sides in depth
+    growth : ratio of neighbouring element sides in depth
     """
     track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
     x = track if periodic else continued(track, far, h, 1.4, far / 4, both=True)
@@ -39,17 +43,17 @@ def half_space_nodes(
 
 
 def recorded_step(a: float) -> float:
-    """Return the distance of recorded positions along a track of given length [mm].
+    """Return the distance between positions of results along a track of given length [mm].
 
-    It is 0.25 mm, halved as often as a small Hertz half-width ``a`` [mm] asks for.
+    It is 0.25 mm, halved until 30 positions lie in the Hertz half-width ``a`` [mm].
     """
     return 0.25 / 2 ** max(0, math.ceil(math.log2(0.25 * _RECORDED / a)))
 
 
 def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
-    """Return angle [rad] and radius [mm] of the nodes of a wheel of radius ``R``.
+    """Return angles [rad] and radii [mm] of the grid lines of a wheel of radius ``R``.
 
-    Elements of side ``h`` lie within an arc ``reach`` of the lowest point.
+    Up to the arc length ``reach`` from the lowest point, elements have the side ``h``.
     """
     rim = np.linspace(-reach, reach, rim_elements(reach, h) + 1)
     angle = continued(rim, math.pi * R - reach, h, 1.5, 0.3 * R, both=True) / R
@@ -59,7 +63,6 @@ def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
 def rim_elements(reach: float, h: float) -> int:
     """Return the number of elements of side ``h`` along the part of the rim that may touch.
 
-    A reach of a whole number of sides has as many elements, however the quotient is rounded: a
-    steady pass takes rim and track to have sides of one length.
+    Rounding of ``reach / h`` adds no element: a steady pass needs equal sides on rim and track.
     """
     return 2 * math.ceil(reach / h * (1 - _ROUNDING))

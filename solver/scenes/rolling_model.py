@@ -1,4 +1,4 @@
-"""Wheel, track and timetable of the rolling scene."""
+"""The model of the rolling scene: half-space and wheel."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
-    """Return what `half_space_nodes` takes."""
+    """Return the arguments of `half_space_nodes`."""
     p, a = parameters, parameters.half_width
     far = p.length if p.periodic else p.half_space_size * a
     return p.fine, far, a, p.element_size, p.growth, p.periodic
@@ -100,7 +100,7 @@ def _wheel(parameters: RollingParameters) -> Body:
 
 
 def model(parameters: RollingParameters) -> Model:
-    """Return the half-space, and the wheel where there is one."""
+    """Return the half-space, and the wheel unless ``load`` is ``hertz``."""
     half_space = _half_space(parameters)
     if parameters.load == "hertz":
         return Model(bodies=(half_space,))

@@ -18,21 +18,25 @@ from solver.scenes.sequence import OF_A_PASS, block_of
 from solver.scenes.wheel_parameters import WheelParameters
 
 ENDLESS: Literal["endless"] = "endless"
-"""What `track` is where passes are steady."""
+"""Value of `track` for steady passes."""
 Track = Annotated[Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["endless"], Unit("mm")]
 
 _ELEMENTS: Mapping[Accuracy, tuple[int, int]] = {
     "draft": (8, 4), "standard": (16, 8), "fine": (32, 16)
 }  # fmt: skip
-"""Elements of a half-width: on a track without ends, and on one of given length."""
+"""Elements per Hertz half-width, on an endless track and on one of given length."""
 _GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.15**0.5}
-_LARGEST = 100.0  # element side [mm]
-_MARGIN = 2.5  # least fine track and rim beyond the ends of the track / Hertz half-width
-_SINKS = (
-    0.65  # touches beyond the track / (Hertz half-width * load ratio), where the wheel sinks in
-)
-_PERIOD = 6.0  # least length of a track that repeats itself / Hertz half-width
-_LONGEST_REACH = 0.8  # of half the rim
+_LARGEST = 100.0
+"""Largest element side [mm]."""
+_MARGIN = 2.5
+"""Smallest ratio of the fine length beyond the end of the track to the Hertz half-width."""
+_SPREAD = 0.65
+"""Ratio of the length that a sinking wheel touches beyond the end of the track to the Hertz
+half-width times the load ratio."""
+_PERIOD = 6.0
+"""Smallest ratio of the length of a periodic track to the Hertz half-width."""
+_LONGEST_REACH = 0.8
+"""Largest ratio of `RollingParameters.reach` to half the circumference of the wheel."""
 _MOST_INCREMENTS = 100_000
 
 
@@ -40,36 +44,40 @@ _MOST_INCREMENTS = 100_000
 class RollingParameters(WheelParameters):
     """Parameters of rolling (N, mm, MPa; forces per mm of width)."""
 
-    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "passes over the track")
+    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
     sequence: tuple[Mapping[str, float | str], ...] = described(
         (),
-        "passes of different loads that repeat, each a table of what differs from the run: "
+        "list of different passes, repeated; each is a table of what differs from the run: "
         f"{', '.join(OF_A_PASS)}, and `times`",
     )
     direction: Literal["same", "back_and_forth"] = described(
-        "same", "whether every pass goes the same way, or the wheel rolls back"
+        "same", "whether every pass has the same direction, or the wheel rolls back"
     )
-    heading: Literal["forward", "backward"] = described("forward", "way of the first pass along x")
+    heading: Literal["forward", "backward"] = described(
+        "forward", "direction of the first pass along x"
+    )
     load: Literal["contact", "hertz"] = described(
-        "contact", "a wheel in true contact, or a translated Hertz pressure"
+        "contact", "a wheel in contact, or a moving Hertz pressure"
     )
     track: Track = described(
         ENDLESS,
-        "endless: passes are steady, and the load stands at x = 0; or the length rolled in a pass "
-        "by increments, centred on x = 0",
+        "endless: steady passes, with the load at x = 0; or the length rolled by increments in a "
+        "pass, centred on x = 0",
     )
     until: Literal["passes", "decided"] = described(
-        "passes", "whether an endless track is rolled on after its shakedown state is decided"
+        "passes",
+        "last pass on an endless track: that of `passes`, or the first after which the shakedown "
+        "state is decided",
     )
     periodic: bool = described(
         False,
-        "whether the half-space, as deep as the track is long, repeats itself after each track "
-        "length, together with its loads",
+        "whether half-space and load are repeated along x after each track length; the half-space "
+        "is then as deep as the track is long",
     )
     half_space_size: Annotated[float, Interval(ge=5.0, le=1e5), Unit("1")] = described(
         400.0,
-        "depth of the half-space under a track of given length, and width beyond it / Hertz "
-        "half-width; a track without ends has 1600",
+        "ratio of the depth of the half-space, and of its width beyond a track of given length, to "
+        "the Hertz half-width; 1600 for an endless track",
     )
     element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = by_accuracy(
         "element side along the track and at the surface"
@@ -82,11 +90,11 @@ class RollingParameters(WheelParameters):
     )
     advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
         0.0,
-        "largest change of residual stress / yield stress by halving the advance: it is halved "
-        f"until the change is smaller, at most {HALVINGS} times; 0 keeps advance_step",
+        "ratio of the change of residual stress by halving the advance to the yield stress: the "
+        f"advance is halved until it is smaller, at most {HALVINGS} times; 0 keeps advance_step",
     )
     press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
-        8, "increments of setting down, and of driving"
+        8, "increments of setting down, and of applying the moment"
     )
     unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(4, "increments of unloading")
 
@@ -109,7 +117,7 @@ class RollingParameters(WheelParameters):
                 f"radius {self.radius:g} and load_ratio {self.load_ratio:.4g}",
             )  # fmt: skip
         if self.sequence and not self.endless:
-            raise ModelError("sequence", self.sequence, "must be empty, or track endless")
+            raise ModelError("sequence", self.sequence, "must be empty unless track = endless")
         if self.endless:
             self._check_endless()
         else:
@@ -117,15 +125,15 @@ class RollingParameters(WheelParameters):
         self._check_rim()
 
     def _check_endless(self) -> None:
-        """Raise `ModelError` for what a track without ends cannot have."""
+        """Raise `ModelError` for parameters that an endless track cannot have."""
         for name, usual in (
             ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
-                raise ModelError(name, value, f"must be {usual}, or track a length")
+                raise ModelError(name, value, f"must be {usual} with track = endless")
         a, h = self.mesh_width, self.element_size
         if h > a / 2:
-            allowed = f"must be at most {a / 2:.4g} mm, half the half-width that is meshed"
+            allowed = f"must be at most {a / 2:.4g} mm, half the half-width of the mesh"
             raise ModelError("element_size", h, allowed)
         columns = sum(window_elements(a, h))
         if columns > MOST_COLUMNS:
@@ -133,9 +141,9 @@ class RollingParameters(WheelParameters):
             raise ModelError("element_size", h, f"{allowed} {MOST_COLUMNS}")
 
     def _check_length(self) -> None:
-        """Raise `ModelError` for what a track of given length cannot have."""
+        """Raise `ModelError` for parameters that a track of given length cannot have."""
         if self.until != "passes":
-            raise ModelError("until", self.until, "must be passes, or track endless")
+            raise ModelError("until", self.until, "must be passes unless track = endless")
         if self.advance_step > self.length / 2:
             raise ModelError(
                 "advance_step", self.advance_step,
@@ -162,12 +170,12 @@ class RollingParameters(WheelParameters):
         if self.periodic and self.length < _PERIOD * self.half_width:
             raise ModelError(
                 "track", self.track,
-                f"must be at least {_PERIOD:g} Hertz half-widths when it repeats itself, "
+                f"must be at least {_PERIOD:g} Hertz half-widths with periodic = true, "
                 f"{_PERIOD * self.half_width:.4g} mm",
             )  # fmt: skip
 
     def _check_rim(self) -> None:
-        """Raise `ModelError` where the rim is too short for what may touch it."""
+        """Raise `ModelError` if the rim is too short for track and contact."""
         longest = _LONGEST_REACH * math.pi * self.radius
         if self.load == "contact" and self.reach > longest:
             room = 0.0 if self.endless else 2 * (longest - self.margin) / self._turning
@@ -178,9 +186,9 @@ class RollingParameters(WheelParameters):
             )  # fmt: skip
 
     def usual(self) -> Mapping[str, float]:
-        """Return the elements and increments of an accuracy, in lengths of two digits.
+        """Return element side, growth and advance of an accuracy; docs/accuracy.md has the errors.
 
-        Errors: docs/accuracy.md.
+        The side is rounded to two digits.
         """
         endless, of_length = _ELEMENTS[self.accuracy]
         side = self.mesh_width / endless if self.endless else self.half_width / of_length
@@ -205,8 +213,8 @@ class RollingParameters(WheelParameters):
 
     @property
     def spread(self) -> float:
-        """How far beyond the end of the track a wheel that sinks in may touch [mm]."""
-        return _SINKS * self.load_ratio * self.half_width
+        """Length beyond the end of the track that a sinking wheel may touch [mm]."""
+        return _SPREAD * self.load_ratio * self.half_width
 
     @property
     def reach(self) -> float:
@@ -227,22 +235,22 @@ class RollingParameters(WheelParameters):
 
     @property
     def _turning(self) -> float:
-        """Largest length of rim / length of track over which it passes."""
+        """Ratio of the length of rim that rolls to the length of track, at least 1."""
         return 1 + max(0.0, -self.given_creepage)
 
     @property
     def block(self) -> tuple[RollingParameters, ...]:
-        """The parameters of each pass of the sequence once; of any pass where there is none."""
+        """The parameters of each pass of the sequence; without one those of the run."""
         return block_of(self, self.sequence) or (self,)
 
     @property
     def widest(self) -> RollingParameters:
-        """Those of its passes with the widest contact."""
+        """The parameters of the pass with the widest contact."""
         return max(self.block, key=lambda own: own.half_width)
 
     @property
     def mesh_width(self) -> float:
-        """Half-width that an endless track is meshed for [mm]: runs of nearly the same share it."""
+        """Half-width of the mesh of an endless track [mm], rounded so that runs share meshes."""
         return float(f"{self.widest.half_width:.3g}")
 
     def of_pass(self, number: int) -> RollingParameters:
@@ -251,7 +259,7 @@ class RollingParameters(WheelParameters):
 
     @property
     def directions(self) -> tuple[int, ...]:
-        """The way of each pass along x, 1 or -1."""
+        """The direction of each pass along x, 1 or -1."""
         turn = -1 if self.direction == "back_and_forth" else 1
         ways = [1 if own.heading == "forward" else -1 for own in self.block]
         return tuple(ways[k % len(ways)] * turn**k for k in range(self.passes))
@@ -263,7 +271,7 @@ class RollingParameters(WheelParameters):
 
     @property
     def schedule(self) -> Schedule:
-        """The timetable."""
+        """The loading history of the passes by increments."""
         return Schedule(
             n=self.passes,
             track=self.length,

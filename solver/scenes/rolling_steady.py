@@ -1,4 +1,4 @@
-"""The steady passes of the rolling scene: track, rim and load of its parameters."""
+"""Steady passes of the rolling scene: track, rim and loads made from its parameters."""
 
 from __future__ import annotations
 
@@ -32,29 +32,32 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _PARTS, _TOLERANCE = 4, 0.01
-"""How exactly a pass on a coarser mesh is solved, from which a finer one begins."""
+"""Increments between two points of a row, and tolerance, of a pass on a coarser mesh."""
 
 
 def steady_passes(
     parameters: RollingParameters, reach: float = 1.0, parts: int | None = None
 ) -> Iterator[Pass]:
-    """Yield the passes, on a window of so many times the usual size.
+    """Yield the passes in their order.
 
-    ``parts`` are the increments from one point of a row to the next, None as many as usual.
+    Parameters
+    ----------
+    reach : ratio of the size of the window to the usual size
+    parts : increments between two points of a row, or None for the usual number
     """
     p = parameters
     track = track_for(p, reach)
     block = p.block  # equal passes are one object
-    made = {id(own): load_on(track, p, own) for own in block}
-    loads = itertools.cycle(made[id(own)] for own in block)
+    load_of = {id(own): load_on(track, p, own) for own in block}
+    loads = itertools.cycle(load_of[id(own)] for own in block)
     guess = _first_guess(p, reach)
     yield from rolling(track, p.material(), loads, p.directions, guess=guess, parts=parts)
 
 
 def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
-    """Return the strains that the first pass adds, as a mesh twice as coarse has them.
+    """Return the strain of the first pass as found with elements of twice the side, or None.
 
-    Half of Newton's steps lead into the neighbourhood of the solution; there they cost a fifth.
+    Half of Newton's steps only come near the solution; on the coarser mesh they cost a fifth.
     """
     p = parameters
     try:
@@ -74,13 +77,13 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
 
 
 def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
-    """Return the half-space, made once for all runs of a process with the same mesh."""
+    """Return the half-space, built once in a process for each mesh."""
     p = parameters
     return track_of(p.mesh_width, p.element_size, p.growth, p.material().elasticity, reach)
 
 
 def rim_of(parameters: RollingParameters) -> Rim:
-    """Return the rim of the wheel, condensed once for all runs of a process with the same wheel."""
+    """Return the rim of the wheel, condensed once in a process for each wheel."""
     p = parameters
     return _rim(p.radius, p.widest.reach, p.element_size, p.wheel_material)
 
@@ -93,12 +96,17 @@ def _rim(radius: float, reach: float, h: float, material: Material) -> Rim:
 
 
 def load_on(track: Track, run: RollingParameters, parameters: RollingParameters) -> PassingLoad:
-    """Return what passes over the track of a run, along +x, with the parameters of a pass.
+    """Return the load of a pass, which moves along +x.
+
+    Parameters
+    ----------
+    run : parameters of the run, for the rim of its widest contact
+    parameters : those of the pass
 
     Raises
     ------
     LimitLoad
-        if no surface bears its shear
+        if its prescribed shear is above the shear strength of the material
     """
     p = parameters
     if p.load == "hertz":

@@ -1,4 +1,4 @@
-"""Where the results of rolling are taken."""
+"""Positions of the results of rolling."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
     from solver.scenes.rolling_parameters import RollingParameters
 
-_SEEN = 4.0  # reach of what is recorded on a track without ends / Hertz half-width
+_EXTENT = 4.0
+"""Ratio of the largest x of results on an endless track to the Hertz half-width."""
 
 
 def view(parameters: RollingParameters) -> View:
-    """Return where the results are taken: a function of dimensions, not of the mesh."""
+    """Return the positions of results, which depend on dimensions and not on the mesh."""
     if parameters.endless:
         return _around_the_load(parameters.widest.half_width)
     half, a = parameters.length / 2, parameters.half_width
@@ -41,13 +42,13 @@ def view(parameters: RollingParameters) -> View:
 
 
 def _around_the_load(a: float) -> View:
-    """Return where the results of a track without ends are taken, for the half-width a [mm]."""
+    """Return the positions of results on an endless track for the half-width a [mm]."""
     return View(
-        x=a * np.linspace(-_SEEN, _SEEN, 161),
+        x=a * np.linspace(-_EXTENT, _EXTENT, 161),
         y=-_pixels(a),
         depth=_depths(a),
         station=np.array([0.0]),
-        s=a * np.linspace(-_SEEN, _SEEN, 641),
+        s=a * np.linspace(-_EXTENT, _EXTENT, 641),
         profile_body="half_space",
         surfaces={"half_space": "top"},
         stages=("loaded", "unloaded"),
@@ -55,7 +56,7 @@ def _around_the_load(a: float) -> View:
 
 
 def _pixels(a: float) -> NDArray[np.float64]:
-    """Return the depths of the rows of the map for the half-width a [mm]."""
+    """Return the depths of the map for the half-width a [mm]."""
     return cells(5 * a, smallest=a / 64, ratio=1.05, largest=a / 16)
 
 

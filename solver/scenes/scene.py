@@ -31,9 +31,8 @@ Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
 An exception it raises stops the work and reaches the caller unchanged."""
 
-
 Method = Callable[["Scene", Sequence[Any], Monitor], Iterator[FinishedRun]]
-"""Computes runs of a scene, given by their parameters in increasing order."""
+"""Computes runs of a scene from their parameters, in the order of the branch parameter."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,28 +46,27 @@ class Scene:
     parameters : frozen, keyword-only dataclass; every field has a default, an
         ``annotated_types`` constraint where it has a range, an ``annotated_types.Unit`` and a
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
-    branch : the parameter for whose values runs share increments: the run of a larger value goes
-        on where that of a smaller one ends, or leaves it later; empty where there is none
+    branch : name of the branch parameter: runs that differ only in it share increments. The run of
+        a larger value continues that of a smaller one, or leaves it later. Empty if there is none
     model : (parameters) -> bodies and contact; the same for all values of ``branch``
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
-    view : (parameters) -> where results are taken
-    places : (parameters) -> places that have names, and numbers requested at them, where there are
+    view : (parameters) -> positions of results
+    places : (parameters) -> named places and numbers requested at them
     outputs : functions that compute quantities of a complete run
     costs : functions that compute quantities of every run, also of one that failed
-    method : (parameters) -> how runs that differ in ``branch`` are computed; `by_increments`
-        where there is none
-    trace : (samples, states of a lap) -> what is kept of each lap
-    watch : (parameters, samples, converged increment) -> what is kept of it in
-        ``outcome.history``
-    refinement : (parameters) -> how increments are halved, or None to take those of the program
-    effort : (parameters, values of ``branch``) -> the work of walking this path, told in
-        microseconds, without a mesh; without it a study is estimated by its runs alone
+    method : (parameters) -> method that computes runs that differ in ``branch``; without it
+        `by_increments`
+    trace : (samples, states of a lap) -> data stored for each lap in ``outcome.traces``
+    watch : (parameters, samples, converged increment) -> data stored for it in ``outcome.history``
+    refinement : (parameters) -> how increments are halved, or None for those of the program
+    effort : (parameters, values of ``branch``) -> work of the loading path, counted without a mesh
+        in microseconds; without it a study is estimated from its runs alone
     warnings : (run) -> texts for the user, added to the message of its record
-    advice : for an outcome, what the user can do
-    quantities : numbers that only this scene has
+    advice : status -> what the user can do
+    quantities : quantities that only this scene declares
     source : digest of the data it was made from, if any; it counts in the ids of runs
-    allow : what every study of it allows: ``large_strain`` takes runs outside small-strain theory
-        as ok
+    allow : what all its studies allow: with ``large_strain`` runs outside small-strain theory are
+        ok
     """
 
     name: str
@@ -95,9 +93,8 @@ class Scene:
     def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
         """Yield one record for each value of the branch parameter, in increasing order.
 
-        A scene without one yields a single record.
-
-        Each is yielded as soon as it is known; a failed run gives a record too.
+        Each is yielded as soon as it is known, also that of a failed run. A scene without a branch
+        parameter yields one record.
         """
         runs = [parameters]
         if self.branch:
@@ -116,7 +113,7 @@ class Scene:
             status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
             messages = (*run.notes, str(run.outcome.error))
             return self._labelled(run, status, messages, cost)
-        from solver.results.audit.stored import stored  # only who computes needs the solver
+        from solver.results.audit.stored import stored  # loads scipy
 
         check = run.check()
         status = Status.OUTSIDE_THEORY if check.outside else Status.OK
@@ -126,20 +123,20 @@ class Scene:
         values = {**cost, **figures, **_merged(run, (singular_points, *self.outputs))}
         written = self._labelled(run, Status.OK, (), values)
         places = self.places(run.parameters) if self.places else None
-        last = stored(run, written, self.view(run.parameters), places)
-        violations = check.violations + last.violations
+        comparison = stored(run, written, self.view(run.parameters), places)
+        violations = check.violations + comparison.violations
         if violations:
             status = Status.AUDIT_FAILED
         messages = violations + check.outside + run.notes + check.warnings + own
         return replace(
             written,
             status=status,
-            message=self._told(status, messages),
-            scalars={**written.scalars, "audit_stored": last.figure},
+            message=self._message(status, messages),
+            scalars={**written.scalars, "audit_stored": comparison.figure},
             mesh=partial(mesh_fields, run.samples.fields, states),
         )
 
-    def _told(self, status: Status, messages: tuple[str, ...]) -> str:
+    def _message(self, status: Status, messages: tuple[str, ...]) -> str:
         advice = self.advice.get(status)
         return "; ".join((*messages, advice) if advice else messages)
 
@@ -150,7 +147,7 @@ class Scene:
         return Record(
             parameters=run.parameters,
             status=status,
-            message=self._told(status, messages),
+            message=self._message(status, messages),
             coordinates={**run.view.coordinates, **own},
             fields={
                 q.name: (q.dims, value)
@@ -175,8 +172,8 @@ def _merged(run: FinishedRun, outputs: Sequence[Output]) -> Values:
 
 
 def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterator[FinishedRun]:
-    """Walk the programs of runs that differ in the branch parameter; yield each when known."""
-    # only who computes needs the solver, which takes half a second to import
+    """Solve the programs of runs that differ in the branch parameter; yield each when finished."""
+    # these take half a second to import
     from solver.contact.system import System
     from solver.loading.walker import Walker
     from solver.results.audit.pairs import untouched
@@ -205,8 +202,8 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             tally = outcome.tally
             return audit(system, loaded, unloaded, tally.dissipation, tally.lost)
 
-        # of a run that stopped nobody knows which pairs would have touched
-        never = () if outcome.error else untouched(system, outcome.points.values())
+        # in the rest of a run that failed, any pair could have come into contact
+        notes = () if outcome.error else untouched(system, outcome.points.values())
         yield FinishedRun(
             parameters=run,
             samples=samples,
@@ -214,12 +211,12 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
             outcome=outcome,
             check=check,
             singular=system.model.singular,
-            notes=(*system.model.doubts, *never),
+            notes=(*system.model.doubts, *notes),
         )
 
 
 def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:
-    """Return the function to call after each increment: it tells the monitor the share done."""
+    """Return a function to call after each increment, which reports the share done."""
     expected = walked(programs)
     done = 0
 

@@ -1,12 +1,12 @@
-"""The timetable of passes over a track: set down, drive, roll, release, return.
+"""The loading history of passes over a track: set down, drive, roll, release, return.
 
-One pass takes the times
+The times of a pass:
 
 ====================  =====================================================================
 0 to 1                the load grows where the pass begins
-1 to 2                the moment grows (left out where there is none)
+1 to 2                the moment grows (left out if there is none)
 then 1 per millimetre the axle advances to the other end
-then 1                the load is released, and the bodies are taken apart
+then 1                the load is released, and the bodies are separated
 then 1                the axle goes to where the next pass begins
 ====================  =====================================================================
 """
@@ -22,11 +22,12 @@ from solver.loading.program import Lap, Program, Stage
 from solver.model.amplitude import Amplitude
 
 _ROUNDING = 1e-6
+"""Difference below which two times are the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Schedule:
-    """The timetable of ``n`` passes.
+    """The loading history of ``n`` passes.
 
     Attributes
     ----------
@@ -35,7 +36,7 @@ class Schedule:
     step : advance of an increment [mm]
     directions : (n,) +1 or -1, direction of each pass along x
     driven : whether a moment acts
-    press, release : increments of loading and of unloading
+    press, release : numbers of increments of loading and of unloading
     """
 
     n: int
@@ -83,7 +84,7 @@ class Schedule:
         return min(max(time - (number * self.duration + driven), 0.0), self.track)
 
     def place(self, time: float) -> str:
-        """Return the words for a time in messages: which pass, and how far."""
+        """Return the text for a time in messages: the pass and its progress."""
         number = int(time / self.duration + _ROUNDING)
         since = max(0.0, time - number * self.duration)
         loaded, driven, arrived, released, _ = self.marks
@@ -96,14 +97,14 @@ class Schedule:
 
     @property
     def load(self) -> Amplitude:
-        """Share of the load over time."""
+        """Factor of the load over time."""
         return self._amplitude([(0.0, 1.0, 1.0, 1.0, 0.0)] * self.n)
 
     @property
     def drive(self) -> Amplitude:
-        """Share of the moment over time, with the direction of the pass as its sign."""
-        share = float(self.driven)
-        return self._amplitude([(0.0, 0.0, way * share, way * share, 0.0)
+        """Factor of the moment over time, with the direction of the pass as its sign."""
+        factor = float(self.driven)
+        return self._amplitude([(0.0, 0.0, way * factor, way * factor, 0.0)
                                 for way in self.directions])  # fmt: skip
 
     @property
@@ -118,14 +119,14 @@ class Schedule:
         return self._amplitude([(float(way),) * 5 for way in self.directions])
 
     def _amplitude(self, values: list[tuple[float, ...]]) -> Amplitude:
-        """Return the amplitude with a value at each mark of each pass, its start first."""
+        """Return the amplitude with these values at the start and the first marks of each pass."""
         starts = [(0.0, *self.marks[:-1])] * self.n
         time = [k * self.duration + mark for k, marks in enumerate(starts) for mark in marks]
         return Amplitude(np.array(time), np.array(values).ravel())
 
     @property
     def program(self) -> Program:
-        """The passes as a loading history, one lap each."""
+        """The passes as a program, a lap for each."""
         return Program(
             laps=tuple(self._lap(k * self.duration) for k in range(self.n)),
             cycle=self.cycle,

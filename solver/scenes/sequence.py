@@ -1,4 +1,4 @@
-"""Passes of different loads, one after the other: traffic."""
+"""A sequence of passes with different loads."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _MOST_TIMES = 1000
 
 
 def block_of(parameters: Any, sequence: Sequence[Mapping[str, float | str]]) -> tuple[Any, ...]:
-    """Return the parameters of each pass of a sequence; those of equal passes are one object.
+    """Return the parameters of each pass of a sequence; passes of one entry share an object.
 
     Raises
     ------
     ModelError
-        naming the entry and its field
+        naming the entry and its field, if a parameter is wrong or cannot differ between passes
     """
     block: list[Any] = []
     for number, entry in enumerate(sequence):
@@ -42,7 +42,7 @@ def block_of(parameters: Any, sequence: Sequence[Mapping[str, float | str]]) -> 
 
 
 def _times(value: Any) -> int:
-    """Return how often an entry stands for a pass."""
+    """Return the number of passes of an entry."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if not number or not 1 <= value <= _MOST_TIMES or value != int(value):
         raise ModelError(_TIMES, value, f"must be an integer from 1 to {_MOST_TIMES}")

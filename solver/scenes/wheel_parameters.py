@@ -1,4 +1,4 @@
-"""Parameters of a wheel that presses and drives: the elastic Hertz contact that they stand for."""
+"""Parameters of a wheel under load, and its elastic Hertz contact."""
 
 from __future__ import annotations
 
@@ -22,27 +22,28 @@ class WheelParameters(ContactParameters):
         502.0, "uniaxial yield stress Re of the half-space"
     )
     load_ratio: Annotated[float, Interval(gt=0.0, le=10.0), Unit("1")] = described(
-        1360.0 / 502.0, "peak pressure of the elastic Hertz contact / yield stress"
+        1360.0 / 502.0,
+        "ratio of the peak pressure of the elastic Hertz contact to the yield stress",
     )
     friction: Friction = described(0.3, "Coulomb friction coefficient")
     traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
         0.0,
-        "longitudinal force / full slip force: positive brakes, negative accelerates, 1 is a "
-        "locked wheel",
+        "ratio of the longitudinal force to that of full slip: positive brakes, negative "
+        "accelerates, 1 is a locked wheel",
     )
     control: Literal["moment", "creepage"] = described(
         "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
     )
     given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
         0.0,
-        "1 + R d(rotation) / d(advance) of a wheel that turns as prescribed: positive brakes",
+        "creepage 1 + R d(rotation) / d(advance) of a prescribed rotation: positive brakes",
     )
     radius: Length = described(334.92, "radius R of the wheel")
     wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
-        1.0, "Young's modulus of the wheel / that of the half-space"
+        1.0, "ratio of Young's modulus of the wheel to that of the half-space"
     )
     wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
-        "same", "Poisson ratio of the wheel, or that of the half-space"
+        "same", "Poisson ratio of the wheel; same: that of the half-space"
     )
     wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
         0.0, "angle by which the wheel is turned before it is set down"
@@ -58,7 +59,7 @@ class WheelParameters(ContactParameters):
             raise ModelError("traction", self.traction, allowed)
         prescribed = self.control == "creepage"
         if prescribed and self.traction:
-            raise ModelError("traction", self.traction, "must be 0 where creepage is given")
+            raise ModelError("traction", self.traction, "must be 0 with control = creepage")
         if self.given_creepage and not prescribed:
             raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
 

@@ -1,4 +1,4 @@
-"""Scenes as data: a file of tables, and a mesh beside it, become a `Scene` like the built-in ones.
+"""Scene files: tables, with mesh files beside them, from which a `Scene` is made.
 
 ``scene.toml`` -> `description.Description` -> `scene.file_scene` -> `Scene`
 """

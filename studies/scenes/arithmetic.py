@@ -18,7 +18,7 @@ from functools import lru_cache
 from typing import Any, TypeGuard
 
 LONGEST = 200
-"""Characters an expression may have."""
+"""Largest number of characters of an expression."""
 
 FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
     "sqrt": (math.sqrt, 1),
@@ -35,7 +35,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
     "min": (min, 2),
     "max": (max, 2),
 }
-"""Name -> function, number of its arguments; angles are in radians."""
+"""Name -> function and number of its arguments; angles are in radians."""
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.Add: operator.add,
@@ -59,16 +59,17 @@ _PARAMETER = re.compile(r"\$([A-Za-z_]\w*)", re.ASCII)
 _WORD = re.compile(r"'[A-Za-z0-9_ .-]*'", re.ASCII)
 _CHOICE = re.compile(r"\bif\s*\(", re.ASCII)
 _MARK, _IF = "parameter__", "if__"
-"""What stands for ``$`` and for ``if`` where Python reads the text."""
+"""Names that replace ``$`` and ``if`` in the text that Python parses."""
 _FOREIGN = re.compile(rf"\*\*|//|{_MARK}|{_IF}|[^\w\s$.,()*/^+<>=!-]", re.ASCII)
+"""What an expression must not contain outside of words."""
 
 
 class ExpressionError(ValueError):
-    """An expression that makes no sense; the message says what is wrong with it."""
+    """An expression that has no value; the message says why."""
 
 
 def is_expression(value: object) -> bool:
-    """Tell whether a value of a table is to be evaluated: a text with a ``$``."""
+    """Tell whether a value of a table is an expression: a text with a ``$``."""
     return isinstance(value, str) and "$" in value
 
 
@@ -78,19 +79,18 @@ def names(text: str) -> set[str]:
 
 
 def evaluated(text: str, values: Mapping[str, Any]) -> Any:
-    """Return the value of an expression.
+    """Return the value of an expression: a number, a word, or true or false.
 
-    A text that is one parameter and nothing else, such as ``"$hardening"``, has its value, which
-    may be a word or a truth value; all others are numbers, words, or true or false.
+    The value of a text that is one parameter, such as ``"$hardening"``, is that of the parameter.
 
     Parameters
     ----------
-    values : of the parameters
+    values : values of the parameters
 
     Raises
     ------
     ExpressionError
-        where the text cannot be read, names an unknown parameter, or is no finite number
+        if the text cannot be read, names an unknown parameter, or is no finite number
     """
     if len(text) > LONGEST:
         raise ExpressionError(f"must be at most {LONGEST} characters long")
@@ -109,6 +109,7 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
 
 @lru_cache(maxsize=1024)
 def _read(text: str) -> ast.expr:
+    """Return the syntax tree of an expression."""
     bare = _WORD.sub(lambda word: " " * len(word[0]), text)
     if found := _FOREIGN.search(bare):
         raise ExpressionError(f"cannot be read from {text[found.start() :]!r} on")
@@ -125,7 +126,7 @@ def _read(text: str) -> ast.expr:
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """Return a number, a word, or whether a condition holds."""
+    """Return the value of a node: a number, a word, or true or false."""
     match node:
         case ast.Constant(value=str() as word):
             return word
@@ -148,7 +149,7 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
 
 
 def _compared(node: ast.Compare, values: Mapping[str, Any]) -> bool:
-    """Return whether a comparison of two numbers, or two words, holds."""
+    """Tell whether a comparison of two numbers or two words is true."""
     if len(node.ops) != 1 or type(node.ops[0]) not in _COMPARISONS:
         raise ExpressionError(
             "must compare two values by one of <, <=, >, >=, ==, !=; join more by and, or"
@@ -192,7 +193,7 @@ def _number(node: ast.expr, values: Mapping[str, Any]) -> float:
 
 
 def _operand(node: ast.expr, values: Mapping[str, Any]) -> float:
-    """Return a value that is computed with."""
+    """Return the value of an operand, which must be a number."""
     value = _value(node, values)
     if _is_number(value):
         return value

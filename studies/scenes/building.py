@@ -1,4 +1,4 @@
-"""From tables to a model and its loading; every mistake on the way is kept, none hides another."""
+"""Build model and loading history from the tables of a scene file."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ if TYPE_CHECKING:
     from solver.model.rigid import RigidBody
 
 T = TypeVar("T")
-_BESIDE = (
+_NOT_OF_MODEL = (
     "name", "summary", "parameters.", "derived.", "stages", "loading", "results.", "outputs.",
     "singular", "allow", "accuracy", "checks", "advice",
 )  # fmt: skip
-"""Entries of which the bodies and how they are held do not depend."""
+"""Beginnings of the names of entries on which bodies, supports and contact do not depend."""
 
 
 @dataclass
 class Builder:
-    """Makes the parts of a scene.
+    """Builds the model of a scene and collects all mistakes.
 
     Attributes
     ----------
     scene : its tables, for values of its parameters
-    meshes : mesh files by the name that bodies give
-    mistakes : what was found wrong so far
-    absent : tables with something wrong, such as ``bodies.pin``: stand-ins are in their place
+    meshes : mesh files by the name that bodies give; None if they are not at hand
+    mistakes : the mistakes found so far
+    absent : names of wrong tables, such as ``bodies.pin``, which are replaced by stand-ins
     """
 
     scene: tables.SceneFile
@@ -59,26 +59,23 @@ class Builder:
     _boundaries: dict[str, list[str]] = field(default_factory=dict, init=False)
 
     def model(self) -> Model | None:
-        """Return the model; None where there are mistakes.
-
-        What is told of one table hides nothing of the others.
-        """
+        """Return the model, or None if there are mistakes, which are those of all tables."""
         from solver.model.model import Model
         from solver.model.singular import SingularPoint
 
         t = self.scene
         laws = {
-            name: self.tried(f"materials.{name}", partial(law_of, table))
+            name: self.attempt(f"materials.{name}", partial(law_of, table))
             for name, table in t.materials.items()
         }
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
         for side in t.results.surfaces:
-            self._named("results.surfaces", *side.split("."))
-        if self._hurt():
+            self._has_boundary("results.surfaces", *side.split("."))
+        if self._is_incomplete():
             return None
-        return self.tried(
+        return self.attempt(
             "",
             lambda: Model(
                 bodies=tuple(filter(None, bodies)),
@@ -88,8 +85,8 @@ class Builder:
             ),
         )
 
-    def tried(self, where: str, make: Callable[[], T]) -> T | None:
-        """Return what is made; None where it fails, which is kept as a mistake of an entry."""
+    def attempt(self, where: str, make: Callable[[], T]) -> T | None:
+        """Return the result of a function; None if it fails, which is added to the mistakes."""
         try:
             return make()
         except ModelError as error:
@@ -97,10 +94,10 @@ class Builder:
             self.mistakes.append(StudyError(name, error.value, error.allowed))
             return None
 
-    def _hurt(self) -> bool:
-        """Whether something is wrong that the model is made of."""
+    def _is_incomplete(self) -> bool:
+        """Tell whether a part of the model is absent or wrong."""
         fields = [*self.absent, *(mistake.field for mistake in self.mistakes)]
-        return any(not field.startswith(_BESIDE) for field in fields)
+        return any(not field.startswith(_NOT_OF_MODEL) for field in fields)
 
     # -- bodies ------------------------------------------------------------------------------
 
@@ -110,37 +107,39 @@ class Builder:
         from solver.model.body import Body
 
         where = f"bodies.{name}"
-        lost = table.mesh is not None and self.meshes is not None and table.mesh not in self.meshes
-        if lost or where in self.absent or (table.mesh is None and table.shape is None):
-            return None  # that is told already
+        no_file = (
+            table.mesh is not None and self.meshes is not None and table.mesh not in self.meshes
+        )
+        if no_file or where in self.absent or (table.mesh is None and table.shape is None):
+            return None  # reported already
         at = where if table.shape is None else f"{where}.shape"
-        as_made = self.tried(at, lambda: _made(table, self.meshes))
-        mesh = self.tried(where, lambda: _placed(as_made, table)) if as_made else None
+        given = self.attempt(at, lambda: _given_mesh(table, self.meshes))
+        mesh = self.attempt(where, lambda: _placed_mesh(given, table)) if given else None
         if mesh is None:
             return None
         self._boundaries[name] = list(mesh.boundaries or {})
         supports = {
             boundary: held
             for boundary, held in table.supports.items()
-            if self._named(f"{where}.supports.{boundary}", name, boundary)
+            if self._has_boundary(f"{where}.supports.{boundary}", name, boundary)
         }
         loads = [
             self._load(k, load)
             for k, load in enumerate(self.scene.loads)
             if load.body == name
-            and self._named(f"loads[{k}].boundary", name, getattr(load, "boundary", None))
+            and self._has_boundary(f"loads[{k}].boundary", name, getattr(load, "boundary", None))
         ]
         law = laws.get(table.material)
         if law is None:
             return None
-        return self.tried(
+        return self.attempt(
             where,
             lambda: Body(
                 name=name,
                 mesh=mesh,
                 material=law,
                 kinematics=self.scene.kinematics,
-                element=table.element or usual_element(mesh),
+                element=table.element or default_element(mesh),
                 thickness=self.scene.thickness,
                 supports=supports,
                 loads=tuple(filter(None, loads)),
@@ -159,7 +158,7 @@ class Builder:
                 start, end = np.radians(surface.angles)
                 surfaces[each] = arc(surface.centre, surface.radius, (start, end), surface.edges)
                 continue
-            chain = self.tried(f"rigid.{name}.surfaces.{each}", surface.chain)
+            chain = self.attempt(f"rigid.{name}.surfaces.{each}", surface.chain)
             if chain is None:
                 return None
             surfaces[each] = RigidSurface(points=chain)
@@ -171,7 +170,7 @@ class Builder:
                 motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude)
             else:
                 motions[axis] = Moved(value=motion.moved or 0.0, amplitude=amplitude)
-        return self.tried(
+        return self.attempt(
             f"rigid.{name}",
             lambda: RigidBody(
                 name=name,
@@ -182,8 +181,8 @@ class Builder:
             ),
         )
 
-    def _named(self, field: str, body: str, boundary: str | None) -> bool:
-        """Whether a body has a boundary, or need not have; it is a mistake where it has not."""
+    def _has_boundary(self, field: str, body: str, boundary: str | None) -> bool:
+        """Tell whether a body has a boundary, and add a mistake if not; None needs no boundary."""
         known = self._boundaries.get(body)
         if boundary is None or known is None or boundary in known:
             return True
@@ -191,21 +190,21 @@ class Builder:
         self.mistakes.append(StudyError(field, boundary, allowed + nearest(boundary, known)))
         return False
 
-    # -- what acts ---------------------------------------------------------------------------
+    # -- loads and contact -------------------------------------------------------------------
 
     def _load(self, k: int, table: tables.LoadTable) -> Load | None:
         where = f"loads[{k}]"
         amplitude = self._amplitude(where, getattr(table, "amplitude", None))
-        return self.tried(where, lambda: load_of(table, amplitude))
+        return self.attempt(where, lambda: load_of(table, amplitude))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
 
         slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
         for side, (body, boundary) in (("slave", slave), ("master", master)):
-            self._named(f"contacts[{k}].{side}", body, boundary)
+            self._has_boundary(f"contacts[{k}].{side}", body, boundary)
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
-        return self.tried(
+        return self.attempt(
             f"contacts[{k}]",
             lambda: ContactPair(
                 slave=(slave[0], slave[1]),
@@ -219,45 +218,43 @@ class Builder:
         )
 
     def _amplitude(self, where: str, given: tables.Amplitude | None) -> Amplitude | None:
-        """Return a load factor over time: time k is the end of the k-th stage."""
+        """Return a load factor over time; stage k ends at time k."""
         stages = self.scene.stages
         if not stages:
             if given is not None:
                 allowed = "needs stages: with loading all loads grow together"
                 self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
             return None
-        values, now = [0.0], 0.0 if given is not None else 1.0
+        values = [0.0]
         for stage in stages:
-            if given is None:
-                values.append(0.0 if stage.release else 1.0)
-                continue
-            now = given.get(stage.name, 0.0 if stage.release else now)
-            values.append(now)
+            usual = 1.0 if given is None else values[-1]
+            values.append((given or {}).get(stage.name, 0.0 if stage.release else usual))
         return Amplitude(np.arange(len(values), dtype=float), np.array(values))
 
-    def program(self) -> Program:
-        """Return the loading history."""
-        loading = self.scene.loading
-        if loading is not None:
-            step = loading.step or loading.factor
-            if loading.cycles is None:
-                return load_and_release(loading.factor, step, loading.release_increments)
-            return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
-        stages = tuple(
-            Stage(
-                name=stage.name,
-                target=float(k + 1),
-                steps=stage.increments,
-                apart=stage.release,
-                turns=k > 0,
-            )
-            for k, stage in enumerate(self.scene.stages)
+
+def program_of(scene: tables.SceneFile) -> Program:
+    """Return the loading history."""
+    loading = scene.loading
+    if loading is not None:
+        step = loading.step or loading.factor
+        if loading.cycles is None:
+            return load_and_release(loading.factor, step, loading.release_increments)
+        return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
+    stages = tuple(
+        Stage(
+            name=stage.name,
+            target=float(k + 1),
+            steps=stage.increments,
+            apart=stage.release,
+            turns=k > 0,
         )
-        return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
+        for k, stage in enumerate(scene.stages)
+    )
+    return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
 
 
 def _place(names: list[str]) -> Any:
-    """Return the words for a time: the stage, and how much of it is done."""
+    """Return the function that gives the text for a time: the stage and the share of it done."""
 
     def words(time: float) -> str:
         k = min(max(math.ceil(time - 1e-9) - 1, 0), len(names) - 1)
@@ -272,14 +269,15 @@ def law_of(table: Any) -> Law:
     Raises
     ------
     ModelError
-        naming the entry, if those of its rule are wrong or do not go with its yield condition
+        naming the entry, if the hardening rule does not accept it or if the yield condition does
+        not allow the rule
     """
     given = table.given()
     return MaterialParameters(**given).material(elastic="yield_stress" not in given)
 
 
 def friction_of(table: tables.PairTable) -> FrictionLaw:
-    """Return the law of friction of a contact pair."""
+    """Return the friction law of a contact pair."""
     return FRICTION.made(table.friction_law, table)
 
 
@@ -290,30 +288,30 @@ def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
     return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
 
 
-def usual_element(mesh: Mesh) -> str:
+def default_element(mesh: Mesh) -> str:
     """Return the element of a body that names none."""
     return "quad8" if mesh.t.shape[0] == 4 else "tri6"
 
 
 def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
-    """Return the mesh of a body where it stands, with the boundaries of its table."""
-    return _placed(_made(table, meshes), table)
+    """Return the mesh of a body at its position, with cuts and boundaries."""
+    return _placed_mesh(_given_mesh(table, meshes), table)
 
 
-def _made(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
-    """Return the mesh of a body as its shape or its file has it."""
+def _given_mesh(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
+    """Return the mesh of the shape or of the file of a body."""
     from solver.mesh.elements import known_elements
 
     if table.mesh is None:
-        kind = known_elements().get(table.element or "")  # the body refuses one that is unknown
+        kind = known_elements().get(table.element or "")  # `Body` refuses an unknown element
         return mesh_of(table.shape, kind.cells if kind else "quad")
     if meshes is None:
         raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")
     return meshes[table.mesh].mesh(table.part)
 
 
-def _placed(mesh: Mesh, table: tables.BodyTable) -> Mesh:
-    """Return a mesh where its body stands, with the cuts and the boundaries of its table."""
+def _placed_mesh(mesh: Mesh, table: tables.BodyTable) -> Mesh:
+    """Return the mesh moved to the position of its body, with cuts and boundaries."""
     if any(table.move):
         mesh = mesh.translated(table.move)
     for name, cut in table.cuts.items():

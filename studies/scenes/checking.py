@@ -1,4 +1,4 @@
-"""What entries of a scene file say of each other: names that must exist, choices of one."""
+"""Mistakes between the entries of a scene file, such as names that do not exist."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from studies.scenes.arithmetic import is_expression
 from studies.scenes.description import LARGEST
 
 RESERVED = frozenset({"status", "message", "id", "scene", "name", "title", "created"})
-"""Names that a data set or a query has already."""
+"""Names that data sets and queries use for something else."""
 
 
-def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:
-    """Yield what entries say of each other that cannot be.
+def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:
+    """Yield contradictions between entries, and names that do not exist.
 
     Parameters
     ----------
-    meshes : names of the mesh files that are there; None where this does not matter
+    meshes : names of the mesh files beside the scene file; None leaves this check out
     """
     yield from _bodies(scene, None if meshes is None else set(meshes))
     yield from _loads(scene)
@@ -43,23 +43,23 @@ def clashes(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[S
         yield from _one_of(f"checks[{k}].parameter", check.parameter, scene.names)
 
 
-def unmet(scene: tables.SceneFile, values: Mapping[str, Any]) -> Iterator[StudyError]:
-    """Yield the parameters that the checks of a file refuse, for these values of them."""
+def failed_checks(scene: tables.SceneFile, values: Mapping[str, Any]) -> Iterator[StudyError]:
+    """Yield the checks of a file that fail; ``values`` are those of the parameters."""
     for check in scene.checks:
         if not check.that:
             yield StudyError(check.parameter, values.get(check.parameter), check.allowed)
 
 
-def declarations(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyError]:
-    """Yield what is wrong with declared parameters; see `defaults` for those without a value.
+def wrong_parameters(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyError]:
+    """Yield mistakes in declared parameters that have a default.
 
     Parameters
     ----------
-    used : those that some entry names
+    used : parameters that some entry uses
     """
     for name, each in scene.declared.items():
         field, default = f"parameters.{name}", each.default
-        if default is None:  # that is told already
+        if default is None:  # see `wrong_accuracies`
             continue
         number = isinstance(default, int | float) and not isinstance(default, bool)
         if name in QUANTITIES or name in RESERVED:
@@ -67,28 +67,30 @@ def declarations(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyError
         if iskeyword(name):
             yield StudyError(field, name, "is a word of the language Python: choose another")
         if number and not -LARGEST <= default <= LARGEST:  # type: ignore[operator]
-            yield StudyError(f"{field}.default", default, f"must be at most {LARGEST:g} in size")
+            allowed = f"must be at most {LARGEST:g} in absolute value"
+            yield StudyError(f"{field}.default", default, allowed)
         if name not in used and not (scene.accuracy and name == tables.ACCURACY):
-            yield StudyError(field, default, f"has no effect: no entry says ${name}")
+            yield StudyError(field, default, f"has no effect: no entry uses ${name}")
         if is_expression(default):
-            yield StudyError(f"{field}.default", default, "must be a value; see derived")
+            allowed = "must be a value; [derived] may have expressions"
+            yield StudyError(f"{field}.default", default, allowed)
             continue
         if each.range is not None and not number:
-            yield StudyError(f"{field}.range", each.range, "goes with a number as default")
+            yield StudyError(f"{field}.range", each.range, "needs a number as default")
         elif each.range is not None and not each.range[0] <= default <= each.range[1]:  # type: ignore[operator]
             low, high = each.range
             yield StudyError(
                 f"{field}.default", default, f"must be in its range, {low:g} to {high:g}"
             )
         if isinstance(default, str) and each.choices is None:
-            yield StudyError(f"{field}.choices", None, "must be given where the default is a word")
+            yield StudyError(f"{field}.choices", None, "must be given if the default is a word")
         elif each.choices is not None and default not in each.choices:
             listed = ", ".join(each.choices)
             yield StudyError(f"{field}.default", default, f"must be one of its choices: {listed}")
 
 
-def defaults(scene: tables.SceneFile) -> Iterator[StudyError]:
-    """Yield what is wrong with the numbers that ``accuracy`` sets, and those that nothing sets."""
+def wrong_accuracies(scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield mistakes in the numbers that ``accuracy`` sets, and parameters that have no default."""
     for name, each in scene.parameters.items():
         if each.default is None and (scene.accuracy is None or name not in scene.accuracy.standard):
             allowed = "must be given, or a number in each table of accuracy"
@@ -105,10 +107,10 @@ def defaults(scene: tables.SceneFile) -> Iterator[StudyError]:
             field, value = f"accuracy.{level}.{name}", numbers.get(name)
             known = scene.parameters.get(name)
             if value is None or known is None or known.default is not None:
-                allowed = "every accuracy must set the same parameters, none with a default"
+                allowed = "every accuracy must set the same parameters, which have no default"
                 yield StudyError(field, value, allowed)
             elif type(value) is float and known.unit == "1" and type(usual[name]) is int:
-                yield StudyError(field, value, "must be an integer, as it is for standard")
+                yield StudyError(field, value, "must be an integer, as for standard")
             elif known.range is not None and not known.range[0] <= value <= known.range[1]:
                 low, high = known.range
                 yield StudyError(field, value, f"must be in its range, {low:g} to {high:g}")
@@ -128,9 +130,9 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             given = "both" if body.shape else None
             yield StudyError(f"{where}.shape", given, "must be given, or mesh: one of the two")
         if body.part is not None and body.mesh is None:
-            yield StudyError(f"{where}.part", body.part, "goes with mesh")
+            yield StudyError(f"{where}.part", body.part, "needs mesh")
         if body.mesh is not None and meshes is not None and body.mesh not in meshes:
-            yield StudyError(f"{where}.mesh", body.mesh, "there is no such file with the scene")
+            yield StudyError(f"{where}.mesh", body.mesh, "there is no such file beside the scene")
         boxes: dict[str, tables.BoundaryTable | tables.CutTable] = {}
         boxes |= {f"boundaries.{other}": box for other, box in body.boundaries.items()}
         boxes |= {f"cuts.{other}": cut for other, cut in body.cuts.items()}
@@ -205,8 +207,8 @@ def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
         yield from _one_of(f"results.points.{name}.body", point.body, scene.bodies)
 
 
-def lacking(scene: tables.SceneFile) -> Iterator[StudyError]:
-    """Yield the outputs that are asked for and need what the file has not."""
+def unmet_needs(scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield the requested outputs that need something that the file does not have."""
     taken = scene.results
     there: Mapping[Need, tuple[bool, str]] = {
         "map": (taken.map is not None, "results.map"),
@@ -221,7 +223,7 @@ def lacking(scene: tables.SceneFile) -> Iterator[StudyError]:
                    if not is_there]  # fmt: skip
         if missing:
             yield StudyError("results.outputs", word, f"needs {', '.join(missing)}")
-    bodies = [side.partition(".")[0] for side in taken.surfaces]
+    bodies = [side.partition(".")[0] for side in taken.surfaces]  # those with results
     if taken.profile and bodies:
         yield from _one_of("results.profile.body", taken.profile.body, bodies)
 
@@ -238,7 +240,7 @@ def _spaced(where: str, axis: tables.Spaced) -> Iterator[StudyError]:
     ]
     yield from wrong
     if not wrong and not (np.diff(tables.positions(axis)) > 0).all():
-        yield StudyError(where, "several pieces", "must follow each other, in increasing places")
+        yield StudyError(where, "several pieces", "must be in increasing order without overlap")
 
 
 def _piece(where: str, axis: tables.SpacedTable) -> Iterator[StudyError]:
@@ -270,15 +272,15 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
         fitting = ("body", "line") if output.of in of_body(2) else ("contact",)
         given = {key: getattr(output, key) for key in places if getattr(output, key) is not None}
         if len(given) != 1 or not set(given) <= set(fitting):
-            allowed = f"needs one of {', '.join(fitting)}, where {output.of} is taken"
+            allowed = f"needs one of {', '.join(fitting)} for {output.of}"
             yield StudyError(where, given, allowed)
             continue
         ((key, value),) = given.items()
         yield from _one_of(f"{where}.{key}", value, places[key])
         if key == "body" and output.take in ("integral", "extent"):
-            yield StudyError(f"{where}.take", output.take, "goes with a line or a contact")
+            yield StudyError(f"{where}.take", output.take, "needs a line or a contact")
         if key != "body" and (output.x or output.y):
-            yield StudyError(where, given, "a box of x and y goes with a body")
+            yield StudyError(where, given, "a box of x and y needs a body")
 
 
 def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -291,9 +293,8 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
     }
     for field, names in groups.items():
         for name in names:
-            own_name = "two have this name: each needs one of its own"
-            allowed = "stands twice" if field.startswith("results.") else own_name
-            yield StudyError(field, name, allowed)
+            listed, named = "is listed twice", "two have this name: give each its own"
+            yield StudyError(field, name, listed if field.startswith("results.") else named)
     taken = {*QUANTITIES, *RESERVED, *scene.names}
     for name in scene.outputs:
         own = {name, *(f"{name}_{axis}" for axis in AXES)}

@@ -1,4 +1,4 @@
-"""What a scene file says: its tables, evaluated for values of its parameters, and its mistakes."""
+"""The content of a scene file, and its tables evaluated for values of its parameters."""
 
 from __future__ import annotations
 
@@ -24,38 +24,38 @@ from studies.scenes.tables import ACCURACY, OPEN, ParameterTable, SceneFile
 from studies.toml import toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
-"""Entries of a scene file in which no parameter stands, and the table of derived numbers."""
+"""Entries of a scene file without expressions of parameters, and the derived numbers."""
 
 LARGEST = 1e100
-"""Largest number that a parameter may have by default."""
+"""Largest absolute value of the default of a parameter."""
 
 WHEN = "when"
-"""Entry of a table that is left out where it is false."""
+"""Entry of a table: the condition without which the table is left out."""
 
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
 
+_LEAST = {
+    "name": "scene",
+    "materials": {"m": {"youngs_modulus": 1.0, "poisson_ratio": 0.3}},
+    "bodies": {"b": {"material": "m"}},
+}
+"""The required entries of a scene file, to check some other entries alone."""
+
 _LEFT_OUT = object()
-"""What stands for a table whose condition is false."""
+"""Stands for a table whose condition is false."""
 
 Mistakes = dict[Where, StudyError | None]
-"""What is wrong by its place; None where the cause is told elsewhere."""
-
-
-class _Evaluated(NamedTuple):
-    """A tree whose expressions have been evaluated, and those that have no value."""
-
-    tree: Any
-    mistakes: Mistakes
+"""Mistakes by place; None if the mistake that causes it is at another place."""
 
 
 class Readable(NamedTuple):
-    """What can be read of a scene file.
+    """The readable part of a scene file.
 
     Attributes
     ----------
-    tables : with stand-ins where there are mistakes; None where too little is left
-    wrong : the mistakes by their places
+    tables : with stand-ins for wrong tables; None if too little is left
+    wrong : the mistakes by place
     own : see `mending.Mended`
     """
 
@@ -65,7 +65,7 @@ class Readable(NamedTuple):
 
     @property
     def mistakes(self) -> list[StudyError]:
-        """What is told."""
+        """The mistakes to report, without those that another mistake causes."""
         return [mistake for mistake in self.wrong.values() if mistake]
 
 
@@ -76,9 +76,9 @@ class Description:
     Attributes
     ----------
     file : name of the file, for messages
-    content : its tables, as TOML or JSON holds them
-    meshes : mesh files by the name that bodies give; None where they are not at hand, so that
-        no model can be built
+    content : its tables, as read from TOML or JSON
+    meshes : mesh files by the name that bodies give; None if they are not at hand, so that no
+        model can be built
     shipped : whether it is a scene of the package, which studies call by its name
     """
 
@@ -94,31 +94,31 @@ class Description:
         Raises
         ------
         StudyError
-            when a file cannot be read, or is no TOML
+            if a file cannot be read or is no TOML
         """
         path = Path(path)
         content = toml_of(_bytes(path), "scene", path.name)
         meshes = {}
         for name in mesh_names(content):
-            if (path.parent / name).is_file():  # one that is not there is a mistake of the file
+            if (path.parent / name).is_file():  # a missing one is a mistake of the scene file
                 meshes[name] = MeshFile(name, _bytes(path.parent / name))
         return cls(path.name, content, meshes, shipped)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what another process makes it of: not what was found of it here."""
+        """Return the fields alone: cached properties do not go to other processes."""
         return Description, (self.file, self.content, self.meshes, self.shipped)
 
     @cached_property
     def digest(self) -> str:
-        """Content id of the file and its meshes, 32 hexadecimal digits; words do not count."""
-        told = json.dumps(_without_words(self.content), sort_keys=True, default=str)
+        """Content id of the file and its meshes, 32 hexadecimal digits; texts do not count."""
+        content = json.dumps(_without_texts(self.content), sort_keys=True, default=str)
         meshes = sorted((self.meshes or {}).items())
-        parts = [told, *(f"{name} {_digest(mesh.data)}" for name, mesh in meshes)]
+        parts = [content, *(f"{name} {_digest(mesh.data)}" for name, mesh in meshes)]
         return _digest("\n".join(parts).encode())[:32]
 
     @cached_property
     def key(self) -> tuple[str, str, bool]:
-        """Content id, the content with its words, and whether the package brings it."""
+        """Content id, content with its texts, and whether it is a scene of the package."""
         return self.digest, json.dumps(self.content, sort_keys=True, default=str), self.shipped
 
     @cached_property
@@ -128,18 +128,18 @@ class Description:
         Raises
         ------
         SceneError
-            where a declaration is wrong
+            if a declaration is wrong
         """
         given = self.content.get("parameters", {})
         stub = {"parameters": given}
         try:
-            return SceneFile.model_validate_json(_json(self._bare() | stub), strict=True).parameters
+            return SceneFile.model_validate_json(_json(_LEAST | stub), strict=True).parameters
         except ValidationError as error:
             raise SceneError(self.file, [*mistakes_of(error, SceneFile).values()]) from None
 
     @cached_property
     def opened(self) -> Declared:
-        """The parameters that open tables bring, and that the file does not declare itself."""
+        """The parameters that open tables declare and the file itself does not."""
         given = self.content.get("parameters")
         own = given.keys() if isinstance(given, Mapping) else ()
         return {
@@ -150,8 +150,8 @@ class Description:
         }
 
     @cached_property
-    def written_out(self) -> Mapping[str, Any]:
-        """The content, open tables with all entries that are parameters."""
+    def completed(self) -> Mapping[str, Any]:
+        """The content; entries left out of open tables are expressions of their parameters."""
         found = dict(self.content)
         for key, entries in OPEN.items():
             whole = {name: f"${name}" for name in entries}
@@ -163,7 +163,7 @@ class Description:
         return found
 
     def parameter_of(self, where: str) -> str:
-        """Return the parameter that an entry of an open table is, or the entry."""
+        """Return an entry, or the parameter that takes its place in an open table."""
         table, _, entry = where.rpartition(".")
         name, _, which = table.replace("[", ".").rstrip("]").partition(".")
         given: Any = self.content.get(name, {})
@@ -176,7 +176,7 @@ class Description:
         Raises
         ------
         SceneError
-            with all entries that are wrong
+            with all wrong entries
         """
         found = self.readable(values)
         if found.tables is None or found.wrong:
@@ -184,7 +184,7 @@ class Description:
         return found.tables
 
     def readable(self, values: Mapping[str, Any]) -> Readable:
-        """Return what can be read for values of all parameters, and what cannot."""
+        """Return the tables for values of all parameters, and the mistakes."""
         tree, wrong = self._evaluated(values)
         try:
             tables = SceneFile.model_validate_json(_json(tree), strict=True)
@@ -195,14 +195,14 @@ class Description:
         rest, own = mended(tree, wrong)
         try:
             return Readable(SceneFile.model_validate_json(_json(rest), strict=True), wrong, own)
-        except ValidationError:  # too little is left, or a name is none
+        except ValidationError:  # too little is left, or a name is wrong
             return Readable(None, wrong, own)
 
     def used(self) -> set[str]:
-        """Return the parameters that some entry names, through derived numbers too."""
+        """Return the parameters that some entry uses, directly or through derived numbers."""
         derived = self._derived
-        told = _without_words(self.written_out)
-        rest = {key: value for key, value in told.items() if key not in PLAIN}
+        completed = _without_texts(self.completed)
+        rest = {key: value for key, value in completed.items() if key not in PLAIN}
         found = set().union(*(names(text) for _, text in _expressions(rest)))
         for name in reversed(list(derived)):
             if name in found and is_expression(derived[name]):
@@ -211,20 +211,20 @@ class Description:
 
     @property
     def declared(self) -> dict[str, Any]:
-        """The defaults as they are written; None where there is none that can be."""
+        """The defaults as written in the file; None for those that no parameter can have."""
         given = self.content.get("parameters")
         tables = given.items() if isinstance(given, Mapping) else ()
         defaults = {str(k): v.get("default") if isinstance(v, Mapping) else None for k, v in tables}
         levels = self._levels({})
         usual = levels.get("standard") if isinstance(levels, Mapping) else None
         if isinstance(usual, Mapping):
-            set_by_it = {k: v for k, v in usual.items() if k in defaults and defaults[k] is None}
-            defaults |= {ACCURACY: "standard"} | set_by_it
-        known = {name: each if _can_be(each) else None for name, each in defaults.items()}
+            from_it = {k: v for k, v in usual.items() if k in defaults and defaults[k] is None}
+            defaults |= {ACCURACY: "standard"} | from_it
+        known = {name: each if _is_value(each) else None for name, each in defaults.items()}
         return known | {name: field.default for name, (_, field) in self.opened.items()}
 
     def _levels(self, mistakes: Mistakes) -> Any:
-        """Return the table of accuracies; texts in it are arithmetic without parameters."""
+        """Return the table of accuracies; its texts are expressions without parameters."""
 
         def numbers(where: Where, value: Any) -> Any:
             if isinstance(value, Mapping):
@@ -242,12 +242,8 @@ class Description:
         given = self.content.get("derived")
         return {str(k): v for k, v in given.items()} if isinstance(given, Mapping) else {}
 
-    def _bare(self) -> dict[str, Any]:
-        """Return the least that a scene file has: to check a part of one."""
-        material = {"youngs_modulus": 1.0, "poisson_ratio": 0.3}
-        return {"name": "scene", "materials": {"m": material}, "bodies": {"b": {"material": "m"}}}
-
-    def _evaluated(self, values: Mapping[str, Any]) -> _Evaluated:
+    def _evaluated(self, values: Mapping[str, Any]) -> tuple[dict[str, Any], Mistakes]:
+        """Return the tables with values in place of expressions, and the mistakes."""
         mistakes: Mistakes = {}
         known = dict(values)
         for name, text in self._derived.items():
@@ -256,19 +252,19 @@ class Description:
             if name in values:
                 allowed = "is a parameter too: give it another name"
                 mistakes[where] = StudyError(dotted(where), text, allowed)
-            elif where not in mistakes and not _can_be(value):
+            elif where not in mistakes and not _is_value(value):
                 mistakes[where] = StudyError(dotted(where), text, "must be a number")
             known[name] = None if where in mistakes else value
         plain = {key: value for key, value in self.content.items() if key in PLAIN}
-        rest = {key: value for key, value in self.written_out.items() if key not in PLAIN}
-        tree: dict[str, Any] = plain | _replaced((), rest, known, mistakes)
+        rest = {key: value for key, value in self.completed.items() if key not in PLAIN}
+        tree: dict[str, Any] = plain | _with_values((), rest, known, mistakes)
         if ACCURACY in tree:
             tree[ACCURACY] = self._levels(mistakes)
-        return _Evaluated(tree, mistakes)
+        return tree, mistakes
 
 
 def mesh_names(content: Mapping[str, Any]) -> list[str]:
-    """Return the names of the mesh files that bodies are read from; none that leads elsewhere."""
+    """Return the names of the mesh files of bodies, without paths to other folders."""
     bodies = content.get("bodies")
     found = (
         [each.get("mesh") for each in bodies.values() if isinstance(each, Mapping)]
@@ -280,7 +276,7 @@ def mesh_names(content: Mapping[str, Any]) -> list[str]:
 
 
 def _open(tables: Any) -> list[Mapping[str, Any]]:
-    """Return the open ones of a collection of tables."""
+    """Return the open tables of a collection."""
     each = tables.values() if isinstance(tables, Mapping) else tables
     return [table for table in each if _is_open(table)] if isinstance(each, Iterable) else []
 
@@ -298,10 +294,10 @@ def _bytes(path: Path) -> bytes:
         raise StudyError("scene", str(path), f"cannot be read: {error.strerror}") from None
 
 
-def _replaced(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
-    """Return a part of the tree with numbers and words in place of expressions.
+def _with_values(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
+    """Return a part of the tree with values in place of expressions, without tables left out.
 
-    Tables that are left out are not in it, and lists are numbered without them.
+    Places in lists count the remaining tables.
     """
     if isinstance(value, Mapping):
         tree = {}
@@ -309,38 +305,39 @@ def _replaced(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mist
             at = (*where, str(key))
             if key == "description" and len(where) == 2 and where[0] in DESCRIBED:
                 tree[str(key)] = each
-            elif (there := _there(at, each, known, mistakes)) is not _LEFT_OUT:
-                tree[str(key)] = _replaced(at, there, known, mistakes)
+            elif (rest := _unconditional(at, each, known, mistakes)) is not _LEFT_OUT:
+                tree[str(key)] = _with_values(at, rest, known, mistakes)
         return tree
     if isinstance(value, list | tuple):
         found: list[Any] = []
         for each in value:
             at = (*where, len(found))
-            if (there := _there(at, each, known, mistakes)) is not _LEFT_OUT:
-                found.append(_replaced(at, there, known, mistakes))
+            if (rest := _unconditional(at, each, known, mistakes)) is not _LEFT_OUT:
+                found.append(_with_values(at, rest, known, mistakes))
         return found
     return _value(where, value, known, mistakes)
 
 
-def _there(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
-    """Return an entry without its condition; `_LEFT_OUT` where this is false.
+def _unconditional(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
+    """Return an entry without its condition; `_LEFT_OUT` if the condition is false.
 
-    A table that names what does not exist stays, so that this is told whatever its condition.
+    A table with unknown parameters is never left out, so that they are always reported.
     """
     if not isinstance(value, Mapping) or isinstance(value.get(WHEN), Mapping | None):
         return value
-    told = value[WHEN]
-    holds = _value((*where, WHEN), told, known, mistakes)
+    condition = value[WHEN]
+    holds = _value((*where, WHEN), condition, known, mistakes)
     rest = {key: each for key, each in value.items() if key != WHEN}
     if (*where, WHEN) not in mistakes and not isinstance(holds, bool):
         allowed = "must be true or false, such as $depth > 0 or $kind == 'round'"
-        mistakes[(*where, WHEN)] = StudyError(dotted((*where, WHEN)), told, allowed)
-    lost = holds is False and all(names(text) <= known.keys() for _, text in _expressions(rest))
-    return _LEFT_OUT if lost else rest
+        mistakes[(*where, WHEN)] = StudyError(dotted((*where, WHEN)), condition, allowed)
+    if holds is False and all(names(text) <= known.keys() for _, text in _expressions(rest)):
+        return _LEFT_OUT
+    return rest
 
 
 def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
-    """Return the value of an expression; None where it has none, or needs what has none."""
+    """Return the value of an expression, or None if it or a parameter of it has none."""
     if not is_expression(value):
         return value
     if any(known.get(name, value) is None for name in names(value)):
@@ -353,8 +350,8 @@ def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistake
         return None
 
 
-def _can_be(value: Any) -> bool:
-    """Tell whether a parameter may have this value: a number or a word, true or false."""
+def _is_value(value: Any) -> bool:
+    """Tell whether a parameter may have this value: a number, a word, true or false."""
     if isinstance(value, int | float):
         return not abs(value) > LARGEST
     return isinstance(value, str) and not is_expression(value)
@@ -371,8 +368,8 @@ def _expressions(value: Any) -> Iterator[tuple[Where, str]]:
         yield (), value
 
 
-def _without_words(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables without summary, descriptions and advice, which make no numbers."""
+def _without_texts(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables without summary, descriptions and advice, which affect no number."""
     return {
         key: {name: _undescribed(each) for name, each in value.items()}
         if key in DESCRIBED and isinstance(value, Mapping)

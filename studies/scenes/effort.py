@@ -1,4 +1,4 @@
-"""What a run of a scene file costs, told from its tables."""
+"""The work of a loading path of a scene file, counted from its tables."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from solver.errors import ModelError
 from solver.scenes.effort import Effort
 from studies.errors import StudyError
 from studies.scenes import tables
+from studies.scenes.body_size import BodySize, is_grid, size_of_grid, size_of_mesh
 from studies.scenes.building import friction_of, load_of, mesh_of_body
-from studies.scenes.lattice import BodySize, is_lattice, size_of_lines, size_of_mesh
 
 if TYPE_CHECKING:
     from studies.scenes.description import Description
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 def effort_of(
     description: Description, scene: tables.SceneFile, increments: Sequence[int]
 ) -> Effort:
-    """Return the work of walking a path.
+    """Return the work of a loading path.
 
     Parameters
     ----------
     scene : tables for the values of its parameters
-    increments : of each of its runs, those that are shared once
+    increments : numbers for its runs, shared increments counted once
 
     Raises
     ------
@@ -43,22 +43,22 @@ def effort_of(
         loads = [load_of(load) for load in scene.loads if load.body == name]
         driven = any(each.components or each.softening(np.zeros((2, 1))) is not None
                      for each in loads)  # fmt: skip
-        # an elastic body is reduced to its contact surfaces
-        reduced = size.on(own) if own and not driven and is_elastic(scene, body) else None
+        # an elastic body is condensed to its contact surfaces
+        condensed = size.on(own) if own and not driven and is_elastic(scene, body) else None
         held = [(b, "xy".index(axis)) for b, axes in body.supports.items() for axis in axes]
         held += [(b, axis) for each in loads for b in each.boundaries for axis in each.components]
         for axis in (0, 1):
             fixed = size.on(boundary for boundary, along in held if along == axis)
-            unknowns += size.nodes if reduced is None else size.count(reduced)
-            unknowns -= size.count(fixed if reduced is None else fixed & reduced)
+            unknowns += size.nodes if condensed is None else size.count(condensed)
+            unknowns -= size.count(fixed if condensed is None else fixed & condensed)
     total = sum(increments)
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
 
 
 def too_large(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
-    """Yield what is wrong with shapes whose meshes need not be made to see it: their size."""
+    """Yield mistakes in shapes that are grids: those that make no mesh, or a too large one."""
     for name, body in scene.bodies.items():
-        if is_lattice(body):
+        if is_grid(body):
             try:
                 _size_of(description, name, body)
             except StudyError as error:
@@ -66,9 +66,9 @@ def too_large(description: Description, scene: tables.SceneFile) -> Iterator[Stu
 
 
 def in_one_increment(scene: tables.SceneFile) -> bool:
-    """Whether one increment solves a run: nothing yields, and all is proportional to the load.
+    """Tell whether one increment solves a run: nothing yields, and all is proportional to the load.
 
-    With friction that is so where surfaces touch all over before loading, as flat ones do.
+    With friction this requires surfaces that touch everywhere before loading, as flat ones do.
     """
     if scene.loading is None or scene.loading.cycles is not None:
         return False
@@ -79,20 +79,20 @@ def in_one_increment(scene: tables.SceneFile) -> bool:
 
 
 def is_elastic(scene: tables.SceneFile, body: tables.BodyTable) -> bool:
-    """Whether the material of a body has no yield stress."""
+    """Tell whether the material of a body has no yield stress."""
     return getattr(scene.materials[body.material], "yield_stress", None) is None
 
 
 def _free_motions(scene: tables.SceneFile) -> int:
-    """Return the number of motions of rigid bodies that forces decide."""
+    """Return the number of motions of rigid bodies that are free under a force."""
     motions = [each for body in scene.rigid.values() for each in (body.x, body.y, body.rotation)]
     return sum(motion.pushed is not None for motion in motions)
 
 
 _SIZES: WeakKeyDictionary[Description, dict[str, BodySize]] = WeakKeyDictionary()
-"""What was found of the bodies of each file that is in use, by their tables."""
+"""Sizes of the bodies of each description in use, by the JSON of their tables."""
 _MOST = 256
-"""Bodies of a file that are kept."""
+"""Largest number of sizes that are kept for a description."""
 
 
 def _size_of(description: Description, name: str, body: tables.BodyTable) -> BodySize:
@@ -102,8 +102,8 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> Bod
     if key not in known:
         try:
             known[key] = (
-                size_of_lines(body)
-                if is_lattice(body)
+                size_of_grid(body)
+                if is_grid(body)
                 else size_of_mesh(mesh_of_body(body, description.meshes), body.element)
             )
         except ModelError as error:

@@ -1,4 +1,4 @@
-"""All mistakes of a scene file at once: in its entries, between them, and in its bodies."""
+"""Find all mistakes of a scene file: in its entries, between them, and in its bodies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder
-from studies.scenes.checking import clashes, declarations, defaults, lacking, unmet
+from studies.scenes.checking import (
+    contradictions,
+    failed_checks,
+    unmet_needs,
+    wrong_accuracies,
+    wrong_parameters,
+)
 from studies.scenes.description import Description
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
@@ -19,7 +25,7 @@ if TYPE_CHECKING:
     from solver.contact.system import System
 
 _NEAR = 0.1
-"""Ratio of the gap to the shortest edge of a surface, up to which a body held by contact alone
+"""Ratio of the gap to the shortest edge of a surface; up to it a body that contact alone holds
 counts as touching."""
 
 
@@ -28,42 +34,42 @@ def examined(description: Description, *, built: bool) -> tables.SceneFile:
 
     Parameters
     ----------
-    built : whether its bodies are built, for the defaults
+    built : whether to build its bodies too
 
     Raises
     ------
     SceneError
-        with all mistakes; an entry that is wrong hides no mistake of other tables, but for what
-        needs the whole model: a free rigid motion, bodies apart or overlapping
+        with all mistakes. A wrong entry hides only mistakes of the whole model: a free rigid
+        motion, bodies apart or overlapping
     """
     found = description.readable(description.declared)
     mistakes = found.mistakes
     if found.tables:
-        others = [*declarations(found.tables, description.used())]
-        others += clashes(found.tables, description.meshes)
+        others = [*wrong_parameters(found.tables, description.used())]
+        others += contradictions(found.tables, description.meshes)
         if not {where[0] for where in found.own} & {"accuracy", "parameters"}:
-            others += defaults(found.tables)
-        if not found.own:  # what has a stand-in may be what is needed
-            others += lacking(found.tables)
-        others += unmet(found.tables, description.declared)
+            others += wrong_accuracies(found.tables)
+        if not found.own:  # a table with a stand-in may be the one that is needed
+            others += unmet_needs(found.tables)
+        others += failed_checks(found.tables, description.declared)
         if not description.shipped and is_built_in(found.tables.name):
             allowed = "a built-in scene has this name: choose another"
             others.append(StudyError("name", found.tables.name, allowed))
-        mistakes += _meant(others, found.own)
+        mistakes += _without_stand_ins(others, found.own)
         if built:
             absent = {dotted(where) for where in found.own}
             builder = Builder(found.tables, description.meshes, [*mistakes], absent)
             _build(builder, found.tables)
-            mistakes += _meant(builder.mistakes[len(mistakes) :], found.own)
+            mistakes += _without_stand_ins(builder.mistakes[len(mistakes) :], found.own)
     if mistakes or found.tables is None:
         raise SceneError(description.file, mistakes)
     return found.tables
 
 
-def _meant(
+def _without_stand_ins(
     mistakes: Iterable[StudyError], own: Mapping[Where, frozenset[str]]
 ) -> Iterator[StudyError]:
-    """Yield the mistakes of what is the file's own, not of stand-ins."""
+    """Yield the mistakes in entries of the file, without those in stand-ins."""
     for mistake in mistakes:
         for where, kept in own.items():
             table, field = dotted(where), mistake.field
@@ -76,20 +82,20 @@ def _meant(
 
 
 def _build(builder: Builder, scene: tables.SceneFile) -> None:
-    """Build the scene; the builder keeps the mistakes of meshes, bodies, contact and the map."""
+    """Build model, system and samples; the builder collects the mistakes."""
     from solver.contact.system import System
     from solver.results.samples import Samples
 
     model = builder.model()
     if model is not None:
-        system = builder.tried("", lambda: System(model))
+        system = builder.attempt("", lambda: System(model))
         if system:
-            builder.mistakes += _apart(system)
-            builder.tried("results", lambda: Samples(system, view_of(scene)))
+            builder.mistakes += _bodies_apart(system)
+            builder.attempt("results", lambda: Samples(system, view_of(scene)))
 
 
-def _apart(system: System) -> Iterator[StudyError]:
-    """Yield the bodies that contact alone must hold, and that touch nothing at the beginning."""
+def _bodies_apart(system: System) -> Iterator[StudyError]:
+    """Yield the bodies that contact alone holds and that touch nothing before loading."""
     from solver.model.rigid import RigidBody
 
     state = system.initial()
@@ -98,7 +104,7 @@ def _apart(system: System) -> Iterator[StudyError]:
         if not part.rigid.shape[1] or not own:
             continue
         gap = min(float(i.pairing(state.u, 0.0).gap.min()) for i in own)
-        # a curved surface touches at a point, and its gap is a mean around it
+        # the gap of a curved surface is a mean around the point where it touches
         if gap > _NEAR * min(i.slave_surface.shortest_edge for i in own):
             allowed = f"is held by contact alone and stands {gap:.4g} mm away: move it there"
             kind = "rigid" if isinstance(part.body, RigidBody) else "bodies"

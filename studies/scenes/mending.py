@@ -1,4 +1,4 @@
-"""Stand-ins for what is wrong in a scene file, so that the rest of it is checked as well."""
+"""Stand-ins for wrong tables of a scene file, so that the others can be checked."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 Where = tuple[str | int, ...]
-"""Keys and positions that lead to an entry."""
+"""Place of an entry: the keys and list positions that lead to it."""
 
 
 class _StandIn(NamedTuple):
-    """The least that a table needs, and which of its entries can be checked without the others."""
+    """The required entries of a table, and those that can be checked without the others."""
 
     table: dict[str, Any]
     kept: frozenset[str]
@@ -52,8 +52,8 @@ class Mended(NamedTuple):
 
     Attributes
     ----------
-    tree : None where it would lack names that other tables use
-    own : for each table or entry with a stand-in, the entries that are still those of the file
+    tree : its tables; None if names that other tables use are lost
+    own : for each table or entry with a stand-in, its entries that are still those of the file
     """
 
     tree: dict[str, Any] | None
@@ -61,7 +61,7 @@ class Mended(NamedTuple):
 
 
 def mended(tree: dict[str, Any], wrong: Iterable[Where]) -> Mended:
-    """Return a tree with stand-ins for the tables that have something wrong at these places."""
+    """Return a tree with stand-ins for the tables that have a wrong entry at these places."""
     places = sorted(wrong, key=str)
     own: dict[Where, frozenset[str]] = {}
     found = tree
@@ -80,7 +80,7 @@ def mended(tree: dict[str, Any], wrong: Iterable[Where]) -> Mended:
 
 
 def _item(where: Where) -> Where:
-    """Return the place of the table of a collection in which an entry stands, or of the entry."""
+    """Return the place of the table of a collection that contains an entry, or of the entry."""
     collections = [*_STAND_INS, *_WITHOUT]
     depth = max((len(each) + 1 for each in collections if where[: len(each)] == each), default=1)
     return where[:depth]
@@ -93,7 +93,7 @@ def _at(tree: Any, where: Where) -> Any:
 
 
 def _replaced(tree: Any, where: Where, new: Any) -> Any:
-    """Return a tree with ``new`` at a place, or without the entry where it is None."""
+    """Return a tree with ``new`` at a place, or without the entry if ``new`` is None."""
     if not where:
         return new
     key, *rest = where

@@ -1,4 +1,4 @@
-"""Meshes read from files by meshio, a part of them at a time."""
+"""Meshes of bodies from mesh files, read by meshio."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from skfem import Mesh
 
 OUTLINE = "outline"
-"""Boundary that every mesh has: all edges with an element on one side alone."""
+"""Boundary of every mesh: all edges with an element on one side only."""
 
 LARGEST = 50_000_000
-"""Bytes a mesh file may have."""
+"""Largest size of a mesh file [bytes]."""
 
 MOST_POINTS = 1_000_000
-"""Points a mesh file may have."""
+"""Largest number of points of a mesh file."""
 
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
-"""Cells of meshio that a body is made of, and their corners."""
+"""Cells of meshio that a body may have -> number of their corners."""
 _LINES = ("line", "line3")
 _NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
-"""Cell data of meshio that say in which set a cell is, by number."""
+"""Cell data of meshio that hold the number of the set of each cell."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,7 +39,7 @@ class MeshFile:
 
     Attributes
     ----------
-    name : of the file; its ending tells the format
+    name : name of the file; its ending tells the format
     data : its bytes
     """
 
@@ -47,12 +47,12 @@ class MeshFile:
     data: bytes
 
     def mesh(self, part: str | None) -> Mesh:
-        """Return the part of this name, or all cells, boundaries named.
+        """Return the part of this name, or all cells, with named boundaries.
 
         Raises
         ------
         ModelError
-            when the file cannot be read, has no such part, or is no mesh of a plane
+            if the file cannot be read, has no such part, or is no plane mesh
         """
         return _mesh(self.name, self.data, part)
 
@@ -62,7 +62,7 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
     found = _read(name, data)
     points = np.asarray(found.points, dtype=float)
     if len(points) > MOST_POINTS:
-        raise ModelError("mesh", name, f"must have at most {MOST_POINTS} points; {len(points)}")
+        raise ModelError("mesh", name, f"must have at most {MOST_POINTS} points, not {len(points)}")
     if not np.isfinite(points).all():
         raise ModelError("mesh", name, "must have finite points")
     if points.ndim != 2 or points.shape[1] not in (2, 3):
@@ -72,7 +72,7 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
     blocks = [(block.type, np.asarray(block.data)) for block in found.cells]
     for kind, each in blocks:
         if each.size and not 0 <= each.min() <= each.max() < len(points):
-            raise ModelError("mesh", name, f"must have no {kind} of points that are not there")
+            raise ModelError("mesh", name, f"has a {kind} of points that do not exist")
     sets = _sets(found)
     plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
     if not plane:
@@ -107,18 +107,18 @@ def _read(name: str, data: bytes) -> Any:
         path.write_bytes(data)
         try:
             with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
-                return meshio.read(path)  # it prints what it thinks of the file
-        except SystemExit:  # so meshio refuses a format
+                return meshio.read(path)  # meshio prints remarks
+        except SystemExit:  # meshio exits if it does not know a format
             reason = "its format is not known"
         except MemoryError:
             raise
-        except Exception as error:  # whatever a damaged file makes a reader raise
+        except Exception as error:  # a damaged file may raise any
             reason = str(error).replace(str(path), name) or type(error).__name__
     raise ModelError("mesh", name, f"cannot be read: {reason}")
 
 
 def _sets(found: Any) -> dict[str, dict[int, Any]]:
-    """Return the cells of each named set by block; a number without a name is its own name."""
+    """Return the cells of each set by block; the name of a set without one is its number."""
     sets = {
         name: dict(enumerate(each))
         for name, each in found.cell_sets.items()
@@ -140,7 +140,7 @@ def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:
 
 
 def _made(points: NDArray[np.float64], cells: NDArray[np.int64], kind: str) -> tuple[Mesh, Any]:
-    """Return the mesh, and the number of its corner at each point, -1 elsewhere."""
+    """Return the mesh, and the index of its corner at each point, -1 at other points."""
     from skfem import MeshQuad, MeshQuad2, MeshTri, MeshTri2
 
     corners = _CELLS[kind]
@@ -155,7 +155,7 @@ def _made(points: NDArray[np.float64], cells: NDArray[np.int64], kind: str) -> t
     bent = curved.from_mesh(mesh)
     at = bent.doflocs.copy()
     dofs = bent.dofs.element_dofs
-    for k in range(corners, 2 * corners):  # both count the sides from the first corner on
+    for k in range(corners, 2 * corners):  # both number the sides from the first corner
         at[:, dofs[k]] = points[cells[:, k]].T
     if corners == 4:
         X = points[cells].transpose(2, 1, 0)

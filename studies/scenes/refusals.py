@@ -1,4 +1,4 @@
-"""What pydantic finds wrong, in the words of this project: field, value, what is allowed."""
+"""Errors of pydantic as errors of this project: field, value, what is allowed."""
 
 from __future__ import annotations
 
@@ -14,44 +14,44 @@ from studies.scenes.mending import Where
 _KINDS = ("union_tag_not_found", "union_tag_invalid")
 
 _TABLES = frozenset({"properties", "additionalProperties", "patternProperties"})
-"""What the schema of a table has, one of them at least."""
+"""Keys in the schema of a table; it has at least one of them."""
 
 
 def mistakes_of(
     error: ValidationError, table: type[BaseModel], known: Collection[Where] = ()
 ) -> dict[Where, StudyError]:
-    """Return what is wrong by its place, but for what is ``known`` to be wrong at these places.
+    """Return the mistakes by place, without those at ``known`` places.
 
-    Of a table whose entries are wrong the entries are told alone.
+    If entries of a table are wrong, only these are mistakes, not the table.
     """
     schema = _schema(table)
-    walked = [(each, *_walked(schema, _loc(each))) for each in error.errors()]
-    wrong = {kept for _, kept, _ in walked} | set(known)
+    located = [(each, *_located(schema, _loc(each))) for each in error.errors()]
+    wrong = {where for _, where, _ in located} | set(known)
     above = {where[:k] for where in wrong for k in range(len(where))}
-    told: dict[Where, tuple[Any, list[str]]] = {}
-    for each, kept, entries in walked:
-        if kept not in above and kept not in known:
-            told.setdefault(kept, (_given(each), []))[1].append(_allowed(each, entries))
+    found: dict[Where, tuple[Any, list[str]]] = {}
+    for each, where, entries in located:
+        if where not in above and where not in known:
+            found.setdefault(where, (_given(each), []))[1].append(_allowed(each, entries))
     return {
-        kept: StudyError(dotted(kept), given, _either(list(dict.fromkeys(allowed))))
-        for kept, (given, allowed) in told.items()
+        where: StudyError(dotted(where), given, _either(list(dict.fromkeys(allowed))))
+        for where, (given, allowed) in found.items()
     }
 
 
 @cache
 def _schema(table: type[BaseModel]) -> Mapping[str, Any]:
-    """Return the JSON Schema of a table, which takes a tenth of a second to make."""
+    """Return the JSON Schema of a table; making it takes a tenth of a second."""
     return table.model_json_schema()
 
 
 def _either(allowed: list[str]) -> str:
-    """Return what is allowed by one of the branches of a union."""
+    """Return what is allowed by any branch of a union."""
     *others, last = (each.removeprefix("must be ") for each in allowed)
     return f"must be {', '.join(others)} or {last}" if others else allowed[0]
 
 
 def _loc(each: Any) -> Where:
-    """Return where it is wrong: of a table that is of no known kind, its kind."""
+    """Return the location of an error; that of an unknown kind of table is its entry ``kind``."""
     loc: Where = each["loc"]
     return (*loc, "kind") if each["type"] in _KINDS else loc
 
@@ -72,10 +72,10 @@ def _allowed(each: Any, entries: list[str]) -> str:
     return worded(each)
 
 
-def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
-    """Return a place without the tags that unions put into it, and what its table may have.
+def _located(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
+    """Return the place of a location of pydantic, and the entries that its table may have.
 
-    These are the entries; where its kind is not known, the kinds.
+    The place has no tags of unions. If the kind of the table is unknown, its entries are the kinds.
     """
     node: Mapping[str, Any] = schema
     kept: list[str | int] = []
@@ -105,13 +105,13 @@ def _walked(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
             node = node.get("items", (node.get("prefixItems") or [{}])[0])
         else:
             named = node.get("patternProperties") or {"": node.get("additionalProperties")}
-            below = next(iter(named.values()))  # a table with names of the user's own
+            below = next(iter(named.values()))  # a table whose keys are names of the user
             node = below if isinstance(below, Mapping) else {}
     return tuple(kept), entries
 
 
 def _is_branch(part: str | int, option: Mapping[str, Any]) -> bool:
-    """Whether a part of a place is the name of this branch of a union: a table, or a list."""
+    """Tell whether a part of a location is the tag of this branch of a union: a table or a list."""
     if isinstance(part, int):
         return False
     if option.get("type") == "array":

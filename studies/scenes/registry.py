@@ -1,4 +1,4 @@
-"""Scenes by name: those of the package, those of installed packages, and those of files."""
+"""Scenes by name: of the package, of installed packages, and of scene files."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def scene_named(name: Any, find: Find = nothing) -> Scene:
 
     Parameters
     ----------
-    name : of a built-in scene or of one that an installed package gives, or what ``find`` knows
-    find : where scenes of files are found
+    name : name of a scene of the package or of an installed package, or one that ``find`` knows
+    find : function that finds scenes of files
 
     Raises
     ------
     StudyError
-        that says which scenes exist
+        with the names that exist
     """
     if isinstance(name, str):
         found = SCENES.get(name) or _shipped(name) or find(name)
@@ -50,7 +50,7 @@ def scene_named(name: Any, find: Find = nothing) -> Scene:
 
 
 def known_names() -> list[str]:
-    """Return the names of the built-in scenes and of those of installed packages."""
+    """Return the names of the scenes of the package and of installed packages."""
     return list(dict.fromkeys((*SCENES, *SHIPPED, *_installed())))
 
 
@@ -60,19 +60,19 @@ def built_in() -> list[Scene]:
 
 
 def known_scenes() -> Iterator[Scene]:
-    """Yield the same scenes."""
+    """Yield the scenes of the package and of installed packages."""
     return map(scene_named, known_names())
 
 
 def name_of(scene: Scene) -> str:
-    """Return what a study calls a scene: its name, or the content id of one from a file."""
+    """Return the name of a scene in a study: its own, or the content id of one from a file."""
     from studies.scenes.scene import FileScene
 
     return scene.id if isinstance(scene, FileScene) and scene.posted else scene.name
 
 
 def beside(folder: Path) -> Find:
-    """Return what finds scenes by the name of their file in a folder."""
+    """Return a function that finds scenes by the names of their files in a folder."""
 
     def find(name: str) -> Scene | None:
         if not name.endswith(".toml"):
@@ -85,7 +85,7 @@ def beside(folder: Path) -> Find:
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """Return what a data set tells of its scene, so that it can be read without the file."""
+    """Return the attributes of a data set that hold its scene, so that it needs no scene file."""
     from studies.scenes.scene import FileScene
 
     if not (isinstance(scene, FileScene) and scene.posted):
@@ -94,23 +94,24 @@ def attributes(scene: Scene) -> dict[str, str]:
     return {"scene": scene.name, "scene_id": scene.id, "scene_file": json.dumps(content)}
 
 
-def scene_of(told: Mapping[str, Any]) -> Scene:
-    """Return the scene that the attributes of a data set tell; its meshes may be missing.
+def scene_of(attributes: Mapping[str, Any]) -> Scene:
+    """Return the scene from the attributes of a data set, without its mesh files.
 
     Raises
     ------
     StudyError
-        when it is none that exists here
+        if there is no scene of this name
     """
-    if "scene_file" not in told:
-        return scene_named(told["scene"])
+    if "scene_file" not in attributes:
+        return scene_named(attributes["scene"])
     from studies.scenes.scene import file_scene
 
-    return file_scene(Description(str(told["scene"]), json.loads(told["scene_file"]), None))
+    name, content = str(attributes["scene"]), json.loads(attributes["scene_file"])
+    return file_scene(Description(name, content, None))
 
 
 def _shipped(name: str) -> Scene | None:
-    """Return the scene of a file of the package."""
+    """Return the scene of this name from a file of the package, or None."""
     if name not in SHIPPED:
         return None
     from studies.scenes.scene import file_scene

@@ -1,4 +1,4 @@
-"""Where the results of a scene file are taken: map, lines, points, contacts, and numbers."""
+"""Places and numbers of the results of a scene file: map, lines, points, contacts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NOWHERE = np.zeros(0)
 
 
 def view_of(scene: tables.SceneFile) -> View:
-    """Return the map grid and the states; see `places_of` for lines, points and contacts."""
+    """Return the view: map, surfaces, profile and stages."""
     names = scene.stage_names
     released, taken = scene.released, scene.results
     under_load = [name for name in names if name != released]
@@ -46,12 +46,12 @@ def view_of(scene: tables.SceneFile) -> View:
 
 
 def numbers_of(scene: tables.SceneFile) -> list[RequestedNumber]:
-    """Return the numbers that a scene file requests of every run."""
+    """Return the numbers that a scene file requests."""
     return [RequestedNumber(name=name, **each.model_dump()) for name, each in scene.outputs.items()]
 
 
 def places_of(scene: tables.SceneFile) -> NamedPlaces:
-    """Return the places that a scene file names, and the numbers that it requests."""
+    """Return the named lines, points and contacts, and the requested numbers."""
     taken = scene.results
     return NamedPlaces(
         lines={
@@ -65,11 +65,11 @@ def places_of(scene: tables.SceneFile) -> NamedPlaces:
 
 
 def output_of(scene: tables.SceneFile, word: str) -> Output:
-    """Return the output of a word with the parameters that a scene file gives it."""
-    known = outputs()[word]
-    return (
-        known.make(**getattr(scene.results, word).model_dump()) if known.parametric else known.make
-    )
+    """Return the output of a word, with its parameters from the scene file."""
+    output = outputs()[word]
+    if not output.parametric:
+        return output.make
+    return output.make(**getattr(scene.results, word).model_dump())
 
 
 def places(line: tables.LineResultTable, samples: int) -> Array:

@@ -1,4 +1,4 @@
-"""A scene made of a scene file: parameters, model, loading and results are read from its tables."""
+"""The `Scene` made from a scene file: parameters, model, loading and results from its tables."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
-from studies.scenes.building import Builder, friction_of, law_of
-from studies.scenes.checking import clashes, lacking, unmet
+from studies.scenes.building import Builder, friction_of, law_of, program_of
+from studies.scenes.checking import contradictions, failed_checks, unmet_needs
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of, in_one_increment, too_large
 from studies.scenes.examining import examined
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FileScene(Scene):
-    """A scene made of a file.
+    """A scene made from a file.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class FileScene(Scene):
 
     @property
     def posted(self) -> bool:
-        """Whether it is none of the package, so that studies call it by its content id."""
+        """Whether it is not of the package: studies call it by its content id."""
         return not self.description.shipped
 
     @property
@@ -64,11 +64,11 @@ class FileScene(Scene):
 
 
 def file_scene(description: Description, *, built: bool = False) -> FileScene:
-    """Return the scene of a description, the same object for the same content and words.
+    """Return the scene of a description, the same object for the same content.
 
     Parameters
     ----------
-    built : whether its bodies are built once, with the defaults, to find what is wrong with them
+    built : whether to build its bodies once, with the defaults, to find mistakes in them
 
     Raises
     ------
@@ -78,7 +78,7 @@ def file_scene(description: Description, *, built: bool = False) -> FileScene:
     known = _SCENES.get(description.key)
     if known is None or built:
         scene = examined(description, built=built)
-        known = _SCENES.setdefault(description.key, _made(description, scene))
+        known = _SCENES.setdefault(description.key, _scene_of(description, scene))
         while len(_SCENES) > _MOST:
             del _SCENES[next(iter(_SCENES))]
     return known
@@ -86,10 +86,10 @@ def file_scene(description: Description, *, built: bool = False) -> FileScene:
 
 _SCENES: dict[tuple[str, str, bool], FileScene] = {}
 _MOST = 64
-"""Scenes of files that a process keeps."""
+"""Largest number of scenes of files that a process keeps."""
 
 
-def _made(description: Description, scene: tables.SceneFile) -> FileScene:
+def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
     return FileScene(
         name=scene.name,
         summary=scene.summary or f"scene of the file {description.file}",
@@ -104,7 +104,7 @@ def _made(description: Description, scene: tables.SceneFile) -> FileScene:
             partial(_at_places, description),
         ),
         costs=(cost,),
-        watch=partial(_watched, description),
+        watch=partial(_watch, description),
         effort=partial(_effort, description),
         warnings=partial(_warnings, description),
         advice={
@@ -123,12 +123,12 @@ def read_scene(path: Path | str) -> FileScene:
     Raises
     ------
     StudyError, SceneError
-        when the file cannot be read, or with all its mistakes
+        if the file cannot be read; with all its mistakes
     """
     return file_scene(Description.read(path), built=True)
 
 
-# -- what the driver of scenes calls -------------------------------------------------------------
+# -- functions that the driver of scenes calls -----------------------------------------------------
 
 
 def _model(description: Description, parameters: Any) -> Model:
@@ -140,7 +140,7 @@ def _model(description: Description, parameters: Any) -> Model:
 
 
 def _program(description: Description, parameters: Any) -> Program:
-    return Builder(_tables(description, parameters), description.meshes).program()
+    return program_of(_tables(description, parameters))
 
 
 def _effort(description: Description, parameters: Any, values: Sequence[Any]) -> Effort:
@@ -172,10 +172,10 @@ def _at_places(description: Description, run: FinishedRun) -> Values:
     return at_named_places(run, _places(description, run.parameters), times)
 
 
-def _watched(
+def _watch(
     description: Description, parameters: Any, samples: Samples, converged: Converged
 ) -> Any:
-    from solver.results.history import observe  # only who computes needs scipy
+    from solver.results.history import observe  # loads scipy
 
     system: Any = samples.system
     watched = {
@@ -188,8 +188,8 @@ def _watched(
 
 
 def _warnings(description: Description, run: FinishedRun) -> tuple[str, ...]:
-    told = [getattr(each, "warnings", None) for each in _outputs(description, run.parameters)]
-    return tuple(text for warnings in told if warnings for text in warnings(run))
+    each = [getattr(output, "warnings", None) for output in _outputs(description, run.parameters)]
+    return tuple(text for warnings in each if warnings for text in warnings(run))
 
 
 def _outputs(description: Description, parameters: Any) -> list[Output]:
@@ -216,7 +216,7 @@ def _values(parameters: Any) -> dict[str, Any]:
 def _branch(description: Description) -> str:
     """Return the parameter that is the load factor or the number of cycles, or an empty text.
 
-    It is one that all else is without. Outputs may have it: they are taken of each run.
+    No other entry uses it, except parameters of outputs, which are computed for each run.
     """
     loading = description.content.get("loading", {})
     results = description.content.get("results", {})
@@ -232,7 +232,7 @@ def _branch(description: Description) -> str:
 
 
 def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
-    """Return the class of the scene's parameters, which checks itself as those of scenes do."""
+    """Return the class of the scene's parameters, a dataclass that checks itself when built."""
     declared, levels = scene.declared, scene.accuracy
     usual: dict[str, dict[str, Any]] = {}
     if levels:
@@ -247,26 +247,30 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
                 object.__setattr__(self, name, number)
         try:
             found = _tables(description, self)
-            mistakes = [*unmet(found, _values(self)), *clashes(found, None), *lacking(found)]
+            mistakes = [
+                *failed_checks(found, _values(self)),
+                *contradictions(found, None),
+                *unmet_needs(found),
+            ]
             if not mistakes:
-                mistakes = [*_unlawful(description, found), *too_large(description, found)]
+                mistakes = [*_wrong_laws(description, found), *too_large(description, found)]
         except SceneError as error:
             mistakes = list(error.mistakes)
         for first in mistakes[:1]:
             raise ModelError(first.field, first.value, first.allowed)
 
     def reduced(self: Any) -> tuple[Any, ...]:
-        return _again, (description, _values(self))
+        return _rebuilt, (description, _values(self))
 
     def idle(self: Any) -> Mapping[str, str]:
-        """Parameters that no number depends on, each with the one whose word decides that."""
+        """Parameters without effect, each with the parameter whose word has no use for it."""
         every = [parts for parts in ContactParameters.PARTS if parts.kind in names]
         unused = {name: p.kind for p in every for name in p.unused(getattr(self, p.kind))}
         return {name: kind for name, kind in unused.items() if name in description.opened}
 
     own: dict[str, tuple[Any, Any]] = {
         name: (
-            _kind(each),
+            _annotated_type(each),
             by_accuracy(each.description)
             if levels and name in levels.standard
             else described(_default(each), each.description),
@@ -296,8 +300,8 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
     )
 
 
-def _unlawful(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
-    """Yield what laws of materials and of friction refuse, by its parameter where it is one."""
+def _wrong_laws(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield the mistakes in material and friction laws, by parameter or else by entry."""
     made: dict[str, Callable[[], Any]] = {
         f"materials.{name}": partial(law_of, table) for name, table in scene.materials.items()
     }
@@ -310,20 +314,20 @@ def _unlawful(description: Description, scene: tables.SceneFile) -> Iterator[Stu
             yield StudyError(field, error.value, error.allowed)
 
 
-def _again(description: Description, values: Mapping[str, Any]) -> Any:
-    """Return the parameters that another process had."""
+def _rebuilt(description: Description, values: Mapping[str, Any]) -> Any:
+    """Return the parameters that another process pickled."""
     return file_scene(description).parameters(**values)
 
 
 def _default(declared: tables.ParameterTable) -> Any:
-    """Return a default; a whole number with a unit is a length or the like, not a count."""
+    """Return the default of a parameter, as a float if it is an integer with a unit."""
     default = declared.default
     if isinstance(default, int) and not isinstance(default, bool) and declared.unit != "1":
         return float(default)
     return default
 
 
-def _kind(declared: tables.ParameterTable) -> Any:
+def _annotated_type(declared: tables.ParameterTable) -> Any:
     """Return the annotated type of a parameter."""
     default = _default(declared)
     if isinstance(default, bool):

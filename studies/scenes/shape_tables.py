@@ -1,4 +1,4 @@
-"""Tables of shapes: of bodies that are meshed here, and of the surfaces of rigid ones."""
+"""Tables of the shapes of bodies, with their meshes, and of the surfaces of rigid bodies."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ Growth = Annotated[float, Interval(gt=1.0, le=3.0)]
 
 
 class NearTable(SceneTable):
-    """Where a built-in shape is meshed finely.
+    """A place at which a shape is meshed finely.
 
-    Elements have the side ``size`` [mm] within ``radius`` of the place, and grow away from there.
+    Elements have the side ``size`` [mm] within ``radius`` of the place and grow away from there.
     """
 
     at: Place
@@ -38,7 +38,7 @@ class NearTable(SceneTable):
 
 
 class _MeshedTable(SceneTable):
-    """What shapes that are divided along two directions have.
+    """Base of shapes with graded elements.
 
     ``size`` is the largest element side, ``growth`` the ratio of neighbouring sides.
     """
@@ -49,7 +49,7 @@ class _MeshedTable(SceneTable):
 
 
 class RectangleTable(_MeshedTable):
-    """From ``x[0]`` to ``x[1]`` and ``y[0]`` to ``y[1]``: left, right, bottom, top."""
+    """A rectangle of the spans ``x`` and ``y``: left, right, bottom, top."""
 
     kind: Literal["rectangle"]
     x: Span
@@ -57,7 +57,7 @@ class RectangleTable(_MeshedTable):
 
 
 class HalfPlaneTable(_MeshedTable):
-    """A rectangle below y = 0, as deep as it reaches to either side; its half where symmetric."""
+    """A rectangle below y = 0 of depth and half-width ``extent``; its right half if symmetric."""
 
     kind: Literal["half_plane"]
     extent: Length
@@ -65,10 +65,7 @@ class HalfPlaneTable(_MeshedTable):
 
 
 class PadTable(_MeshedTable):
-    """A block on y = 0, its bottom an arc that touches x = 0: left, right, bottom, top.
-
-    It is as high at its sides as in its middle.
-    """
+    """A block with a flat top and an arc through the origin as bottom: left, right, bottom, top."""
 
     kind: Literal["pad"]
     width: Length
@@ -77,7 +74,7 @@ class PadTable(_MeshedTable):
 
 
 class RingTable(_MeshedTable):
-    """Between two radii, and between two angles [degrees]: inner, outer, start, end."""
+    """A ring or sector between two radii and two angles [degrees]: inner, outer, start, end."""
 
     kind: Literal["ring", "sector"]
     centre: Place = (0.0, 0.0)
@@ -88,8 +85,8 @@ class RingTable(_MeshedTable):
 class FilletTable(_MeshedTable):
     """A bar that narrows from ``wide`` to ``narrow`` over a fillet at y = 0, its axis at x = 0.
 
-    It reaches ``lengths`` below and above: left (the axis), bottom, right (the end of the wide
-    part), surface, fillet, top. Where something is ``near``, the whole fillet is fine.
+    ``lengths`` are those below and above y = 0. Boundaries: left (the axis), bottom, right (the
+    side of the wide part), surface, fillet, top. With ``near`` the whole fillet is fine.
     """
 
     kind: Literal["fillet"]
@@ -100,7 +97,7 @@ class FilletTable(_MeshedTable):
 
 
 class DiscTable(SceneTable):
-    """A whole disc, meshed evenly: rim, and its quarters east, north, west, south."""
+    """A disc with elements of one size: rim, and its quarters east, north, west, south."""
 
     kind: Literal["disc"]
     centre: Place = (0.0, 0.0)
@@ -109,7 +106,7 @@ class DiscTable(SceneTable):
 
 
 class RoundTable(SceneTable):
-    """A disc that touches y = 0 at ``at``, fine there, without a cap on its far side.
+    """A disc that touches y = 0 at ``at`` and is fine there, without a cap on its far side.
 
     Its boundaries are those of `solver.mesh.ball`.
     """
@@ -125,20 +122,19 @@ class RoundTable(SceneTable):
 
 
 class _MarkTable(SceneTable):
-    """An element side [mm] that lines have at a place; left out, it is that of the other places.
+    """The element side ``size`` [mm] at a place; without it that of the neighbouring places.
 
-    ``largest`` is the largest side between this place and the one before; with ``parts`` there are
-    that many equal sides between them.
+    ``largest`` is the largest side between this place and the one before, ``parts`` the number of
+    equal sides between them.
     """
 
     size: Length | None = None
     largest: Length | None = None
-
     parts: Count | None = None
 
 
 class LineMarkTable(_MarkTable):
-    """A place on an axis through which a line of a grid goes."""
+    """A position on an axis through which a grid line goes."""
 
     at: float
 
@@ -150,9 +146,9 @@ class PointMarkTable(_MarkTable):
 
 
 class GridTable(SceneTable):
-    """A rectangle whose lines go through given places: left, right, bottom, top.
+    """A rectangle whose grid lines go through given positions: left, right, bottom, top.
 
-    Elements have the sides that are given there, and grow away from them.
+    Elements have the sides that are given there and grow away from them.
     """
 
     kind: Literal["grid"]
@@ -179,12 +175,12 @@ _MESHED: Mapping[str, Callable[..., Mesh]] = {
 
 
 def mesh_of(shape: Any, cells: str) -> Mesh:
-    """Return the mesh of a shape, its boundaries named.
+    """Return the mesh of a shape, with named boundaries.
 
     Parameters
     ----------
     shape : one of the tables above
-    cells : ``quad`` or ``tri``; shapes with curved sides have quadrilaterals
+    cells : ``quad`` or ``tri``; shapes with curved sides have quadrilaterals only
 
     Raises
     ------
@@ -206,9 +202,9 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
 
 
 class GridLines(NamedTuple):
-    """Lines (n,) of the grid that a mesh is made of, which may be bent then [mm].
+    """Lines (n,) of a grid before it is bent [mm].
 
-    ``names`` are its boundaries: name -> side of the grid.
+    ``names`` are the boundaries of the mesh: name -> side of the grid.
     """
 
     x: Array
@@ -217,7 +213,7 @@ class GridLines(NamedTuple):
 
 
 def lines_of(shape: Any) -> GridLines:
-    """Return the lines of a shape that is one grid, bent or not: a `GridTable` or `RoundTable`."""
+    """Return the lines of a shape that is one grid, bent or not: `GridTable` or `RoundTable`."""
     if isinstance(shape, RoundTable):
         across = ball_lines(shape.radius, shape.fine, shape.size, shape.growth)
         along = across if shape.symmetric else np.concatenate([-across[:0:-1], across])
@@ -230,7 +226,7 @@ def lines_of(shape: Any) -> GridLines:
 
 
 def _graded(field: str, marks: Sequence[_MarkTable], at: Sequence[float], growth: float) -> Array:
-    """Return lines through places ``at`` (n,) with the sides of their marks [mm]."""
+    """Return grid lines through the positions ``at`` with the sides of their marks [mm]."""
     if not all(before < after for before, after in pairwise(at)):
         raise ModelError(field, list(at), "must have increasing places [mm]")
     if marks[0].largest is not None or marks[0].parts is not None:
@@ -244,7 +240,7 @@ def _graded(field: str, marks: Sequence[_MarkTable], at: Sequence[float], growth
 
 
 class LineTable(SceneTable):
-    """A straight surface of a rigid body, which lies on the left of one who walks along it."""
+    """A polygonal surface of a rigid body; the body is to the left of the path of its points."""
 
     kind: Literal["line"]
     points: Annotated[tuple[Place, ...], Field(min_length=2, max_length=10_000)]
@@ -255,7 +251,7 @@ class LineTable(SceneTable):
 
 
 class GradedTable(SceneTable):
-    """A line through points, its edges growing away from each of them, as a grid's do."""
+    """A line through points with graded edges, as those of a grid."""
 
     kind: Literal["graded"]
     points: Annotated[tuple[PointMarkTable, ...], Field(min_length=2)]
@@ -270,7 +266,7 @@ class GradedTable(SceneTable):
 
 
 class ArcTable(SceneTable):
-    """An arc [degrees]; counter-clockwise the rigid body is inside the circle."""
+    """An arc [degrees]; if it is counter-clockwise, the rigid body is inside the circle."""
 
     kind: Literal["arc"]
     centre: Place

@@ -1,4 +1,4 @@
-"""The scenes that the package brings as files, in the folder ``files`` beside this module."""
+"""The scene files of the package, in the folder ``files`` beside this module."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from solver.scenes import SCENES
 SHIPPED: Mapping[str, Path] = {
     path.stem: path for path in sorted((Path(__file__).parent / "files").glob("*.toml"))
 }
-"""Name of a scene, which is that of its file -> file."""
+"""Name of a scene -> its file."""
 
 
 def is_built_in(name: str) -> bool:

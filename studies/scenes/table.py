@@ -1,4 +1,4 @@
-"""What all tables of a scene file have, and the kinds of entries they share."""
+"""The base class of the tables of a scene file, and types of their entries."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from annotated_types import Interval
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,59}$")]
-"""A name that a scene file gives: 1 to 60 of ``A-Z a-z 0-9 _``, beginning with a letter."""
+"""A name: 1 to 60 of ``A-Z a-z 0-9 _``, beginning with a letter."""
 FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 FileName = Annotated[str, StringConstraints(pattern=f"^{FILE_NAME.pattern}$")]
 """The name of a file beside the scene file."""
@@ -17,7 +17,7 @@ Place = tuple[float, float]
 Span = tuple[float, float]
 Count = Annotated[int, Interval(ge=1, le=10_000)]
 Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
-"""A surface: ``body.boundary``."""
+"""A boundary of a body: ``body.boundary``."""
 
 
 class SceneTable(BaseModel):

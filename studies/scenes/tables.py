@@ -1,4 +1,4 @@
-"""The tables of a scene file, as they are once its expressions have been evaluated."""
+"""The tables of a scene file after its expressions have been evaluated."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side
 
 
 class BoundaryTable(SceneTable):
-    """Facets of other boundaries whose middles lie in a box, under a name of their own."""
+    """A boundary of the facets of other boundaries whose middles lie in a box."""
 
     of: Annotated[tuple[str, ...], Field(min_length=1)]
     x: Span | None = None
@@ -44,9 +44,9 @@ class BoundaryTable(SceneTable):
 
 
 class CutTable(SceneTable):
-    """A rectangle that is cut out of a body: a notch in its side, or a hole.
+    """A rectangle that is cut out of a body along lines of its mesh: a notch, or a hole.
 
-    Its sides are lines of the mesh; the boundary that it opens has its name.
+    The boundary that it opens has its name.
     """
 
     x: Span
@@ -54,7 +54,7 @@ class CutTable(SceneTable):
 
 
 class BodyTable(SceneTable):
-    """A body: a shape, or a mesh file and the part of it that the body is."""
+    """A body: a shape, or a part of a mesh file."""
 
     material: str
     shape: Shape | None = None
@@ -67,17 +67,17 @@ class BodyTable(SceneTable):
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)
 
 
-_GIVEN = declared(ContactParameters)
+_ALL = declared(ContactParameters)
 _LAW = [name for name in declared(MaterialParameters) if name != "accuracy"]
 OPEN: Mapping[str, Declared] = {
-    "materials": {name: _GIVEN[name] for name in _LAW},
-    "contacts": {n: each for n, each in _GIVEN.items() if n not in (*_LAW, "accuracy")},
+    "materials": {name: _ALL[name] for name in _LAW},
+    "contacts": {n: each for n, each in _ALL.items() if n not in (*_LAW, "accuracy")},
 }
-"""Tables that may be open -> entries that are then parameters of the scene, where left out."""
+"""Tables that may be open -> entries that are parameters of the scene if an open one omits them."""
 
 
 class OpenTable(SceneTable):
-    """A table whose entries are parameters of the scene, where it is open and leaves them out."""
+    """A table that may be open: entries that it omits are then parameters of the scene."""
 
     open: bool = False
 
@@ -127,11 +127,11 @@ class RigidTable(SceneTable):
     rotation: MotionTable = MotionTable()
 
 
-# -- what acts -----------------------------------------------------------------------------------
+# -- loads and contact ---------------------------------------------------------------------------
 
 
 class LoadTable(SceneTable):
-    """What all loads have."""
+    """Base of the tables of loads."""
 
     body: str
 
@@ -141,20 +141,20 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     known: dict[str, Any] = {"amplitude": (Amplitude | None, None)} if kind.varies else {}
     known["kind"] = (Literal[word], ...)
     for name, (hint, field) in declared(kind).items():
-        told = _told(hint)
-        if told is not None and name != "amplitude":
-            known[name] = (told, ... if field.default is dataclasses.MISSING else field.default)
+        kept = _without_functions(hint)
+        if kept is not None and name != "amplitude":
+            known[name] = (kept, ... if field.default is dataclasses.MISSING else field.default)
     made: type[LoadTable] = create_model(f"{kind.__name__}Table", __base__=LoadTable, **known)
     made.__doc__ = kind.__doc__
     return made
 
 
-def _told(hint: Any) -> Any:
-    """Return what a file can say of a parameter; None where only a function can be given."""
+def _without_functions(hint: Any) -> Any:
+    """Return the type of a parameter in a file, which holds no functions; None if none is left."""
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
-    told = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
-    return None if told == (NoneType,) else Union[told]  # noqa: UP007
+    kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
+    return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ else:
 
 
 class PairTable(OpenTable):
-    """Two surfaces that may touch; see `solver.ContactPair`. Its label is ``name``."""
+    """Two boundaries that may touch; see `solver.ContactPair`. Its label is ``name``."""
 
     name: Label
     slave: Side
@@ -180,7 +180,7 @@ class PairTable(OpenTable):
 
 
 def _contact() -> type[PairTable]:
-    """Return the table of a pair with the words and the parameters of the laws of friction."""
+    """Return the table of a contact pair with the parameters of all friction laws."""
     known: dict[str, Any] = {n: (hint, f.default) for n, (hint, f) in OPEN["contacts"].items()}
     made: type[PairTable] = create_model("ContactTable", __base__=PairTable, **known)
     return made
@@ -193,7 +193,7 @@ else:
 
 
 class SingularTable(SceneTable):
-    """A point at which strain has no bound; see `solver.SingularPoint`."""
+    """A point at which strain is unbounded; see `solver.SingularPoint`."""
 
     at: Place
     radius: Length
@@ -202,8 +202,8 @@ class SingularTable(SceneTable):
 class StageTable(SceneTable):
     """A part of the loading, in equal increments.
 
-    At the end of the first one a load without an amplitude is at its full value; where ``release``
-    is true such loads go to zero, and the bodies are taken apart.
+    Loads without an amplitude reach their full value at the end of the first stage. In a stage with
+    ``release`` they go to zero, and the bodies are separated.
     """
 
     name: Label
@@ -212,9 +212,9 @@ class StageTable(SceneTable):
 
 
 class LoadingTable(SceneTable):
-    """Loads that grow together up to ``factor``, in steps of ``step``, and are taken away.
+    """Loads that grow together to ``factor``, in steps of ``step``, and are then removed.
 
-    Without a step they grow in one increment. With ``cycles`` all of this is done as many times.
+    Without a step they grow in one increment. ``cycles`` is the number of repetitions.
     """
 
     factor: Annotated[float, Interval(gt=0.0, le=1e7)]
@@ -223,15 +223,15 @@ class LoadingTable(SceneTable):
     cycles: Count | None = None
 
 
-# -- where results are taken ---------------------------------------------------------------------
+# -- places of results ---------------------------------------------------------------------------
 
 
 class SpacedTable(SceneTable):
-    """Points from ``start`` to ``stop``, in equal steps.
+    """Positions from ``start`` to ``stop``, in equal steps.
 
-    They are ``size`` apart at ``near``, and farther apart away from it; or their distances from
-    ``away``, which lies before or behind them, are in a constant ratio. Of a table with ``within``
-    those between its two places are taken.
+    With ``near`` they are ``size`` apart at ``near``, and farther apart away from it. With ``away``
+    their distances from ``away``, which lies outside, are in a constant ratio. With ``within`` only
+    those between its two positions are kept.
     """
 
     start: float
@@ -243,7 +243,7 @@ class SpacedTable(SceneTable):
     within: Span | None = None
 
     def positions(self) -> NDArray[np.float64]:
-        """Return the points (num,), or those of them that lie within [mm]."""
+        """Return the positions (n,) [mm]."""
         points = self._points()
         if self.within is None:
             return points
@@ -252,7 +252,7 @@ class SpacedTable(SceneTable):
     def _points(self) -> NDArray[np.float64]:
         if self.away is not None:
             if self.near is not None or self.start <= self.away <= self.stop:
-                allowed = f"must be < {self.start:g} or > {self.stop:g}, and goes without near"
+                allowed = f"must be < {self.start:g} or > {self.stop:g}, without near"
                 raise ModelError("away", self.away, allowed)
             return self.away + np.geomspace(self.start - self.away, self.stop - self.away, self.num)
         if self.near is None or self.size is None:
@@ -261,11 +261,11 @@ class SpacedTable(SceneTable):
 
 
 Spaced = SpacedTable | Annotated[tuple[float | SpacedTable, ...], Field(min_length=1)]
-"""Points along a line: equally spaced or graded, or several such pieces and single points."""
+"""Positions along an axis: one table, or several tables and single positions in turn."""
 
 
 def positions(spaced: Spaced) -> NDArray[np.float64]:
-    """Return the points (n,) [mm]."""
+    """Return the positions (n,) [mm]."""
     pieces = spaced if isinstance(spaced, tuple) else (spaced,)
     each = [p.positions() if isinstance(p, SpacedTable) else np.array([p]) for p in pieces]
     return np.concatenate(each)
@@ -279,7 +279,7 @@ class MapTable(SceneTable):
 
 
 class LineResultTable(SceneTable):
-    """A straight line from one place to another, or an arc [degrees], in a body."""
+    """A straight line or an arc [degrees] in a body."""
 
     body: str
     start: Place | None = None
@@ -290,7 +290,7 @@ class LineResultTable(SceneTable):
 
 
 class PointResultTable(SceneTable):
-    """A place in a body."""
+    """A point of a body."""
 
     body: str
     at: Place
@@ -305,19 +305,19 @@ class ProfileTable(SceneTable):
 
 
 class AxisTable(SceneTable):
-    """The line along the contact surface; see `solver.results.view.Axis`."""
+    """The line along the contact surfaces; see `solver.results.view.Axis`."""
 
     origin: Place = (0.0, 0.0)
     along: Place = (1.0, 0.0)
 
 
 class PlacesTable(SceneTable):
-    """Where results are stored; ``samples`` is their number along lines and contact surfaces.
+    """Places of results, and the words of outputs.
 
-    With ``surfaces`` the bodies that these belong to have results on the map and along ``s``,
-    without it all bodies have.
-    ``outputs`` are words of outputs without parameters; those with parameters have tables of their
-    own. Left out, what a map can show is stored.
+    ``samples`` is the number of points along lines and contact surfaces. Only the bodies of
+    ``surfaces`` have results on the map and along ``s``; without it all bodies have. ``outputs``
+    are words of outputs without parameters, by default ``maps`` if there is a map; outputs with
+    parameters have their own tables.
     """
 
     samples: Annotated[int, Interval(ge=2, le=5000)] = 201
@@ -332,7 +332,7 @@ class PlacesTable(SceneTable):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words of all outputs that are stored."""
+        """The words of all requested outputs."""
         plain = (("maps",) if self.map else ()) if self.outputs is None else self.outputs
         tables = (w for w, each in outputs().items() if each.parametric and getattr(self, w, None))
         return (*plain, *tables)
@@ -352,7 +352,7 @@ def _results() -> type[PlacesTable]:
 
 
 def _fields(kind: Any) -> dict[str, Any]:
-    """Return the entries of a table for the parameters of a part."""
+    """Return the entries of a table from the fields of a dataclass."""
     return {
         name: (hint, ... if field.default is dataclasses.MISSING else field.default)
         for name, (hint, field) in declared(kind).items()
@@ -366,7 +366,7 @@ else:
 
 
 def _requested() -> type[SceneTable]:
-    """Return the table of a requested number: of bodies with two coordinates, its name outside."""
+    """Return the table of a requested number of plane bodies; its key is the name."""
     words = (*of_body(2), *OF_CONTACT)
     known = _fields(RequestedNumber) | {"of": (Literal[words], ...)}
     entries = {name: each for name, each in known.items() if name not in ("name", "z")}
@@ -381,13 +381,13 @@ else:
     OutputTable = _requested()
 
 
-# -- the whole -----------------------------------------------------------------------------------
+# -- parameters and the whole file ---------------------------------------------------------------
 
 
 class ParameterTable(SceneTable):
     """A declared parameter: its default, range or choices, unit and meaning.
 
-    One without a default is a number that `AccuracyTable` sets.
+    `AccuracyTable` sets a parameter without a default.
     """
 
     default: bool | int | float | str | None = None
@@ -419,16 +419,16 @@ class CheckTable(SceneTable):
 
 
 ACCURACY = "accuracy"
-"""The parameter that a file with a table of accuracies has."""
+"""Name of the parameter that a file with an `AccuracyTable` has."""
 _ACCURACY = ParameterTable(
     default="standard",
     choices=get_args(Accuracy),
-    description="sets mesh and increments together, where they are not given",
+    description=_ALL[ACCURACY][1].metadata["description"],
 )
 
 
 class AdviceTable(SceneTable):
-    """What the user can do when a run fails."""
+    """Advice for the user if a run fails, by its status."""
 
     limit_load: str = ""
     not_converged: str = ""
@@ -462,20 +462,20 @@ class SceneFile(SceneTable):
 
     @property
     def declared(self) -> dict[str, ParameterTable]:
-        """The parameters, `accuracy` too; what it sets stands as default of ``standard``."""
+        """The parameters, also ``accuracy``; defaults that it sets are those of ``standard``."""
         if self.accuracy is None:
             return self.parameters
-        usual = self.accuracy.standard
+        standard = self.accuracy.standard
         return {ACCURACY: _ACCURACY} | {
-            name: each.model_copy(update={"default": usual[name]})
-            if each.default is None and name in usual
+            name: each.model_copy(update={"default": standard[name]})
+            if each.default is None and name in standard
             else each
             for name, each in self.parameters.items()
         }
 
     @property
     def names(self) -> set[str]:
-        """The names of all parameters, and of those that open tables may bring."""
+        """The names of all parameters, also of those that open tables may declare."""
         tables: Mapping[str, Iterable[OpenTable]] = {
             "materials": self.materials.values(),
             "contacts": self.contacts,
@@ -485,7 +485,7 @@ class SceneFile(SceneTable):
 
     @property
     def released(self) -> str:
-        """Name of the last stage, if the bodies are released in it."""
+        """Name of the last stage if it releases the bodies, else empty."""
         if self.loading or not self.stages:
             return "unloaded"
         last = self.stages[-1]
@@ -493,5 +493,5 @@ class SceneFile(SceneTable):
 
     @property
     def stage_names(self) -> list[str]:
-        """Names of the states that are kept."""
+        """Names of the stages."""
         return [stage.name for stage in self.stages] or ["loaded", "unloaded"]

@@ -55,7 +55,7 @@ def test_a_small_half_space_is_another_problem() -> None:
 @pytest.mark.parametrize(
     ("own", "allowed"),
     [
-        ({}, "must be 400.0, or track a length"),
+        ({}, "must be 400.0 with track = endless"),
         ({"track": 100.0, "periodic": True}, "the depth is the length of the track"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Rectangles cut out of bodies, and the size of a body that is told without its mesh."""
+"""Rectangles cut out of bodies, and the size of a mesh that is counted without making it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from solver import ModelError
 from studies.errors import SceneError
+from studies.scenes.body_size import is_grid, size_of_grid, size_of_mesh
 from studies.scenes.building import mesh_of_body
-from studies.scenes.lattice import is_lattice, size_of_lines, size_of_mesh
 from studies.scenes.tables import BodyTable
 from tests.studies.scenes.conftest import blocks, built
 
@@ -38,19 +38,19 @@ def moved(box: dict[str, list[float]], way: tuple[float, float]) -> dict[str, li
 @pytest.mark.parametrize("element", ["quad4", "quad8", "quad9", "tri3", "tri6"])
 @pytest.mark.parametrize("cuts", [(), ("notch",), ("side",)])
 @pytest.mark.parametrize("move", [(0.0, 0.0), (1.0, 0.5)])
-def test_the_size_that_lines_tell_is_that_of_the_mesh(
+def test_the_counted_size_of_a_grid_is_that_of_the_mesh(
     element: str, cuts: tuple[str, ...], move: tuple[float, float]
 ) -> None:
     boundaries = {"near": {"of": ["top", "left", *cuts], "x": [-5, 1.5]}}
     boxes = {name: moved(CUTS[name], move) for name in cuts}
     table = body(element=element, boundaries=boundaries, move=move, cuts=boxes)
-    assert is_lattice(table)
-    told, made = size_of_lines(table), size_of_mesh(mesh_of_body(table, None), element)
-    assert (told.elements, told.nodes) == (made.elements, made.nodes)
-    assert told.edges.keys() == made.edges.keys()
-    for name in told.edges:
-        assert told.count(told.on([name])) == made.count(made.on([name])), name
-        assert told.count(told.on([name, "left"])) == made.count(made.on([name, "left"])), name
+    assert is_grid(table)
+    size, made = size_of_grid(table), size_of_mesh(mesh_of_body(table, None), element)
+    assert (size.elements, size.nodes) == (made.elements, made.nodes)
+    assert size.edges.keys() == made.edges.keys()
+    for name in size.edges:
+        assert size.count(size.on([name])) == made.count(made.on([name])), name
+        assert size.count(size.on([name, "left"])) == made.count(made.on([name, "left"])), name
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -59,10 +59,10 @@ def test_so_is_that_of_a_ball(symmetric: bool, above: bool) -> None:
     shape = {"kind": "round", "radius": 3.0, "size": 0.2, "fine": 0.6, "growth": 1.6,
              "symmetric": symmetric, "above": above}  # fmt: skip
     table = body(shape=shape, boundaries={"back": {"of": ["cap", "right"]}})
-    told, made = size_of_lines(table), size_of_mesh(mesh_of_body(table, None), None)
-    assert (told.elements, told.nodes) == (made.elements, made.nodes)
+    size, made = size_of_grid(table), size_of_mesh(mesh_of_body(table, None), None)
+    assert (size.elements, size.nodes) == (made.elements, made.nodes)
     for name in made.edges:
-        assert told.count(told.on([name])) == made.count(made.on([name])), name
+        assert size.count(size.on([name])) == made.count(made.on([name])), name
 
 
 def cut(**box: Any) -> dict[str, Any]:

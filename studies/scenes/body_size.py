@@ -1,4 +1,4 @@
-"""What the mesh of a body has, counted without it where its shape is a grid or a bent one."""
+"""Size of the mesh of a body: elements, nodes and boundary edges; of a grid without making it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.mesh.shapes import few
-from solver.scenes.effort import per_place
+from solver.scenes.effort import node_layout
 from studies.scenes import tables
-from studies.scenes.building import usual_element
+from studies.scenes.building import default_element
 from studies.scenes.shape_tables import GridLines, GridTable, RoundTable, lines_of
 
 if TYPE_CHECKING:
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class BodySize:
-    """What a mesh has.
+    """The size of a mesh.
 
     Attributes
     ----------
-    elements, nodes : how many
-    edges : boundary -> numbers of the corners at the ends of its edges (n, 2)
-    at_corner, on_edge : nodes at a corner, and inside an edge
+    elements, nodes : their numbers
+    edges : boundary -> indices of the corners at the ends of its edges (n, 2)
+    at_corner, on_edge : numbers of nodes at a corner, and inside an edge
     """
 
     elements: int
@@ -41,32 +41,32 @@ class BodySize:
     on_edge: int
 
     def on(self, boundaries: Iterable[str]) -> set[tuple[int, ...]]:
-        """Return corners and edges of boundaries; each stands for the nodes that it has."""
+        """Return the corners and edges of boundaries, as tuples of corner indices."""
         found = (self.edges[name] for name in boundaries if name in self.edges)
         edges = [tuple(sorted(ends)) for each in found for ends in each.tolist()]
         return {*edges, *((corner,) for ends in edges for corner in ends)}
 
     def count(self, places: Iterable[tuple[int, ...]]) -> int:
-        """Return how many nodes corners and edges have."""
+        """Return the number of nodes at corners and inside edges."""
         return sum(self.at_corner if len(place) == 1 else self.on_edge for place in places)
 
 
 def size_of_mesh(mesh: Mesh, element: str | None) -> BodySize:
-    """Return what a mesh has with an element; without one, with that of a body that names none."""
-    _, at_corner, on_edge, inside = per_place(element or usual_element(mesh))
+    """Return the size of a mesh with an element; None is the default element of a body."""
+    _, at_corner, on_edge, inside = node_layout(element or default_element(mesh))
     nodes = at_corner * mesh.nvertices + on_edge * mesh.nfacets + inside * mesh.nelements
     edges = {name: mesh.facets[:, each].T for name, each in (mesh.boundaries or {}).items()}
     return BodySize(mesh.nelements, int(nodes), edges, at_corner, on_edge)
 
 
-def is_lattice(body: tables.BodyTable) -> bool:
-    """Tell whether what the mesh of a body has is seen without making it: by `size_of_lines`."""
+def is_grid(body: tables.BodyTable) -> bool:
+    """Tell whether the mesh of a body is one grid, bent or not; `size_of_grid` counts its size."""
     boxed = body.cuts or any(each.x or each.y for each in body.boundaries.values())
     return isinstance(body.shape, GridTable) or (isinstance(body.shape, RoundTable) and not boxed)
 
 
-def size_of_lines(body: tables.BodyTable) -> BodySize:
-    """Return what the mesh of a body has whose shape is one grid.
+def size_of_grid(body: tables.BodyTable) -> BodySize:
+    """Return the size of the mesh of a body that is one grid; see `is_grid`.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def size_of_lines(body: tables.BodyTable) -> BodySize:
         for entries of the shape that make no mesh, or one of too many elements
     """
     lines = lines_of(body.shape)
-    cells, at_corner, on_edge, inside = per_place(body.element or "quad8")
+    cells, at_corner, on_edge, inside = node_layout(body.element or "quad8")
     grid = _Rectangles(lines, body)
     edges = grid.sides()
     for new, each in body.boundaries.items():
@@ -91,9 +91,9 @@ def size_of_lines(body: tables.BodyTable) -> BodySize:
 
 
 class _Rectangles:
-    """Rectangles between lines, less those that are cut out.
+    """Rectangles between grid lines, without those that are cut out.
 
-    Corner (i, j) has the number ``i * (n_y + 1) + j``.
+    Corner (i, j) has the index ``i * len(y) + j``.
     """
 
     def __init__(self, lines: GridLines, body: tables.BodyTable) -> None:
@@ -105,7 +105,7 @@ class _Rectangles:
             within = [(m > s[0]) & (m < s[1]) for m, s in zip(middles, (cut.x, cut.y), strict=True)]
             opened[name] = there & np.pad(np.logical_and.outer(*within), 1)
             there &= ~opened[name]
-        # an edge or a corner is there where a rectangle beside it is
+        # an edge or a corner exists if a rectangle beside it does
         self._there, self._opened, self._names = there, opened, lines.names
         self._upright = there[:-1, 1:-1] | there[1:, 1:-1]
         self._level = there[1:-1, :-1] | there[1:-1, 1:]
@@ -114,7 +114,7 @@ class _Rectangles:
         self.n_edges = int(self._upright.sum() + self._level.sum())
 
     def sides(self) -> dict[str, Edges]:
-        """Return the edges of the outer sides, and those that each cut opens."""
+        """Return the edges of the outer sides and of the boundaries that cuts open."""
         upright, level = np.zeros_like(self._upright), np.zeros_like(self._level)
         ends = {"left": (0, None), "right": (-1, None), "bottom": (None, 0), "top": (None, -1)}
         found: dict[str, Edges] = {}
@@ -133,7 +133,7 @@ class _Rectangles:
         return found
 
     def _edges(self, upright: Flags, level: Flags) -> Edges:
-        """Return the numbers of the ends of edges (n, 2)."""
+        """Return the corner indices of edges (n, 2)."""
         number = np.arange(len(self._x) * len(self._y)).reshape(len(self._x), len(self._y))
         return np.concatenate([
             np.stack([number[:, :-1][upright], number[:, 1:][upright]], axis=1),
