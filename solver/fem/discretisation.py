@@ -75,6 +75,7 @@ class Discretisation(Nodes, Part):
             self.B = kinematics.mean_dilatation(self.B, self.weights)
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.moves = body.travelling is not None
+        self._travelling: tuple[float, NDArray[np.float64]] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
         self._eigenstrains = eigenstrains(self)
         self.heat = Heat.of(self, self.points.reshape(2, -1))
@@ -113,7 +114,9 @@ class Discretisation(Nodes, Part):
         """Return the external nodal forces (n,) at a time [N]."""
         if self.body.travelling is None:
             return super().external(time)
-        return travelling_forces(self, self.body.travelling, time)
+        if self._travelling[0] != time:  # an increment asks many times
+            self._travelling = time, travelling_forces(self, self.body.travelling, time)
+        return self._travelling[1]
 
     @property
     def side(self) -> float:

@@ -103,7 +103,7 @@ class Analysed:
         else:
             elastic = part.pattern.copy()
             elastic.data = part.elastic_data
-            self.solver = Windowed(elastic, window[part.active], np.flatnonzero(kept))
+            self.solver = Windowed(elastic, window[part.active], np.flatnonzero(kept), name)
 
     def keeps(self, touched: NDArray[np.int64]) -> bool:
         """Whether the unknowns (m,) are kept, as far as they are active."""

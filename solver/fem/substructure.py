@@ -41,7 +41,7 @@ class _CondensedBody:
         inside = np.setdiff1d(part.free, kept)
         self._schur = SchurComplement(K, kept, inside, linear_solver)
         self._loads = part.condensable.fields
-        self.forces = self._schur.condense(self._loads)
+        self.forces = self._schur.begin(self._loads).condensed
         at = self._schur.boundary
         stiffness = K[kept][:, kept].toarray()
         stiffness[np.ix_(at, at)] -= self._schur.taken
@@ -49,7 +49,7 @@ class _CondensedBody:
 
     def expand(self, u: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all displacements (n,) from those kept, at the factors of the loads."""
-        return self._schur.expand(u, self._loads @ factors)
+        return self._schur.begin(self._loads @ factors).finish(u)
 
 
 def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,19 +4,24 @@ With k the kept and i the inner unknowns, ``K_ii u_i = f_i - K_ik u_k`` and
 
     S u_k = f_k - K_ki K_ii^-1 f_i,   S = K_kk - K_ki K_ii^-1 K_ik
 
-S differs from K_kk in a dense block, on the kept unknowns that are coupled to inner ones.
+S differs from K_kk in a dense block, on the kept unknowns that are coupled to inner ones: the
+boundary b.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy import sparse
 
 from solver.linear import solvers as linear
+from solver.linear.pardiso import Pardiso
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -24,6 +29,73 @@ if TYPE_CHECKING:
 
 _COLUMNS = 64
 """Number of right-hand sides that are solved at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Eliminated:
+    """A right-hand side whose inner unknowns are eliminated.
+
+    Attributes
+    ----------
+    condensed : (m,) or (m, k) right-hand side of S
+    finish : (kept unknowns (m,) or (m, k)) -> all unknowns (n,) or (n, k)
+    """
+
+    condensed: Array
+    finish: Callable[[Array], Array]
+
+
+class _Elimination(Protocol):
+    """The inner unknowns (k, ...) eliminated down to those of the boundary (b, ...)."""
+
+    def eliminate(self, data: Array) -> Array:
+        """Return the Schur complement (b, b) of the matrix with these values."""
+
+    def forward(self, right: Array) -> Array:
+        """Return a right-hand side (k + b, ...), inner first, after the elimination."""
+
+    def backward(self, half: Array, kept: Array) -> Array:
+        """Return the solution (k + b, ...) after `forward`, given the boundary's (b, ...)."""
+
+
+class _ByColumns:
+    """The elimination by a solve for each unknown of the boundary, with any linear solver.
+
+    Parameters
+    ----------
+    upper : upper triangle (k + b, k + b), inner unknowns first
+    size : k
+    """
+
+    def __init__(self, upper: sparse.csr_array, size: int, linear_solver: str) -> None:
+        self._inner = sparse.csr_array(upper[:size, :size])
+        self._couple = sparse.csr_array(upper[:size, size:])
+        self._own = upper[size:, size:].toarray()
+        self._size = size
+        self._solver = linear.analyse(self._inner, linear_solver) if size else None
+
+    def eliminate(self, data: Array) -> Array:
+        """See `_Elimination`; ``data`` is that of the matrix it was made with."""
+        del data
+        if self._solver is not None:
+            self._solver.factorise(self._inner.data)
+        schur = self._own + np.triu(self._own, 1).T
+        for first in range(0, schur.shape[1], _COLUMNS):
+            some = slice(first, first + _COLUMNS)
+            schur[:, some] -= self._couple.T @ self._solved(self._couple[:, some].toarray())
+        return schur
+
+    def forward(self, right: Array) -> Array:
+        """See `_Elimination`."""
+        inner = self._solved(right[: self._size])
+        return np.concatenate([inner, right[self._size :] - self._couple.T @ inner])
+
+    def backward(self, half: Array, kept: Array) -> Array:
+        """See `_Elimination`."""
+        return np.concatenate([half[: self._size] - self._solved(self._couple @ kept), kept])
+
+    def _solved(self, right: Array) -> Array:
+        return right if self._solver is None or not right.any() else self._solver.solve(right)
 
 
 class SchurComplement:
@@ -44,34 +116,35 @@ class SchurComplement:
         self, matrix: sparse.csr_array, kept: Numbers, inside: Numbers, linear_solver: str = "auto"
     ) -> None:
         self.kept, self.inside = kept, inside
-        self._couple = sparse.csr_array(matrix[inside][:, kept])
-        self._solver = None
-        if len(inside):
-            upper = sparse.csr_array(sparse.triu(matrix[inside][:, inside], format="csr"))
-            upper.sort_indices()
-            self._solver = linear.analyse(upper, linear_solver)
-            self._solver.factorise(upper.data)
-        self.boundary = np.unique(self._couple.indices)
-        couple = self._couple[:, self.boundary]
-        self.taken = np.zeros((len(self.boundary),) * 2)
-        for first in range(0, len(self.boundary), _COLUMNS):
-            some = slice(first, first + _COLUMNS)
-            self.taken[:, some] = couple.T @ self._follow(couple[:, some].toarray())
+        self.boundary = np.unique(sparse.csr_array(matrix[inside][:, kept]).indices)
+        order = np.concatenate([inside, kept[self.boundary]])
+        size, ends = len(inside), len(order)
+        whole = matrix[order][:, order]
+        # twice the boundary's diagonal: also a body that moves freely is positive definite
+        stiffer = np.where(np.arange(ends) < size, 0.0, whole.diagonal())
+        upper = sparse.csr_array(sparse.triu(whole + sparse.diags_array(stiffer), format="csr"))
+        upper.sort_indices()
+        self._elimination: _Elimination
+        if linear.chosen(linear_solver) == "pardiso" and 0 < size < ends:
+            self._elimination = Pardiso(upper, np.arange(size, ends))
+        else:
+            self._elimination = _ByColumns(upper, size, linear_solver)
+        schur = np.triu(self._elimination.eliminate(upper.data))
+        taken = upper[size:, size:].toarray() - schur
+        self.taken = taken + np.triu(taken, 1).T
 
-    def condense(self, force: Array) -> Array:
-        """Return the right-hand side of S, (m,) or (m, k), from that of all unknowns (n, ...)."""
-        inner = force[self.inside]
-        if not inner.any():
-            return np.asarray(force[self.kept])
-        return np.asarray(force[self.kept] - self._couple.T @ self._follow(inner))
+    def begin(self, force: Array) -> Eliminated:
+        """Eliminate the inner unknowns of a right-hand side (n,) or (n, k)."""
+        condensed, inner = np.asarray(force[self.kept]), force[self.inside]
+        rest = np.zeros((len(self.boundary), *inner.shape[1:]))
+        right = np.asfortranarray(np.concatenate([inner, rest]))
+        half = self._elimination.forward(right) if inner.any() else right
+        condensed[self.boundary] += half[len(inner) :]
 
-    def expand(self, kept: Array, force: Array) -> Array:
-        """Return all unknowns (n,) from the kept ones (m,) and the right-hand side (n,)."""
-        u = np.zeros(len(force))
-        u[self.kept] = kept
-        u[self.inside] = self._follow(force[self.inside] - self._couple @ kept)
-        return u
+        def finish(kept: Array) -> Array:
+            u = np.zeros_like(force)
+            u[self.kept] = kept
+            u[self.inside] = self._elimination.backward(half, kept[self.boundary])[: len(inner)]
+            return u
 
-    def _follow(self, right: Array) -> Array:
-        """Return the inner unknowns for their right-hand side, with the kept unknowns at zero."""
-        return right if self._solver is None or not right.size else self._solver.solve(right)
+        return Eliminated(condensed, finish)

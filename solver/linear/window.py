@@ -6,8 +6,7 @@ With w the unknowns of the window and o the others, every matrix is
     [K_wo  K_ww]        K_oo and K_ow constant
 
 so ``- K_wo K_oo^-1 K_ow``, a dense block on the boundary of the window, is computed once and
-added to each ``K_ww``. A factorisation then costs as much as that of the window alone. A solve
-eliminates the right-hand side forward into the window, and substitutes backward out of it.
+added to each ``K_ww``. A factorisation then costs as much as that of the window alone.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.linear import solvers as linear
-from solver.linear.pardiso import Pardiso
+from solver.linear.schur import SchurComplement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Windowed:
-    """A `LinearSolver` for matrices that are the same outside a window; needs PARDISO.
+    """A `LinearSolver` for matrices that are the same outside a window.
 
     Parameters
     ----------
@@ -37,38 +36,31 @@ class Windowed:
     kept : (m,) increasing, unknowns of the window for which compliances will be needed
     """
 
-    def __init__(self, upper: sparse.csr_array, window: NDArray[np.bool_], kept: Numbers) -> None:
+    def __init__(
+        self,
+        upper: sparse.csr_array,
+        window: NDArray[np.bool_],
+        kept: Numbers,
+        linear_solver: str = "auto",
+    ) -> None:
+        within = np.flatnonzero(window)
+        matrix = sparse.csr_array(upper + sparse.triu(upper, 1, format="csr").T)
+        self._outside = SchurComplement(matrix, within, np.flatnonzero(~window), linear_solver)
         row, column = upper.tocoo().coords
-        crossing = window[row] != window[column]
-        met = np.unique(np.concatenate([row[crossing], column[crossing]]))
-        boundary = met[window[met]]
-        self._n = len(window)
-        self._within = np.flatnonzero(window)
-        self._around = np.union1d(np.flatnonzero(~window), boundary)
-        self._on_boundary = np.searchsorted(self._around, boundary)
-        self._in_window = np.searchsorted(self._within, boundary)
-
-        around = sparse.csr_array(upper[self._around][:, self._around])
-        around.sort_indices()
-        self._outer = Pardiso(around, self._on_boundary)
-        own = around[self._on_boundary][:, self._on_boundary].toarray()
-        block = np.triu(self._outer.eliminate(around.data)) - own
-
         inside = window[row] & window[column]
-        place = np.full(self._n, -1)
-        place[self._within] = np.arange(len(self._within))
-        first, second = np.triu_indices(len(boundary))
-        rows = np.concatenate([place[row[inside]], self._in_window[first]])
-        columns = np.concatenate([place[column[inside]], self._in_window[second]])
-        size = len(self._within)
+        place = np.searchsorted(within, np.arange(len(window)))
+        first, second = np.triu_indices(len(self._outside.boundary))
+        rows = np.concatenate([place[row[inside]], self._outside.boundary[first]])
+        columns = np.concatenate([place[column[inside]], self._outside.boundary[second]])
+        size = len(within)
         keys, slot = np.unique(rows * size + columns, return_inverse=True)
         indptr = np.searchsorted(keys, np.arange(size + 1) * size)
         self._entries = np.flatnonzero(inside)
         self._slot, dense = np.split(slot, [len(self._entries)])
         self._constant = np.zeros(len(keys))
-        self._constant[dense] = block[first, second]
+        self._constant[dense] = -self._outside.taken[first, second]
         inner = sparse.csr_array((self._constant, keys % size, indptr), shape=(size, size))
-        self._inner = linear.analyse(inner, "pardiso", place[kept])
+        self._inner = linear.analyse(inner, linear_solver, place[kept])
 
     def factorise(self, data: Vector) -> None:
         """Factorise the upper triangle (n, n) with these values; raise `Singular` if that fails."""
@@ -83,21 +75,9 @@ class Windowed:
 
     def begin(self, b: Vector) -> linear.Begun:
         """Begin the solution for ``b`` (n,): compute its kept unknowns only."""
-        right = b[self._around]
-        right[self._on_boundary] = 0.0
-        half = self._outer.forward(right)
-        within = b[self._within]
-        within[self._in_window] += half[self._on_boundary]
-        begun = self._inner.begin(within)
-
-        def finish(change: Vector) -> Vector:
-            u = begun.finish(change)
-            x = np.zeros(self._n)
-            x[self._around] = self._outer.backward(half, u[self._in_window])
-            x[self._within] = u
-            return x
-
-        return linear.Begun(begun.kept, finish)
+        outside = self._outside.begin(b)
+        begun = self._inner.begin(outside.condensed)
+        return linear.Begun(begun.kept, lambda change: outside.finish(begun.finish(change)))
 
     def compliance(self, rows: Vector) -> Vector:
         """Return ``rows A^-1 rows'`` for ``rows`` (k, m) on the m unknowns kept."""

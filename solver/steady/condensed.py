@@ -53,7 +53,7 @@ class CondensedTrack:
 
     def condense(self, force: Array) -> Array:
         """Return condensed forces (m, ...), equivalent to forces on all nodes (n, ...) [N]."""
-        return self._outside.condense(force)
+        return self._outside.begin(force).condensed
 
     def solve(self, force: Array) -> Array:
         """Return displacements (m,) or (m, k) for condensed forces."""
@@ -61,4 +61,4 @@ class CondensedTrack:
 
     def expand(self, kept: Array, force: Array) -> Array:
         """Return all displacements (n,) from the kept ones (m,) and the forces (n,)."""
-        return self._outside.expand(kept, force)
+        return self._outside.begin(force).finish(kept)

@@ -11,6 +11,7 @@ from scipy import sparse
 from solver.errors import ModelError
 from solver.linear import pardiso
 from solver.linear import solvers as linear
+from solver.linear.schur import SchurComplement
 from solver.linear.window import Windowed
 
 NAMES = ["superlu", *(["pardiso"] if pardiso.library() else [])]
@@ -103,16 +104,15 @@ def test_a_solution_begun_is_finished_for_any_change_on_the_kept_unknowns(name, 
     assert np.abs(begun.kept - solver.solve(b)[kept]).max() < 1e-9 * size
 
 
-def test_a_window_gives_what_the_whole_matrix_gives():
+@pytest.mark.parametrize("name", NAMES)
+def test_a_window_gives_what_the_whole_matrix_gives(name):
     """Only entries between unknowns of the window change; the grid is 30 by 30."""
-    if pardiso.library() is None:
-        pytest.skip("MKL is not installed")
     A, upper = matrix()
     at = np.arange(A.shape[0])
     window = (at % 30 < 12) & (at // 30 < 9)
     kept = np.array([3, 17 + 30 - 15, 185])
     assert window[kept].all()
-    solver = Windowed(upper, window, kept)
+    solver = Windowed(upper, window, kept, name)
     random = np.random.default_rng(6)
     b, change = random.standard_normal((2, len(at)))
     rows = random.standard_normal((2, 3))
@@ -132,3 +132,32 @@ def test_a_window_gives_what_the_whole_matrix_gives():
         assert np.abs(begun.finish(change[kept]) - exact @ changed).max() < 1e-12 * size
         W = rows @ exact[np.ix_(kept, kept)] @ rows.T
         assert np.abs(solver.compliance(rows) - W).max() < 1e-12 * np.abs(W).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
+def test_a_schur_complement_is_that_of_dense_algebra(name, held):
+    """A grid of 30 by 30 springs: 50 unknowns are kept, held ones are zero."""
+    A, _ = matrix()
+    if not held:  # no force for equal displacements of all
+        A = sparse.csr_array(A - sparse.diags_array(A.sum(axis=1)))
+    at = np.arange(A.shape[0])
+    kept = at[100:150]
+    inside = np.setdiff1d(at, np.concatenate([kept, at[:100] if held else []]))
+    found = SchurComplement(A, kept, inside, name)
+    dense = A.toarray()
+    couple, inverse = dense[np.ix_(kept, inside)], np.linalg.inv(dense[np.ix_(inside, inside)])
+    taken = np.zeros((50, 50))
+    taken[np.ix_(found.boundary, found.boundary)] = found.taken
+    assert np.abs(taken - couple @ inverse @ couple.T).max() < 1e-13 * np.abs(dense).max()
+    force = np.random.default_rng(7).standard_normal((len(at), 3))
+    u = np.random.default_rng(8).standard_normal((50, 3))
+    for k in (np.s_[:], 0):
+        begun = found.begin(force[:, k])
+        condensed = force[kept][:, k] - couple @ inverse @ force[inside][:, k]
+        assert np.abs(begun.condensed - condensed).max() < 1e-12 * np.abs(condensed).max()
+        inner = inverse @ (force[inside][:, k] - couple.T @ u[:, k])
+        whole = begun.finish(u[:, k])
+        assert np.abs(whole[inside] - inner).max() < 1e-11 * np.abs(inner).max()
+        assert np.array_equal(whole[kept], u[:, k])
+        assert not whole[:100].any() or not held
