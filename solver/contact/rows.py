@@ -23,7 +23,7 @@ def joined(pieces: list[ContactRows]) -> ContactRows | None:
     """Return the rows of all surfaces of a part; unknowns that surfaces share occur once."""
     if not pieces:
         return None
-    dofs, place = np.unique(np.concatenate([p.dofs for p in pieces]), return_inverse=True)
-    block = np.zeros((len(pieces[0].block), len(dofs)))
-    np.add.at(block, (slice(None), place), np.hstack([p.block for p in pieces]))  # type: ignore[arg-type]
-    return ContactRows(dofs, block)
+    every, block = np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces])
+    order = np.argsort(every, kind="stable")
+    dofs, first = np.unique(every[order], return_index=True)
+    return ContactRows(dofs, np.add.reduceat(block[:, order], first, axis=1))

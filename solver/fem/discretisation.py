@@ -256,11 +256,12 @@ class Discretisation(Nodes, Part):
 
     def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-        strain, weight = self.strain(step), self.weights.ravel()
+        strain, yields = self.strain(step), response.yielding
         C = self.body.law.stiffness(len(strain))
-        tangent = np.einsum("ap,abp,bp->p", strain, response.tangent, strain) @ weight
-        elastic = (strain * (C @ strain)).sum(axis=0) @ weight
-        return float(tangent), float(elastic)
+        elastic = (strain * (C @ strain)).sum(axis=0) * self.volumes
+        some, D = strain[:, yields], response.tangent[:, :, yields]
+        tangent = np.einsum("ap,abp,bp->p", some, D, some) @ self.volumes[yields]
+        return float(elastic[~yields].sum() + tangent), float(elastic.sum())
 
     def most_strained(self, step: NDArray[np.float64]) -> int:
         """Return the number of the point that a step (n,) strains most."""
