@@ -25,14 +25,9 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
-def pytest_xdist_auto_num_workers() -> int:
-    """Return the number of test processes: one more than cores, as tests of the service wait."""
-    return len(os.sched_getaffinity(0)) + 1
-
-
 @pytest.hookimpl(trylast=True)
 def pytest_collection_finish() -> None:
-    """Keep the thousands of collected tests out of each search for garbage: 3 % of all time."""
+    """Keep the thousands of collected tests out of each search for garbage: 2 % of all time."""
     gc.collect()
     gc.freeze()
 
