@@ -26,8 +26,9 @@ LIMIT = 1e-9
 COSTS = ("cpu_seconds", "wall_seconds", "seconds")
 """Variables that differ from run to run."""
 
-ROUNDING = 1e-6
-"""Figures of the audit below it are rounding."""
+ROUNDING = {"mm": 1e-9, "MPa": 1e-8, "N": 1e-6, "1": 1e-9}
+"""Changes that rounding causes, by unit, where lengths of 1 m, stress of 1000 MPa and forces of
+100 kN cancel; of ratios only those of the audit. Smaller changes do not count."""
 
 Numbers = dict[str, Any]
 
@@ -130,16 +131,20 @@ def changes(before: Numbers, after: Numbers) -> Iterator[tuple[str, float]]:
                 yield f"{key} has NaN elsewhere", np.inf
                 continue
             largest = np.nanmax(np.abs(old), initial=0.0)
-            if (
-                key.startswith("audit_")
-                and max(largest, np.nanmax(np.abs(new), initial=0)) < ROUNDING
-            ):
-                continue
             change = np.nanmax(np.abs(new - old), initial=0.0) if largest < np.inf else 0.0
-            if change > 0:
+            if change > _rounding(key):
                 yield key, float(change / largest) if largest else np.inf
         elif not np.array_equal(old, new):
             yield key, np.inf
+
+
+def _rounding(name: str) -> float:
+    """Return the change of a variable that rounding causes, in its unit."""
+    import solver.scenes  # noqa: F401  (declares all quantities)
+    from solver.results.quantities import QUANTITIES
+
+    units = QUANTITIES[name].units if name in QUANTITIES else ""
+    return 0.0 if units == "1" and not name.startswith("audit_") else ROUNDING.get(units, 0.0)
 
 
 def main() -> int:
