@@ -92,15 +92,15 @@ class RowFlow:
             self.after.plastic_strain - before.plastic_strain,
         )
 
-    def surface(self) -> tuple[PlasticState, Layers]:
-        """Return the internal variables (..., n, n_columns) at the surface, and the layer behind.
+    def left(self) -> tuple[PlasticState, Layers]:
+        """Return the internal variables (..., n, n_columns) at the surface, and the layers behind.
 
-        Its strain is that of the uppermost rows, extrapolated. Plastic strain changes too abruptly
-        in depth for that; it follows from the strain, as on any row.
+        The strain at the surface is extrapolated from the uppermost rows. Plastic strain changes
+        too abruptly in depth for that; it follows from the strain, as on any row.
         """
         top = self._before.top
         flow = self._of(top, self._rows.onto_surface(self._added))
-        return flow.states, replace(top, state=flow.after)
+        return flow.states, replace(self.after, surface=replace(top, state=flow.after))
 
     def _of(self, before: Layers, added: Array) -> Flow:
         """Return the flow along rows with these states before and these added strains."""

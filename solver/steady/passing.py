@@ -16,14 +16,14 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
-from solver.steady.flow import RowFlow, usual_parts
+from solver.steady.flow import usual_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.materials.state import PlasticState
+    from solver.steady.flow import RowFlow
     from solver.steady.layers import Layers
     from solver.steady.load import AppliedLoad, PassingLoad
     from solver.steady.track import Track
@@ -148,7 +149,6 @@ def passing(
     """
     rows, solve = track.rows, track.operator.solve
     parts = parts or usual_parts(material)
-    shape = (*rows.shape, 4)
     scale = np.sqrt(rows.weights)[..., None]
     double_shear = 2 * material.elasticity.shear_modulus
     solves, krylov = 0, _KRYLOV
@@ -156,26 +156,25 @@ def passing(
     def at(added: Array) -> _At:
         nonlocal solves
         solves += 1
-        flow = RowFlow(rows, material, before, added, parts)
+        flow = track.flow(material, before, added, parts)
         loading = load.on(solve(flow.force))
         residual = rows.strain(loading.u) - added
         return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
 
-    nothing = np.zeros(len(track.operator.kept))
-    here = at(rows.strain(load.on(nothing).u) if guess is None else guess)
-    start, sizes = here.size, [here.size]
+    here = at(rows.strain(load.on(track.at_rest).u) if guess is None else guess)
+    start, sizes, shape = here.size, [here.size], here.added.shape
     for step in range(_STEPS):
         left_over = _deviation(here.residual)
         if left_over * double_shear < tolerance * material.yield_stress:
             flow = here.flow
             if flow.beyond:
                 raise WindowTooSmall(f"the window is too small {flow.beyond} for a steady pass")
-            surface, top = flow.surface()
+            surface, after = flow.left()
             return Pass(
                 law=material,
                 parts=parts,
                 before=before,
-                after=replace(flow.after, surface=top),
+                after=after,
                 strain=here.added,
                 states=flow.states,
                 ago=flow.ago,

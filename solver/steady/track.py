@@ -19,6 +19,7 @@ from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
 from solver.steady.condensed import CondensedTrack
+from solver.steady.flow import RowFlow
 from solver.steady.load import Given
 from solver.steady.rows import FlowRows
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
     from solver.fem.surface import Surface
     from solver.materials.elasticity import Elasticity
+    from solver.materials.law import Law
+    from solver.steady.layers import Layers
 
     Array = NDArray[np.float64]
 
@@ -109,6 +112,15 @@ class Track:
         edge = 1e-6 * deep
         inside = (x < ahead + edge) & (x > -behind - edge) & (y > -deep - edge)
         return CondensedTrack(self.part, np.flatnonzero(inside))
+
+    @property
+    def at_rest(self) -> Array:
+        """Displacements (m,) of the window without plastic strain and load: zero [mm]."""
+        return np.zeros(len(self.operator.kept))
+
+    def flow(self, law: Law, before: Layers, added: Array, parts: int) -> RowFlow:
+        """Return the flow of a material along the rows, see `RowFlow`."""
+        return RowFlow(self.rows, law, before, added, parts)
 
     @cached_property
     def at_surface(self) -> NDArray[np.int64]:
