@@ -31,13 +31,15 @@ _RATIO = 8
 _CUT = 6.0
 """Product of k and width beyond which waves are left out: the transform is below 3e-6 there."""
 _LOOSE = 1e-9
+"""Singular value of the motions of the surface rows, of 1 at the farthest node; below it the rows
+do not carry a resultant."""
 
 
 class FarField:
     """The difference of an endless prism to one loaded every L, for loads near one station.
 
-    Resultants are forces along x, y and z and the moment about x: `Section.rigid` on the surface
-    rows.
+    Resultants (4,) are the forces along x, y and z [N] and the moment about x, at the middle of the
+    nodes of the section [N mm].
 
     Parameters
     ----------
@@ -47,8 +49,8 @@ class FarField:
 
     Attributes
     ----------
-    displacement : (n_rows, window, 4) of the surface rows for unit resultants [mm/N]
-    strain : (n_points, window, 6, 4) Mandel strain at the points of the zone [1/N]
+    displacement : (n_rows, window, 4) of the surface rows for unit resultants [mm/N, 1/N]
+    strain : (n_points, window, 6, 4) Mandel strain at the points of the zone [1/N, 1/(N mm)]
 
     Raises
     ------
@@ -59,7 +61,8 @@ class FarField:
     def __init__(self, modes: Modes, x: float, levels: int = 3) -> None:
         self._spacing = modes.length / modes.stations
         self._motions = modes.rows @ modes.section.rigid[modes.unknowns]
-        if np.linalg.matrix_rank(self._motions, tol=_LOOSE) < self._motions.shape[1]:
+        size = np.abs(modes.section.rigid).max(axis=0)
+        if np.linalg.matrix_rank(self._motions / size, tol=_LOOSE) < len(size):
             allowed = "must carry forces along x, y and z and a moment about x"
             raise ModelError("surface", f"{len(self._motions)} rows", allowed)
         k, share = _waves(modes.length, levels)
@@ -85,10 +88,7 @@ class FarField:
         self.strain = modes.by_point(summed(strain, modes.carrying))
 
     def resultants(self, forces: Array) -> Array:
-        """Return the resultants (4,) of forces (n_rows, window) on the surface rows [N, N mm].
-
-        The moment is that about x over the size of `Section.rigid` [N].
-        """
+        """Return the resultants (4,) of forces (n_rows, window) on the surface rows [N/mm]."""
         return self._spacing * (self._motions.T @ forces.sum(axis=1))
 
 

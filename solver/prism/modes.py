@@ -115,12 +115,12 @@ class Modes:
         areas = sparse.diags_array(np.tile(self.weights, 6))
         self._force0 = sparse.csr_array(self.B0.T @ areas)
         self._force1 = sparse.csr_array(self.B1.T @ areas)
-        self._set_rows(surface)
+        self._set_rows(surface, zone)
         self._set_transforms(window, np.asarray(behind, dtype=float))
         self._factors = _factorised(section, self.unknowns, self.wavenumbers.tolist())
 
-    def _set_rows(self, surface: sparse.csr_array | None) -> None:
-        """Restrict the surface rows to the zone, those along x last."""
+    def _set_rows(self, surface: sparse.csr_array | None, zone: NDArray[np.bool_]) -> None:
+        """Restrict the surface rows to the zone."""
         section = self.section
         rows = sparse.csr_array((0, section.n)) if surface is None else sparse.csr_array(surface)
         axis = np.arange(section.n) % 3 == I_AXIS
@@ -128,8 +128,8 @@ class Modes:
         parts = np.stack([size @ axis.astype(float), size @ (~axis).astype(float)])
         for row in np.flatnonzero((parts > 0).all(axis=0))[:1]:
             raise ModelError("surface", int(row), "this row is along x and across it: must be one")
-        outside = np.setdiff1d(section.free, self.unknowns)
-        for row in np.flatnonzero(size @ np.isin(np.arange(section.n), outside) > 0)[:1]:
+        outside = ~np.isin(np.arange(section.n), section.dofs[zone])
+        for row in np.flatnonzero(size @ outside.astype(float) > 0)[:1]:
             raise ModelError("surface", int(row), "this row has nodes outside the zone")
         self.along = parts[0] > 0
         self.rows = sparse.csr_array(rows[:, self.unknowns])

@@ -136,7 +136,7 @@ class Section:
 
     def _check_held(self, held: Numbers) -> None:
         """Raise `ModelError` if neither supports nor springs hold a motion of the whole prism."""
-        motions = self.rigid
+        motions = self.rigid / np.abs(self.rigid).max(axis=0)
         rows = [motions[held]]
         for boundary, along in self._springs.items():
             nodes = self.plane.boundary_nodes(boundary)
@@ -147,15 +147,14 @@ class Section:
 
     @cached_property
     def rigid(self) -> Array:
-        """Motions (n, 4) that strain nothing: along x, y, z, and a turn about x.
+        """Motions (n, 4) that strain nothing: by 1 mm along x, y, z, and by 1 rad about x [mm].
 
-        The turn has its axis in the middle of the nodes, and moves the farthest by 1.
+        The axis of the turn is in the middle of the nodes.
         """
         z, y = self.plane.X - self.plane.X.mean(axis=1, keepdims=True)
-        size = float(np.hypot(z, y).max())
         motions = np.zeros((len(z), 3, 4))
         motions[:, 0, 0] = motions[:, 1, 1] = motions[:, 2, 2] = 1.0
-        motions[:, 1, 3], motions[:, 2, 3] = -z / size, y / size
+        motions[:, 1, 3], motions[:, 2, 3] = -z, y
         return motions.reshape(self.n, 4)
 
     @cached_property
