@@ -394,6 +394,35 @@ def test_a_bar_on_springs_is_the_endless_beam(length: float) -> None:
         assert -near.displacement[middle, some].min() > 3 * beam.max()
 
 
+@pytest.mark.parametrize("resultant", range(4))
+def test_each_resultant_has_its_far_field(resultant: int) -> None:
+    """Force along x, y, z or moment about x; near the load the length does not matter.
+
+    What is left at L = 512 are the shapes of forces that no resultant tells, from one length away.
+    """
+    mesh = grid(np.linspace(-15.0, 15.0, 3), np.linspace(-60.0, 0.0, 7))
+    section = Section(mesh, STEEL, springs={"bottom": (0.03, 0.03, 0.03)})
+    rows = section.rows(on_top(section, 15.0))
+    shape = (rows @ section.rigid)[:, resultant]
+    deep = section.points[1].ravel() < -40.0  # above, stations of 16 mm do not resolve the load
+    found, alone = [], []
+    for length in (512.0, 4096.0):
+        n = round(length / 16.0)
+        modes = Modes(section, np.ones(len(section.weights), bool), length, n, window=11,
+                      surface=rows)  # fmt: skip
+        far = FarField(modes, modes.x[5])
+        forces = np.zeros((len(shape), 11))
+        forces[:, 5] = shape / 16.0 / (shape @ shape)
+        near, resultants = modes.solve(forces=forces), far.resultants(forces)
+        assert resultants[resultant] == pytest.approx(1.0)
+        alone.append(near.displacement)
+        found.append((near.displacement + far.displacement @ resultants,
+                      (near.strain + far.strain @ resultants)[deep]))  # fmt: skip
+    for short, long in zip(*found, strict=True):
+        assert short == pytest.approx(long, abs=2e-4 * np.abs(long).max())
+    assert np.abs(alone[0]).max() > 2 * np.abs(found[0][0]).max()
+
+
 def test_bad_input_is_told_with_what_is_allowed() -> None:
     section, zone = block(1.5, reach=8.0)
     mesh = section.plane.body.mesh
