@@ -18,6 +18,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.linear import solvers as linear
+from solver.prism.modes import superposed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,20 +70,12 @@ class FarField:
         u = _responses(modes, self._motions, k)
         flat = u.reshape(len(u), -1)
         strain = modes.B0 @ flat + modes.B1 @ (flat * np.repeat(k, u.shape[2]))
-        # u = Re(i^carried e^(i k x) / i^along U), carried by the result, along x of the load
         phase = np.outer(k, modes.x - x)
-        trig = share[:, None] * np.stack([np.cos(phase), -np.sin(phase)])
         along = np.any(self._motions[modes.along] != 0, axis=0)
 
         def summed(amplitudes: Array, carrying: NDArray[np.bool_]) -> Array:
-            each = amplitudes.reshape(len(carrying), len(k), -1)
-            out = np.empty((len(carrying), len(modes.x), each.shape[2]))
-            for load, i_load in enumerate(along):
-                for i_result in (False, True):
-                    some = carrying == i_result
-                    factor = trig[0] if i_result == i_load else trig[1] * (-1) ** i_load
-                    out[some, :, load] = each[some, :, load] @ factor
-            return out
+            each = amplitudes.reshape(len(carrying), *u.shape[1:])
+            return superposed(each, phase, share, carrying, along).swapaxes(1, 2)
 
         self.displacement = summed(modes.rows @ flat, modes.along)
         self.strain = modes.by_point(summed(strain, modes.carrying))

@@ -145,7 +145,8 @@ class Modes:
         self._into = plain[:window], carrying[:window]
         twice = np.full(n // 2 + 1, 2.0)
         twice[[0, -1]] = 1.0
-        share = np.repeat(twice / n, 2)
+        self._share = twice / n
+        share = np.repeat(self._share, 2)
         self._back = (share * plain[:window]).T.copy(), (share * carrying[:window]).T.copy()
         self._into_behind = self._into
         if len(behind):
@@ -191,6 +192,18 @@ class Modes:
     def compliance(self) -> Array:
         """Displacements (waves, n_rows, n_rows) of the rows for unit forces on them [mm2/N]."""
         return np.stack([self.rows @ each for each in self.columns])
+
+    @cached_property
+    def kernel(self) -> Array:
+        """Displacement of the rows for unit forces at one station (n_rows, n_rows, stations).
+
+        ``kernel[i, j, d]`` is that of row i, d stations downstream of a force on row j [mm2/N];
+        -d is ``stations - d``.
+        """
+        apart = -self.length / self.stations * np.arange(self.stations)
+        phase = np.outer(self.wavenumbers, apart)
+        amplitudes = self.compliance.swapaxes(0, 1)
+        return superposed(amplitudes, phase, self._share, self.along, self.along)
 
     def _nodal(self, eigenstress: Array | None, forces: Array | None) -> Array:
         """Return the nodal forces (waves, 2, m), real and imaginary [N/mm]."""
@@ -241,6 +254,37 @@ class Modes:
         return np.where(self.along[:, None], amplitudes @ carrying, amplitudes @ plain)
 
 
+def superposed(
+    amplitudes: Array,
+    phase: Array,
+    share: Array,
+    carrying: NDArray[np.bool_],
+    along: NDArray[np.bool_],
+) -> Array:
+    """Return results (n_results, n_loads, n_places) of loads as sums of waves.
+
+    Parameters
+    ----------
+    amplitudes : (n_results, waves, n_loads) real amplitudes for real amplitudes 1 of the loads
+    phase : (waves, n_places) k times the distance along x from the load
+    share : (waves,) factors of the waves
+    carrying, along : (n_results,), (n_loads,) whether a result, a load carries i
+    """
+    # Re(i e^(i phase)) = -sin, and a load that carries i is divided by it
+    factors = {
+        (False, False): np.cos(phase),
+        (True, True): np.cos(phase),
+        (True, False): -np.sin(phase),
+        (False, True): np.sin(phase),
+    }
+    out = np.empty((len(carrying), len(along), phase.shape[1]))
+    for (i_result, i_load), factor in factors.items():
+        results, loads = np.flatnonzero(carrying == i_result), np.flatnonzero(along == i_load)
+        some = amplitudes[results][:, :, loads]
+        out[np.ix_(results, loads)] = np.tensordot(some, share[:, None] * factor, axes=(1, 0))
+    return out
+
+
 def _check(
     section: Section,
     zone: NDArray[np.bool_],
@@ -268,7 +312,7 @@ def _factorised(
 ) -> list[LinearSolver]:
     """Return for each wave the inverse of the stiffness on some unknowns, the others condensed."""
     rest = np.setdiff1d(section.free, zone)
-    coupled = (~np.isin(section.dofs, zone)).any(axis=1)
+    coupled = np.isin(section.dofs, rest).any(axis=1)
     rim = np.intersect1d(section.dofs[coupled], zone)
     own, outside = section.stiffness(zone), section.stiffness(np.concatenate([rest, rim]))
     elimination = Elimination(outside.pattern, len(rest))

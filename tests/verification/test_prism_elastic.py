@@ -252,6 +252,16 @@ def test_forces_and_eigenstress_are_reciprocal() -> None:
     assert of_forces == pytest.approx(of_stress, rel=ROUNDING)
 
 
+def test_the_kernel_is_the_response_to_one_station() -> None:
+    section, zone = block(1.5, reach=8.0)
+    modes = Modes(section, zone, 16.0, 10, surface=section.rows(on_top(section, 3.0)))
+    _, forces = random_fields(modes)
+    exact = modes.solve(forces=forces).displacement
+    apart = (np.arange(10)[:, None] - np.arange(10)) % 10
+    found = np.einsum("ijcd,jd->ic", modes.kernel[:, :, apart], forces)
+    assert found == pytest.approx(exact, abs=ROUNDING * np.abs(exact).max())
+
+
 def test_loads_constant_along_the_prism_are_plane_strain() -> None:
     section, zone = block(1.0, reach=8.0)
     body = Body(
