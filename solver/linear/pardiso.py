@@ -24,6 +24,7 @@ _SEQUENTIAL = 1
 _ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
 NOT_POSITIVE = -4
 POSITIVE_DEFINITE, INDEFINITE = 2, -2
+MINIMUM_DEGREE, DISSECTION = 0, 2
 
 
 @cache
@@ -61,6 +62,7 @@ class Pardiso:
     kept : (m,) increasing, unknowns eliminated last, of a positive definite matrix; none by
         default
     kind : `POSITIVE_DEFINITE` or `INDEFINITE`
+    ordering : `DISSECTION` (nested) or `MINIMUM_DEGREE`
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class Pardiso:
         upper: csr_array,
         kept: NDArray[np.int64] | None = None,
         kind: int = POSITIVE_DEFINITE,
+        ordering: int = DISSECTION,
     ) -> None:
         self.kind = kind
         self.n = upper.shape[0]
@@ -80,7 +83,7 @@ class Pardiso:
         self._handle = np.zeros(64, dtype=np.int64)
         self._iparm = np.zeros(64, dtype=np.int32)
         self._iparm[0] = 1  # values below, not defaults
-        self._iparm[1] = 2  # nested dissection
+        self._iparm[1] = ordering
         self._iparm[9] = 8 if kind == INDEFINITE else 0  # pivot perturbation 1e-8
         self._iparm[34] = 1  # zero-based
         self._iparm[35] = 2 if len(self._kept) else 0  # Schur complement, and factors to solve with

@@ -45,57 +45,99 @@ class Eliminated:
     finish: Callable[[Array], Array]
 
 
-class _Elimination(Protocol):
-    """The inner unknowns (k, ...) eliminated down to those of the boundary (b, ...)."""
+class _Method(Protocol):
+    """How the first k unknowns of a matrix (k + b, k + b) are eliminated."""
 
     def eliminate(self, data: Array) -> Array:
-        """Return the Schur complement (b, b) of the matrix with these values."""
+        """Return the Schur complement (b, b) of the matrix with these values; its upper triangle.
+
+        What is below the diagonal is undefined.
+        """
 
     def forward(self, right: Array) -> Array:
-        """Return a right-hand side (k + b, ...), inner first, after the elimination."""
+        """Return a right-hand side (k + b, ...) after the elimination."""
 
     def backward(self, half: Array, kept: Array) -> Array:
-        """Return the solution (k + b, ...) after `forward`, given the boundary's (b, ...)."""
+        """Return the solution (k + b, ...) after `forward`, given the last unknowns (b, ...)."""
 
 
 class _ByColumns:
-    """The elimination by a solve for each unknown of the boundary, with any linear solver.
+    """The elimination by a solve for each of the last unknowns, with any linear solver.
 
     Parameters
     ----------
-    upper : upper triangle (k + b, k + b), inner unknowns first
+    upper : upper triangle (k + b, k + b)
     size : k
     """
 
     def __init__(self, upper: sparse.csr_array, size: int, linear_solver: str) -> None:
-        self._inner = sparse.csr_array(upper[:size, :size])
-        self._couple = sparse.csr_array(upper[:size, size:])
-        self._own = upper[size:, size:].toarray()
-        self._size = size
-        self._solver = linear.analyse(self._inner, linear_solver) if size else None
+        self._upper, self._size = upper.copy(), size
+        inner = sparse.csr_array(upper[:size, :size])
+        self._solver = linear.analyse(inner, linear_solver) if size else None
 
     def eliminate(self, data: Array) -> Array:
-        """See `_Elimination`; ``data`` is that of the matrix it was made with."""
-        del data
+        """See `_Method`."""
+        size = self._size
+        self._upper.data = data
+        self._couple = sparse.csr_array(self._upper[:size, size:])
         if self._solver is not None:
-            self._solver.factorise(self._inner.data)
-        schur = self._own + np.triu(self._own, 1).T
+            self._solver.factorise(sparse.csr_array(self._upper[:size, :size]).data)
+        schur = self._upper[size:, size:].toarray()
+        schur += np.triu(schur, 1).T
         for first in range(0, schur.shape[1], _COLUMNS):
             some = slice(first, first + _COLUMNS)
             schur[:, some] -= self._couple.T @ self._solved(self._couple[:, some].toarray())
         return schur
 
     def forward(self, right: Array) -> Array:
-        """See `_Elimination`."""
+        """See `_Method`."""
         inner = self._solved(right[: self._size])
         return np.concatenate([inner, right[self._size :] - self._couple.T @ inner])
 
     def backward(self, half: Array, kept: Array) -> Array:
-        """See `_Elimination`."""
+        """See `_Method`."""
         return np.concatenate([half[: self._size] - self._solved(self._couple @ kept), kept])
 
     def _solved(self, right: Array) -> Array:
         return right if self._solver is None or not right.any() else self._solver.solve(right)
+
+
+class Elimination:
+    """The first k unknowns of symmetric matrices eliminated; their pattern is analysed once.
+
+    Parameters
+    ----------
+    upper : upper triangle (k + b, k + b) in CSR, columns increasing, diagonal present; positive
+        definite on the first k unknowns
+    size : k
+    """
+
+    def __init__(self, upper: sparse.csr_array, size: int, linear_solver: str = "auto") -> None:
+        self._upper, self._size = upper.copy(), size
+        ends = upper.shape[0]
+        self._diagonal = upper.indptr[size:-1]  # the first entries of the last rows
+        self._method: _Method
+        if linear.chosen(linear_solver) == "pardiso" and 0 < size < ends:
+            self._method = Pardiso(upper, np.arange(size, ends))
+        else:
+            self._method = _ByColumns(upper, size, linear_solver)
+
+    def taken(self, data: Array) -> Array:
+        """Eliminate, with these values; return ``K_bi K_ii^-1 K_ib`` (b, b)."""
+        # twice the diagonal of the rest: also a body that moves freely is positive definite
+        self._upper.data = data.copy()
+        self._upper.data[self._diagonal] *= 2
+        schur = np.triu(self._method.eliminate(self._upper.data))
+        taken = self._upper[self._size :, self._size :].toarray() - schur
+        return taken + np.triu(taken, 1).T
+
+    def forward(self, right: Array) -> Array:
+        """Return a right-hand side (k + b, ...) after the elimination by `taken`."""
+        return self._method.forward(right)
+
+    def backward(self, half: Array, kept: Array) -> Array:
+        """Return the solution (k + b, ...) after `forward`, given the last unknowns (b, ...)."""
+        return self._method.backward(half, kept)
 
 
 class SchurComplement:
@@ -118,20 +160,10 @@ class SchurComplement:
         self.kept, self.inside = kept, inside
         self.boundary = np.unique(sparse.csr_array(matrix[inside][:, kept]).indices)
         order = np.concatenate([inside, kept[self.boundary]])
-        size, ends = len(inside), len(order)
-        whole = matrix[order][:, order]
-        # twice the boundary's diagonal: also a body that moves freely is positive definite
-        stiffer = np.where(np.arange(ends) < size, 0.0, whole.diagonal())
-        upper = sparse.csr_array(sparse.triu(whole + sparse.diags_array(stiffer), format="csr"))
+        upper = sparse.csr_array(sparse.triu(matrix[order][:, order], format="csr"))
         upper.sort_indices()
-        self._elimination: _Elimination
-        if linear.chosen(linear_solver) == "pardiso" and 0 < size < ends:
-            self._elimination = Pardiso(upper, np.arange(size, ends))
-        else:
-            self._elimination = _ByColumns(upper, size, linear_solver)
-        schur = np.triu(self._elimination.eliminate(upper.data))
-        taken = upper[size:, size:].toarray() - schur
-        self.taken = taken + np.triu(taken, 1).T
+        self._elimination = Elimination(upper, len(inside), linear_solver)
+        self.taken = self._elimination.taken(upper.data)
 
     def begin(self, force: Array) -> Eliminated:
         """Eliminate the inner unknowns of a right-hand side (n,) or (n, k)."""

