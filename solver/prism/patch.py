@@ -1,0 +1,290 @@
+"""An elastic wheel that rolls over the surface of a prism, in the frame of its axle.
+
+Material of both bodies flows upstream to downstream through the contact, in which nothing changes.
+The *slip* at station c is the motion of the surface over the wheel while the axle advances by one
+station: with the displacements u of surface minus wheel, in local axes,
+
+    slip[c] = u_t[c] - u_t[c - 1] + rigid slip       gap[c] = gap of the bodies - u_n[c]
+
+The displacements are those without tractions, and linear in the tractions: the influence between
+two stations depends on their distance alone. The rest is the problem of `friction_cone`. The wheel
+is a half-space; its tractions are those of the surface, mirrored.
+
+J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), sections 1.6 and 4.2.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
+from solver.linear.threads import one_thread
+from solver.prism.friction_cone import NORMAL, OPEN, TANGENTS, ConeProblem, solve_cone
+from solver.prism.half_space import half_space
+from solver.prism.influence import Influence
+from solver.prism.patch_contact import PatchContact
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.prism.friction_cone import ConeSolution
+    from solver.prism.patch_grid import PatchGrid
+    from solver.prism.profiled_wheel import ProfiledWheel
+
+    Array = NDArray[np.float64]
+
+_MIRROR = np.array([1.0, -1.0, 1.0])
+"""Local axes of the wheel's surface, in those of the prism's; (shear, pressure, shear) likewise."""
+_PRESSED = 0.5
+"""Ratio of the interpenetration of undeformed bodies to their approach, over the expected contact.
+For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
+_SLIDES = 1.0
+"""Creepage at which all of a contact slips."""
+
+
+class RollingPatch:
+    """A wheel pressed on the surface of a prism; see `PatchLoad`.
+
+    Parameters
+    ----------
+    grid : stations and vertices of the surface
+    compliance : (N, m, 3, m, 3) [mm/MPa], N >= n: entry ``[d, i, a, j, b]`` is the displacement of
+        the surface along axis a, the mean under hat i, d stations downstream of a unit traction
+        along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
+        stations that repeats itself has every d once
+    wheel : the wheel
+    friction : coefficient of friction
+    force : vertical force on the axle [N]
+    drive : moment on the axle over radius, positive when braking, over friction times force; None
+        if ``creepage`` is given
+    lateral_force : force on the surface along z [N]; None if ``lateral_creepage`` is given
+    creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
+    """
+
+    def __init__(
+        self,
+        grid: PatchGrid,
+        compliance: Array,
+        wheel: ProfiledWheel,
+        *,
+        friction: float,
+        force: float,
+        drive: float | None = None,
+        lateral_force: float | None = None,
+        creepage: float = 0.0,
+        lateral_creepage: float = 0.0,
+        spin: float = 0.0,
+    ) -> None:
+        n, m = grid.stations, len(grid.z)
+        if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
+            allowed = f"must be ({n} or more, {m}, 3, {m}, 3) on this grid"
+            raise ModelError("compliance", compliance.shape, allowed)
+        if not 0 <= friction <= 1:
+            raise ModelError("friction", friction, "must lie between 0 and 1")
+        if not force > 0:
+            raise ModelError("force", force, "must be positive")
+        self.grid, self._friction, self._force = grid, friction, force
+        self._drive = drive if friction else None
+        self._lateral = lateral_force if friction else None
+        self._given = np.array([0.0, creepage, lateral_creepage, spin])
+        self._rest, self._motions = wheel.rolling(grid)
+        self._axes, self._area = grid.axes, grid.area
+        self._influence = _influence(grid, compliance, wheel)
+        self._sums = self._resultants()
+
+    def scaled(self, share: float) -> RollingPatch:
+        """See `PatchLoad`."""
+        other = copy(self)
+        other._force *= share
+        if other._lateral is not None:
+            other._lateral *= share
+        return other
+
+    def driven(self, share: float) -> RollingPatch:
+        """See `PatchLoad`."""
+        other = copy(self)
+        if other._drive is not None:
+            other._drive *= share
+        return other
+
+    @property
+    def moment(self) -> float:
+        """See `PatchLoad`."""
+        return (self._drive or 0.0) * self._friction * self._force
+
+    @property
+    def slipping(self) -> RollingPatch:
+        """See `PatchLoad`."""
+        other = copy(self)
+        if self.moment:
+            other._drive = None
+            other._given = self._given.copy()
+            other._given[1] += np.sign(self.moment) * _SLIDES
+        return other
+
+    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+        """See `PatchLoad`.
+
+        Raises
+        ------
+        Spins, LimitLoad
+            if moment or lateral force exceed the friction of the whole contact
+        WindowTooSmall
+            if the contact reaches the outermost stations or vertices
+        NoContact
+            if no tractions are found
+        """
+        with one_thread():
+            found = self._solve(u, start)
+        status = found.status
+        rim = [status[0], status[-1], status[:, 0], status[:, -1]]
+        if any((part != OPEN).any() for part in rim):
+            raise WindowTooSmall("the contact reaches the outermost stations or vertices")
+        rigid = self._given.copy()
+        rigid[self._free] = found.rigid
+        return PatchContact(
+            grid=self.grid,
+            traction=self._global(found.values),
+            gap=found.effects[..., NORMAL],
+            slip=found.effects[..., TANGENTS],
+            status=status,
+            along=lambda change: self._global(found.along(self._offset(change))[0]),
+            height=float(rigid[0]),
+            creepage=float(rigid[1]),
+            lateral_creepage=float(rigid[2]),
+            spin=float(rigid[3]),
+            steps=found.steps,
+        )
+
+    def _solve(self, u: Array, start: PatchContact | None) -> ConeSolution:
+        """Solve the frictional problem of a surface with these displacements (n, m, 3)."""
+        problem = self._problem(u)
+        if start is not None:
+            try:
+                return solve_cone(problem, *self._known(start))
+            except NoContact:  # the contact may be elsewhere
+                pass
+        smooth = self._smooth(problem)
+        rigid = np.append(smooth.rigid, np.zeros(len(problem.resultants) - 1))
+        try:
+            return solve_cone(problem, smooth.values, rigid)
+        except NoContact:
+            self._check_sliding(u)
+            raise
+
+    @property
+    def _free(self) -> list[int]:
+        """Numbers of the rigid motions whose resultant is given: height and creepages."""
+        given = (self._force, self._drive, self._lateral)
+        return [number for number, value in enumerate(given) if value is not None]
+
+    def _resultants(self) -> Array:
+        """Return the sums (3, n, m, 3) of (q_x, p, q_s) that height and creepages work with."""
+        sin, cos = np.sin(self.grid.angle), np.cos(self.grid.angle)
+        sums = np.zeros((3, *self._rest.shape))
+        sums[0, ..., 1], sums[0, ..., 2] = cos, -sin
+        sums[1] = -self._motions[1] / self.grid.spacing
+        sums[2, ..., 1], sums[2, ..., 2] = sin, cos
+        return sums * self._area[:, None]
+
+    def _offset(self, u: Array) -> Array:
+        """Return slip and gap (n, m, 3) from displacements (n, m, 3) of the surface."""
+        local = np.einsum("jab,cjb->cja", self._axes, u)
+        moved = np.zeros_like(local)
+        moved[1:, :, TANGENTS] = np.diff(local[..., TANGENTS], axis=0)
+        moved[..., NORMAL] = -local[..., NORMAL]
+        return moved
+
+    def _global(self, values: Array) -> Array:
+        """Return tractions (n, m, 3) in x, y, z from (q_x, p, q_s)."""
+        return np.asarray(np.einsum("jab,cja->cjb", self._axes, values * _MIRROR))
+
+    def _problem(self, u: Array) -> ConeProblem:
+        """Return the frictional problem of a surface with these displacements (n, m, 3)."""
+        free = self._free
+        drive = 0.0 if self._drive is None else self._drive * self._friction * self._force
+        resultants = np.array([self._force, drive, self._lateral or 0.0])
+        given = self._given.copy()
+        given[free] = 0.0
+        return ConeProblem(
+            influence=self._influence,
+            offset=self._rest + self._offset(u) + np.tensordot(given, self._motions, 1),
+            friction=self._friction,
+            motions=self._motions[free],
+            weights=self._sums[free],
+            resultants=resultants[free],
+        )
+
+    def _known(self, start: PatchContact) -> tuple[Array, Array]:
+        """Return values (n, m, 3) and free rigid motions of a contact."""
+        values = np.einsum("jab,cjb->cja", self._axes, start.traction) * _MIRROR
+        motions = (start.height, start.creepage, start.lateral_creepage)
+        return values, np.array(motions)[self._free]
+
+    def _smooth(self, problem: ConeProblem) -> ConeSolution:
+        """Return the contact without friction; the undeformed bodies give the first points."""
+        smooth = replace(
+            problem, friction=0.0, motions=problem.motions[:1], weights=problem.weights[:1],
+            resultants=problem.resultants[:1],
+        )  # fmt: skip
+        height = np.array([-self._expected_edge(problem)])
+        return solve_cone(smooth, np.zeros_like(problem.offset), height)
+
+    def _expected_edge(self, problem: ConeProblem) -> float:
+        """Return the gap of undeformed bodies at the edge of the contact, roughly [mm].
+
+        It is a share of the approach, which is that of a uniform pressure on the same area.
+        """
+        gap = (problem.offset[..., NORMAL] / problem.motions[0, ..., NORMAL]).ravel()
+        nearest = np.argsort(gap)
+        area = np.cumsum(np.broadcast_to(self._area, problem.offset.shape[:2]).ravel()[nearest])
+        own = problem.influence.own()[:, NORMAL, NORMAL].mean()
+        approach = own * self._force / np.sqrt(area * self._area.mean())
+        inside = gap[nearest] - gap[nearest[0]] <= _PRESSED * approach
+        return float(gap[nearest[np.flatnonzero(inside)[-1]]])
+
+    def _check_sliding(self, u: Array) -> None:
+        """Raise `Spins` or `LimitLoad` if full slip carries less than moment and lateral force.
+
+        Full slip may carry less than friction times load: spin turns shear, and shear on a slope
+        carries a part of the load.
+        """
+        wanted = np.array([self.moment, self._lateral or 0.0])
+        size = float(np.hypot(*wanted))
+        if not size:
+            return
+        other = copy(self)
+        other._drive = other._lateral = None
+        other._given = self._given.copy()
+        other._given[1:3] += _SLIDES * wanted / size
+        try:
+            found = other._solve(u, None)
+        except NoContact:
+            return
+        forces = np.tensordot(self._sums[1:], found.values, 3)
+        carried = float(forces @ wanted) / size**2
+        if carried >= 1:
+            return
+        if self._lateral:
+            much = f"the wheel slides off: all of its contact slips at {carried:.2%} of the force"
+            raise LimitLoad(much, carried, 1.0)
+        much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
+        raise Spins(much, carried, 1.0)
+
+
+def _influence(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Influence:
+    """Return slip and gap (w_x, g, w_s) from (q_x, p, q_s) on the surface, equal on the wheel."""
+    n = grid.stations
+    distances = np.fft.ifftshift(np.arange(-n, n))
+    turned = np.einsum("iab,dibjc->diajc", grid.axes, compliance[distances % len(compliance)])
+    surface = np.einsum("diajc,jbc->diajb", turned, grid.axes)
+    mirrored = half_space(grid.hats.s, grid.spacing, n, wheel.elasticity)
+    apart = surface * _MIRROR[:, None, None] * _MIRROR + mirrored
+    kernel = apart.copy()
+    for axis in TANGENTS:
+        kernel[:, :, axis] -= np.roll(apart[:, :, axis], 1, axis=0)
+    return Influence(kernel)

@@ -1,0 +1,101 @@
+"""Hertz's elliptic contact, and cases of it for the contact of a prism with a wheel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ellipe, ellipk
+
+from solver.materials import Elasticity
+from solver.prism.half_space import half_space
+from solver.prism.patch import RollingPatch
+from solver.prism.patch_grid import PatchGrid
+from solver.prism.profiled_wheel import ProfiledWheel
+
+Array = NDArray[np.float64]
+
+STEEL = Elasticity(youngs_modulus=2e5, poisson_ratio=0.25)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HertzEllipse:
+    """A contact with semi-axes ``a`` along x and ``b`` along z [mm], and largest pressure [MPa].
+
+    ``modulus`` is E* with 1/E* the sum of (1 - nu^2)/E of both bodies.
+    K.L. Johnson, Contact Mechanics (1985), 4.26: written for the longer axis along x.
+    """
+
+    a: float
+    b: float
+    peak_pressure: float
+    modulus: float
+
+    @property
+    def _terms(self) -> tuple[float, float, float]:
+        """Approach, and curvatures 1/(2 R) along the longer and the shorter axis."""
+        long, short = max(self.a, self.b), min(self.a, self.b)
+        e2 = 1 - (short / long) ** 2
+        K, E = ellipk(e2), ellipe(e2)
+        level = self.peak_pressure * short / self.modulus
+        if e2 == 0:
+            return level * K, np.pi / 4 * level / long**2, np.pi / 4 * level / long**2
+        over = level / (e2 * long**2)
+        return level * K, over * (K - E), over * ((long / short) ** 2 * E - K)
+
+    @property
+    def approach(self) -> float:
+        """Approach of the bodies [mm]."""
+        return self._terms[0]
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Relative radii in the planes of x and z [mm]."""
+        _, long, short = self._terms
+        along, across = (long, short) if self.a >= self.b else (short, long)
+        return 1 / (2 * along), 1 / (2 * across)
+
+    @property
+    def force(self) -> float:
+        """Force [N]."""
+        return 2 / 3 * np.pi * self.a * self.b * self.peak_pressure
+
+    def pressure(self, x: Array, z: Array) -> Array:
+        """Return the pressure at positions of the surface."""
+        inside = 1 - (x / self.a) ** 2 - (z / self.b) ** 2
+        return self.peak_pressure * np.sqrt(np.maximum(0.0, inside))
+
+
+def ellipse(a: float, b: float, elasticity: Elasticity = STEEL) -> HertzEllipse:
+    """Return a contact of two equal bodies, much smaller than their radii."""
+    modulus = elasticity.plane_strain_modulus / 2
+    return HertzEllipse(a=a, b=b, peak_pressure=1e-3 * modulus, modulus=modulus)
+
+
+def pressed(
+    hertz: HertzEllipse, along: float, across: float, *, elasticity: Elasticity = STEEL,
+    margin: float = 1.25, **given: float | None,
+) -> RollingPatch:  # fmt: skip
+    """Return a cylinder on a crowned rail whose contact has this ellipse.
+
+    ``along`` and ``across`` are the distances of stations and vertices, ``given`` friction, drive,
+    creepages and so on.
+    """
+    rolling, crown = hertz.radii
+    half = np.ceil(margin * hertz.b / across) * across
+    z = np.linspace(-half, half, 2 * round(half / across) + 1)
+    ahead = np.ceil(margin * hertz.a / along) * along
+    grid = PatchGrid(
+        z=z, y=-(z**2) / (2 * crown), angle=-np.arctan(z / crown), spacing=along, ahead=ahead,
+        stations=2 * round(ahead / along) + 1,
+    )  # fmt: skip
+    rail = half_space(grid.hats.s, along, grid.stations, elasticity)
+    wheel = ProfiledWheel(profile=np.zeros_like, radius=rolling, elasticity=elasticity)
+    return RollingPatch(grid, rail, wheel, force=hertz.force, **{"friction": 0.0, **given})
+
+
+def flat(patch: RollingPatch) -> Array:
+    """Return displacements of a surface that is not deformed, for a patch."""
+    grid = patch.grid
+    return np.zeros((grid.stations, len(grid.z), 3))
