@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from solver.materials.material import Material
-from solver.steady.stepped import SteppedFlow
-from solver.steady.sweep import CompiledFlow
+from solver.steady.stepped import SteppedFlow, SteppedSweep
+from solver.steady.sweep import CompiledFlow, CompiledSweep
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,28 +34,40 @@ Four cost a third of sixteen, and change stress by 1 MPa in 500 at a spacing of 
 the half-width."""
 
 
-class Flow(Protocol):
-    """The internal variables of material that flows along rows.
+class Sweep(Protocol):
+    """The internal variables of material that flows along rows, with n strain components, 4 or 6.
 
     Attributes
     ----------
     states : internal variables (..., n_rows, n_columns) at the columns
     ago : internal variables at the beginning of the last increment before each column
-    after : internal variables (..., n_rows) behind the load
     """
 
     states: PlasticState
-    after: PlasticState
 
     @property
     def ago(self) -> PlasticState:
         """See above."""
 
-    def along(self, added: Array) -> tuple[Array, Array]:
-        """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4).
+    def changes(self, added: Array) -> Array:
+        """Return the changes of plastic strain (n_rows, n_columns, n).
 
-        ``added`` is the change of strain (n_rows, n_columns, 4) at the columns.
+        ``added`` is the change of strain (n_rows, n_columns, n) at the columns.
         """
+
+
+class Flow(Sweep, Protocol):
+    """A sweep in two dimensions, and the residual state of the half-plane that follows it.
+
+    Attributes
+    ----------
+    after : internal variables (..., n_rows) behind the load
+    """
+
+    after: PlasticState
+
+    def along(self, added: Array) -> tuple[Array, Array]:
+        """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4)."""
 
 
 def usual_parts(law: Law) -> int:
@@ -63,15 +75,23 @@ def usual_parts(law: Law) -> int:
     return _COMPILED if isinstance(law, Material) else _STEPPED
 
 
-def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
-    """Return the flow of material along rows; `Material` uses compiled code.
+def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
+    """Return the sweep of material along rows; `Material` uses compiled code.
 
     Parameters
     ----------
-    strain : (n_rows, n_columns + 1, 4) Mandel, downstream; the first column is before the pass
+    strain : (n_rows, n_columns + 1, n) Mandel, downstream, n is 4 or 6; the first column is before
+        the pass
     start : internal variables (..., n_rows) before the pass
     parts : number of equal increments of strain from one column to the next
     """
+    if isinstance(law, Material):
+        return CompiledSweep(law, strain, start, parts)
+    return SteppedSweep(law, strain, start, parts)
+
+
+def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
+    """Return the sweep and the residual state behind it; for arguments see `sweep_of`, n is 4."""
     if isinstance(law, Material):
         return CompiledFlow(law, strain, start, parts)
     return SteppedFlow(law, strain, start, parts)

@@ -1,7 +1,7 @@
 """A half-plane whose state is a function of depth alone, as steady passes leave it.
 
 With plastic strain ep and no load the strains along x and z are zero, and no stress acts on planes
-y = const:
+y = const. In two dimensions, with 4 Mandel components:
 
     eps_yy = ep_yy + lambda / (lambda + 2 G) (ep_xx + ep_zz),   eps_xy = ep_xy
     sigma_xx = -E / (1 - nu^2) (ep_xx + nu ep_zz),   sigma_zz likewise

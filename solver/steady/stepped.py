@@ -45,8 +45,8 @@ class _Left(NamedTuple):
     strain: Array
 
 
-class SteppedFlow:
-    """Flow of a material with any law along rows; see `solver.steady.flow.Flow`."""
+class SteppedSweep:
+    """Sweep of a material with any law along rows; see `solver.steady.flow.Sweep`."""
 
     def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
         self._law, self._start = law, start
@@ -55,7 +55,7 @@ class SteppedFlow:
         now = start.packed
         self._packed, self._ago = np.empty((2, *now.shape, n_columns))
         self._flowing: list[NDArray[np.int64]] = []
-        C = law.stiffness(4)
+        C = law.stiffness(len(strain))
         for column in range(n_columns):
             first, last = strain[..., column], strain[..., column + 1]
             state = start.unpacked(now)
@@ -74,28 +74,30 @@ class SteppedFlow:
         if not np.isfinite(self._packed).all():
             raise NotConverged("the law has no state for the strains of a steady pass")
         self.states = start.unpacked(self._packed)
-        self._left = _at_rest(law, start.unpacked(now))
-        self.after = self._left.state
 
     @property
     def ago(self) -> PlasticState:
         """Internal variables at the beginning of the last increment before each column."""
         return self._start.unpacked(self._ago)
 
-    def along(self, added: Array) -> tuple[Array, Array]:
+    def changes(self, added: Array) -> Array:
         """Return the changes of plastic strain for a change of the strains."""
+        return self._changes(added)[0]
+
+    def _changes(self, added: Array) -> tuple[Array, Array]:
+        """Return the same, and changes (n_rows, n) of the last column's internal variables."""
         plastic = np.empty(added.shape)
         now = np.zeros(self._start.packed.shape).T
         for column, (at, slopes) in enumerate(zip(self._flowing, self._columns, strict=True)):
             if len(at):
                 change = np.concatenate([now[at], added[at, column]], axis=1)
                 now[at] = np.matmul(slopes, change[..., None])[..., 0]
-            plastic[:, column] = now[:, :4]
-        return plastic, np.matmul(self._closing, now[..., None])[..., 0]
+            plastic[:, column] = now[:, : added.shape[2]]
+        return plastic, now
 
     @cached_property
     def _scale(self) -> Array:
-        """Steps of differences (n + 4,): of internal variables and of strain."""
+        """Steps of differences (n + n_components,): of internal variables and of strain."""
         largest = {
             f.name: np.full_like(getattr(self._start, f.name), np.abs(values).max(initial=0.0))
             for f in fields(self._start)
@@ -103,15 +105,17 @@ class SteppedFlow:
         }
         scale = replace(self._start, **largest).packed[:, 0]
         yield_strain = self._law.yield_stress / self._law.elasticity.youngs_modulus
-        return _STEP * np.append(scale, [yield_strain] * 4)
+        return _STEP * np.append(scale, [yield_strain] * len(self._strain))
 
     def _slopes(self, before: Array, strain: Array) -> Array:
-        """Return the derivatives (n_points, n, n + 4) of internal variables over an increment.
+        """Return the derivatives of internal variables (n_points, n, n + n_components).
+
+        They are those over an increment, by its beginning and by its strain.
 
         Parameters
         ----------
         before : (n, n_points) internal variables at its beginning
-        strain : (4, n_points) at its end
+        strain : (n_components, n_points) at its end
         """
         n = len(before)
         given = np.concatenate([before, strain])
@@ -120,7 +124,7 @@ class SteppedFlow:
             return self._law.respond(given[n:], self._start.unpacked(given[:n])).state.packed
 
         base = after(given)
-        out = np.zeros((before.shape[1], n, n + 4))
+        out = np.zeros((before.shape[1], n, len(given)))
         for k, step in enumerate(self._scale):
             if step:  # a variable that is zero everywhere does not change
                 moved = given.copy()
@@ -137,6 +141,20 @@ class SteppedFlow:
         every = self._slopes(np.concatenate(before, axis=1), np.concatenate(strain, axis=1))
         return np.split(every, np.cumsum([len(at) for at in self._flowing])[:-1])
 
+
+class SteppedFlow(SteppedSweep):
+    """Flow of a material with any law along rows; see `solver.steady.flow.Flow`."""
+
+    def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
+        super().__init__(law, strain, start, parts)
+        self._left = _at_rest(law, start.unpacked(self._packed[..., -1]))
+        self.after = self._left.state
+
+    def along(self, added: Array) -> tuple[Array, Array]:
+        """Return the changes of plastic strain for a change of the strains."""
+        plastic, end = self._changes(added)
+        return plastic, np.matmul(self._closing, end[..., None])[..., 0]
+
     @cached_property
     def _closing(self) -> Array:
         """Derivative (n_rows, 4, n) of the plastic strain behind by the last column's variables."""
@@ -152,7 +170,8 @@ def _at_rest(law: Law, state: PlasticState) -> _Left:
     """Return the state of rows behind the load, where no stress acts on planes y = const.
 
     The strains along x and z return to zero in one increment. If the unloaded stress of a row is
-    outside the yield surface, the row flows.
+    outside the yield surface, the row flows. This is the residual state of a half-plane, with 4
+    components: of the strains only yy and xy follow from stress.
 
     1. strain at rest, if nothing flows
     2. Newton's method for the strains yy and xy, with the tangent of the law; a step that does not
