@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_SHARES = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+SHARES = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 """Positions of the two Gauss points of an edge, over its length."""
 
 
@@ -42,8 +42,8 @@ class Hats:
         edges, m = np.arange(len(self.s) - 1), len(self.s)
         half = np.diff(self.s)[:, None] / 2
         weights = np.zeros((m, m - 1, 2))
-        weights[edges, edges] = half * (1 - _SHARES)
-        weights[edges + 1, edges] = half * _SHARES
+        weights[edges, edges] = half * (1 - SHARES)
+        weights[edges + 1, edges] = half * SHARES
         return weights.reshape(m, -1) / self.width[:, None]
 
     @staticmethod
@@ -52,4 +52,4 @@ class Hats:
 
         ``first`` and ``last`` (m - 1,) are the values at both ends of the edges.
         """
-        return np.asarray((first[:, None] + (last - first)[:, None] * _SHARES).ravel())
+        return np.asarray((first[:, None] + (last - first)[:, None] * SHARES).ravel())

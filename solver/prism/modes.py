@@ -182,6 +182,19 @@ class Modes:
         amplitudes = np.matmul(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
+    def constant(self, eigenstress: Array) -> tuple[Array, Array]:
+        """Return strain (n_points, 6) and displacement (n_rows,) of what is constant along x.
+
+        Parameters
+        ----------
+        eigenstress : (n_points, 6) at all stations [MPa]
+        """
+        flat = eigenstress.T[list(_ORDER)].ravel()
+        u = self._factors[0].solve(self._force0 @ flat)
+        strain = np.empty((6, len(self.points)))
+        strain[list(_ORDER)] = (self.B0 @ u).reshape(6, -1)
+        return strain.T, np.asarray(self.rows @ u)
+
     @cached_property
     def columns(self) -> Array:
         """Displacements (waves, m, n_rows) of the zone for unit forces on the rows [mm2/N]."""

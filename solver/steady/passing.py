@@ -147,9 +147,8 @@ def passing(
     NotConverged
         if Newton's method does not converge
     """
-    rows, solve = track.rows, track.operator.solve
     parts = parts or usual_parts(material)
-    scale = np.sqrt(rows.weights)[..., None]
+    scale = np.sqrt(track.weights)[..., None]
     double_shear = 2 * material.elasticity.shear_modulus
     solves, krylov = 0, _KRYLOV
 
@@ -157,11 +156,11 @@ def passing(
         nonlocal solves
         solves += 1
         flow = track.flow(material, before, added, parts)
-        loading = load.on(solve(flow.force))
-        residual = rows.strain(loading.u) - added
+        loading = load.on(track.solve(flow.force))
+        residual = track.strain(loading.u) - added
         return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
 
-    here = at(rows.strain(load.on(track.at_rest).u) if guess is None else guess)
+    here = at(track.strain(load.on(track.at_rest).u) if guess is None else guess)
     start, sizes, shape = here.size, [here.size], here.added.shape
     for step in range(_STEPS):
         left_over = _deviation(here.residual)
@@ -189,7 +188,7 @@ def passing(
             nonlocal solves
             solves += 1
             change = scaled.reshape(shape) / scale
-            made = rows.strain(here.loading.along(solve(here.flow.along(change))))
+            made = track.strain(here.loading.along(track.solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())
 
         n = here.residual.size

@@ -118,6 +118,19 @@ class Track:
         """Displacements (m,) of the window without plastic strain and load: zero [mm]."""
         return np.zeros(len(self.operator.kept))
 
+    @property
+    def weights(self) -> Array:
+        """Volume of the points (n_rows, n_columns) of the window [mm3]."""
+        return self.rows.weights
+
+    def solve(self, force: Array) -> Array:
+        """Return displacements (m,) for the condensed forces of plastic strain (m,) [mm]."""
+        return self.operator.solve(force)
+
+    def strain(self, u: Array) -> Array:
+        """Return the strains (n_rows, n_columns, 4) of displacements (m,)."""
+        return self.rows.strain(u)
+
     def flow(self, law: Law, before: Layers, added: Array, parts: int) -> RowFlow:
         """Return the flow of a material along the rows, see `RowFlow`."""
         return RowFlow(self.rows, law, before, added, parts)

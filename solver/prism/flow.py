@@ -1,0 +1,156 @@
+"""Plastic strain along the rows of a prism's points, and the state that a pass leaves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.prism.state import PrismState
+from solver.steady.flow import INFLOW, LEAST, sweep_of
+from solver.steady.load import AppliedLoad
+from solver.steady.passing import passing
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.law import Law
+    from solver.materials.state import PlasticState
+    from solver.prism.track import PrismTrack
+
+    Array = NDArray[np.float64]
+
+
+class _Swept:
+    """Plastic strain of material that flows along rows of n points, and its derivative.
+
+    Parameters
+    ----------
+    begin : state at the beginning of the rows
+    before : state that has no eigenstress
+    strain : (n, n_columns, 6) strain at the columns, Mandel
+    parts : number of increments from column to column
+
+    Attributes
+    ----------
+    states : internal variables (..., n, n_columns) at the columns
+    force : (n, n_columns, 6) eigenstress of the plastic strain since ``before`` [MPa]
+    """
+
+    def __init__(
+        self, law: Law, begin: PrismState, before: PrismState, strain: Array, parts: int
+    ) -> None:
+        self._begin, self._strain = begin, strain
+        self._stiff = 2 * law.elasticity.shear_modulus  # plastic strain changes no volume
+        path = np.concatenate([begin.strain[:, None], strain], axis=1)
+        self._sweep = sweep_of(law, path, begin.state, parts)
+        self.states = self._sweep.states
+        plastic = np.moveaxis(self.states.plastic_strain, 0, 2)
+        self.force = self._stiff * (plastic - before.plastic_strain[:, None])
+
+    def along(self, added: Array) -> Array:
+        """Return the change of ``force`` for a change of the strains."""
+        return self._stiff * self._sweep.changes(added)
+
+    @property
+    def ago(self) -> PlasticState:
+        """Internal variables at the beginning of the last increment before each column."""
+        return self._sweep.ago
+
+    @property
+    def _added(self) -> Array:
+        """Accumulated plastic strain (n, n_columns) added since the beginning of the rows."""
+        return np.asarray(self.states.accumulated - self._begin.accumulated[:, None])
+
+    @property
+    def most_added(self) -> float:
+        """Largest accumulated plastic strain that is added at a point."""
+        return float(self._added.max())
+
+    def _last(self, displacement: Array) -> PrismState:
+        """Return the state at the last column, with this displacement of the surface."""
+        state = self._begin.state.unpacked(self.states.packed[..., -1])
+        return PrismState(state, self._strain[:, -1], displacement)
+
+
+class PrismFlow(_Swept):
+    """The flow past a load: columns are the stations of a window."""
+
+    def __init__(
+        self, track: PrismTrack, law: Law, before: PrismState, added: Array, parts: int
+    ) -> None:
+        super().__init__(law, before, before, before.strain[:, None] + added, parts)
+        self._track, self._law, self._before = track, law, before
+
+    @property
+    def beyond(self) -> str:
+        """Where the window is too small, because points yield at its edge; empty if nowhere."""
+        added, law = self._added, self._law
+        least = LEAST * law.yield_stress / law.elasticity.youngs_modulus
+        most = INFLOW * max(least, self.most_added)
+        if added[:, 0].max() > most:
+            return "ahead"
+        return "around" if added[self._track.rim].max(initial=0.0) > most else ""
+
+    def left(self) -> tuple[PlasticState, PrismState]:
+        """Return the internal variables at the stations, and the state far behind the load.
+
+        At the last station the load still acts a little. On the way to no load and no change along
+        x points may yield once more, which is a pass of one column through the section alone.
+        """
+        body = _Release(self._track, self._before)
+        end = self._last(self._before.displacement)
+        guess = body.strain(self.force[:, -1:])
+        return self.states, passing(body, self._law, Nothing(), end, guess).after
+
+
+class Nothing:
+    """No load; see `solver.steady.load.PassingLoad`."""
+
+    def on(self, u: Array) -> AppliedLoad:
+        """See `PassingLoad`."""
+        return AppliedLoad(np.zeros(0), u, lambda change: change)
+
+
+class _Release:
+    """A section without load, as a body for `passing`: its unknowns are eigenstress, constant in x.
+
+    Parameters
+    ----------
+    before : state that has no eigenstress
+    """
+
+    def __init__(self, track: PrismTrack, before: PrismState) -> None:
+        self._track, self._before = track, before
+        self.weights = track.weights[:, :1]
+        self.at_rest = np.zeros((len(self.weights), 1, 6))
+
+    def solve(self, eigenstress: Array) -> Array:
+        """Return the eigenstress (n_points, 1, 6)."""
+        return eigenstress
+
+    def strain(self, eigenstress: Array) -> Array:
+        """Return the strain (n_points, 1, 6) of an eigenstress."""
+        return self._track.modes.constant(eigenstress[:, 0])[0][:, None]
+
+    def flow(self, law: Law, end: PrismState, added: Array, parts: int) -> _ReleaseFlow:
+        """Return the flow from a state to the strain before the pass and ``added``."""
+        return _ReleaseFlow(self._track, law, self._before, end, added, parts)
+
+
+class _ReleaseFlow(_Swept):
+    """The flow from the last station to the state without load: one column."""
+
+    beyond = ""
+
+    def __init__(
+        self, track: PrismTrack, law: Law, before: PrismState, end: PrismState, added: Array,
+        parts: int,
+    ) -> None:  # fmt: skip
+        super().__init__(law, end, before, before.strain[:, None] + added, parts)
+        self._track, self._before = track, before
+
+    def left(self) -> tuple[PlasticState, PrismState]:
+        """Return the internal variables, and the state without load."""
+        moved = self._track.modes.constant(self.force[:, 0])[1].reshape(3, -1).T
+        return self.states, self._last(self._before.displacement + moved)

@@ -1,0 +1,66 @@
+"""A load in a patch of contact, as a load of `solver.steady.passing`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from solver.steady.load import AppliedLoad
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.prism.patch_contact import PatchContact, PatchLoad
+    from solver.prism.track import PrismField
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedPatch(AppliedLoad):
+    """A load on a prism, with its contact."""
+
+    contact: PatchContact
+
+
+class PatchPassing:
+    """A load in a patch of contact, as `solver.steady.load.PassingLoad`.
+
+    Parameters
+    ----------
+    load : the load
+    moved : (m, 3) displacement of the surface before the pass [mm]
+    """
+
+    def __init__(self, load: PatchLoad, moved: Array | None = None) -> None:
+        self._load, self._moved = load, moved
+        self._last: PatchContact | None = None
+
+    def on(self, u: PrismField) -> AppliedPatch:
+        """See `PassingLoad`."""
+        moved = u.displacement if self._moved is None else u.displacement + self._moved
+        self._last = found = self._load.solve(moved, self._last)
+
+        def along(change: PrismField) -> PrismField:
+            return replace(change, traction=found.along(change.displacement))
+
+        return AppliedPatch(found.force, replace(u, traction=found.traction), along, found)
+
+    def scaled(self, share: float) -> PatchPassing:
+        """See `PassingLoad`."""
+        return PatchPassing(self._load.scaled(share), self._moved)
+
+    def driven(self, share: float) -> PatchPassing:
+        """See `PassingLoad`."""
+        return PatchPassing(self._load.driven(share), self._moved)
+
+    @property
+    def moment(self) -> float:
+        """See `PassingLoad`."""
+        return self._load.moment
+
+    @property
+    def slipping(self) -> PatchPassing:
+        """See `PassingLoad`."""
+        return PatchPassing(self._load.slipping, self._moved)

@@ -1,0 +1,192 @@
+"""A prism over which a load passes: what `solver.steady.passing` needs of it.
+
+Stations are numbered downstream from ``ahead`` of the load at x = 0. Only a zone of the section
+and a window of stations may yield. Behind the window plastic strain goes on as at its last station
+and fades to nothing where the length begins again: so the fields of the pass are periodic. What
+is constant along x, the state before the pass, is no wave but the section's own problem, k = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.prism.far_field import FarField
+from solver.prism.flow import PrismFlow
+from solver.prism.modes import Modes
+from solver.prism.state import PrismState
+from solver.prism.surface import RunningSurface
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.law import Law
+    from solver.prism.section import Section
+
+    Array = NDArray[np.float64]
+
+
+class PrismTrack:
+    """The prism, its stations, and the grid where a load may act.
+
+    Parameters
+    ----------
+    section : the cross-section
+    zone : (n_elements,) elements that may yield
+    boundary : chain of edges of the zone on which the load acts
+    length : L, after which the waves repeat [mm]
+    spacing : distance h of stations [mm]; L is an even number of them
+    ahead, behind : the window extends from x = ahead to x = -behind [mm]
+    reach : half the length of the surface where the load may act [mm]
+    levels : levels of the far field; without any the prism repeats itself
+
+    Attributes
+    ----------
+    weights : (n_points, window) volume of the points [mm3]
+    grid : stations and vertices where the load may act
+
+    Raises
+    ------
+    ModelError
+        for lengths that do not fit together
+    """
+
+    def __init__(
+        self,
+        section: Section,
+        zone: NDArray[np.bool_],
+        boundary: str,
+        *,
+        length: float,
+        spacing: float,
+        ahead: float,
+        behind: float,
+        reach: float,
+        levels: int = 3,
+    ) -> None:
+        stations, before = round(length / spacing), round(ahead / spacing)
+        window = before + round(behind / spacing) + 1
+        if window > stations:
+            raise ModelError("length", length, f"must be at least {window * spacing:g} mm")
+        near = int(reach / spacing)
+        if 2 * near > min(before, window - 1 - before):
+            allowed = "must be at most half of what the window has ahead and behind"
+            raise ModelError("reach", reach, allowed)
+        self._section, self._before, self._near = section, before, near
+        surface = RunningSurface(section, boundary)
+        self.grid = surface.grid(spacing, near * spacing, 2 * near + 1)
+        self.modes = Modes(
+            section, zone, length, stations, window=window,
+            behind=_fading(stations - window), surface=surface.rows(self.grid),
+        )  # fmt: skip
+        self.far = FarField(self.modes, -before * spacing, levels) if levels else None
+        self._width = np.tile(self.grid.hats.width, 3)
+        self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
+        self.rim = _rim(section, zone, self.modes.points)
+
+    @property
+    def elasticity(self) -> Any:
+        """Elastic constants."""
+        return self._section.elasticity
+
+    def virgin(self, law: Law) -> PrismState:
+        """Return the state before any load."""
+        n = len(self.weights)
+        return PrismState(law.initial(n, 6), np.zeros((n, 6)), np.zeros((len(self.grid.z), 3)))
+
+    # -- what a pass asks for ------------------------------------------------------------------
+
+    @cached_property
+    def at_rest(self) -> PrismField:
+        """The prism without eigenstress and load."""
+        return PrismField(self)
+
+    def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
+        """Return the flow of a material along the rows of points."""
+        return PrismFlow(self, law, before, added, parts)
+
+    def solve(self, eigenstress: Array) -> PrismField:
+        """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""
+        return PrismField(self, eigenstress)
+
+    def strain(self, field: PrismField) -> Array:
+        """Return the strain (n_points, window, 6) of a field, Mandel."""
+        if field.eigenstress is None and field.traction is None:
+            return np.zeros((*self.weights.shape, 6))
+        forces = None if field.traction is None else self._on_rows(field.traction)
+        strain = self.modes.solve(field.eigenstress, forces).strain
+        if self.far is not None and forces is not None:
+            strain += self.far.strain @ self.far.resultants(forces)
+        return strain
+
+    # -- the surface ---------------------------------------------------------------------------
+
+    @property
+    def _stations(self) -> slice:
+        """The stations of the window at which the load may act."""
+        return slice(self._before - self._near, self._before + self._near + 1)
+
+    def surface_displacement(self, eigenstress: Array) -> Array:
+        """Return the displacement (n, m, 3) of the grid by an eigenstress [mm]."""
+        moved = self.modes.displacement(eigenstress)[:, self._stations]
+        return moved.reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
+
+    def _on_rows(self, traction: Array) -> Array:
+        """Return the forces (n_rows, window) of tractions (n, m, 3), per length [N/mm]."""
+        forces = np.zeros((len(self._width), self.weights.shape[1]))
+        each = traction.transpose(2, 1, 0).reshape(len(forces), -1)
+        forces[:, self._stations] = self._width[:, None] * each
+        return forces
+
+    @cached_property
+    def compliance(self) -> Array:
+        """Displacements by tractions, as `solver.prism.patch.RollingPatch` takes them."""
+        kernel = self.modes.kernel * self._width[:, None]
+        if self.far is not None:
+            unit = np.zeros((len(self._width), len(self._width), 1))
+            unit[np.arange(len(unit)), np.arange(len(unit)), 0] = self._width
+            resultants = np.stack([self.far.resultants(each) for each in unit])
+            for apart in range(-2 * self._near, 2 * self._near + 1):
+                moved = self.far.displacement[:, self._before + apart] @ resultants.T
+                kernel[:, :, apart] += moved
+        m = len(self.grid.z)
+        return np.ascontiguousarray(kernel.reshape(3, m, 3, m, -1).transpose(4, 1, 0, 3, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class PrismField:
+    """What eigenstress and tractions make in a prism; solved when it is asked for.
+
+    Attributes
+    ----------
+    eigenstress : (n_points, window, 6) Mandel [MPa], None where there is none
+    traction : (n, m, 3) tractions on the grid [MPa], None where there are none
+    """
+
+    prism: PrismTrack
+    eigenstress: Array | None = None
+    traction: Array | None = None
+
+    @cached_property
+    def displacement(self) -> Array:
+        """Displacement (n, m, 3) of the grid by the eigenstress alone [mm]."""
+        if self.eigenstress is None:
+            return np.zeros((self.prism.grid.stations, len(self.prism.grid.z), 3))
+        return self.prism.surface_displacement(self.eigenstress)
+
+
+def _fading(count: int) -> Array:
+    """Return the factors (count,) of plastic strain behind the window: from 1 down to 0."""
+    t = np.arange(1, count + 1) / (count + 1)
+    return np.asarray(1 - t**3 * (10 - 15 * t + 6 * t**2))
+
+
+def _rim(section: Section, zone: NDArray[np.bool_], points: NDArray[np.int64]) -> Array:
+    """Return the numbers, among those of the zone, of points in elements beside others."""
+    outside = np.unique(section.dofs[~zone])
+    beside = np.isin(section.dofs, outside).any(axis=1)
+    return np.flatnonzero(beside[points // section.weights.shape[1]])
