@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.prism.state import PrismState
 from solver.steady.flow import INFLOW, LEAST, sweep_of
-from solver.steady.load import AppliedLoad
+from solver.steady.load import Given
 from solver.steady.passing import passing
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.materials.state import PlasticState
-    from solver.prism.track import PrismTrack
+    from solver.prism.modes import Modes
 
     Array = NDArray[np.float64]
 
@@ -74,13 +74,21 @@ class _Swept:
 
 
 class PrismFlow(_Swept):
-    """The flow past a load: columns are the stations of a window."""
+    """The flow past a load: columns are the stations of a window.
+
+    Parameters
+    ----------
+    modes : the waves of the prism
+    rim : numbers of the points at the edge of the zone, which must not yield
+    added : (n, window, 6) strain that the pass adds, Mandel
+    """
 
     def __init__(
-        self, track: PrismTrack, law: Law, before: PrismState, added: Array, parts: int
-    ) -> None:
+        self, modes: Modes, rim: NDArray[np.int64], law: Law, before: PrismState, added: Array,
+        parts: int,
+    ) -> None:  # fmt: skip
         super().__init__(law, before, before, before.strain[:, None] + added, parts)
-        self._track, self._law, self._before = track, law, before
+        self._modes, self._rim, self._law, self._before = modes, rim, law, before
 
     @property
     def beyond(self) -> str:
@@ -90,7 +98,7 @@ class PrismFlow(_Swept):
         most = INFLOW * max(least, self.most_added)
         if added[:, 0].max() > most:
             return "ahead"
-        return "around" if added[self._track.rim].max(initial=0.0) > most else ""
+        return "around" if added[self._rim].max(initial=0.0) > most else ""
 
     def left(self) -> tuple[PlasticState, PrismState]:
         """Return the internal variables at the stations, and the state far behind the load.
@@ -98,18 +106,10 @@ class PrismFlow(_Swept):
         At the last station the load still acts a little. On the way to no load and no change along
         x points may yield once more, which is a pass of one column through the section alone.
         """
-        body = _Release(self._track, self._before)
+        body = _Release(self._modes, self._before)
         end = self._last(self._before.displacement)
-        guess = body.strain(self.force[:, -1:])
-        return self.states, passing(body, self._law, Nothing(), end, guess).after
-
-
-class Nothing:
-    """No load; see `solver.steady.load.PassingLoad`."""
-
-    def on(self, u: Array) -> AppliedLoad:
-        """See `PassingLoad`."""
-        return AppliedLoad(np.zeros(0), u, lambda change: change)
+        guess, nothing = body.strain(self.force[:, -1:]), body.at_rest
+        return self.states, passing(body, self._law, Given(nothing, nothing), end, guess).after
 
 
 class _Release:
@@ -120,9 +120,9 @@ class _Release:
     before : state that has no eigenstress
     """
 
-    def __init__(self, track: PrismTrack, before: PrismState) -> None:
-        self._track, self._before = track, before
-        self.weights = track.weights[:, :1]
+    def __init__(self, modes: Modes, before: PrismState) -> None:
+        self._modes, self._before = modes, before
+        self.weights = modes.weights[:, None]
         self.at_rest = np.zeros((len(self.weights), 1, 6))
 
     def solve(self, eigenstress: Array) -> Array:
@@ -131,11 +131,11 @@ class _Release:
 
     def strain(self, eigenstress: Array) -> Array:
         """Return the strain (n_points, 1, 6) of an eigenstress."""
-        return self._track.modes.constant(eigenstress[:, 0])[0][:, None]
+        return self._modes.constant(eigenstress[:, 0])[0][:, None]
 
     def flow(self, law: Law, end: PrismState, added: Array, parts: int) -> _ReleaseFlow:
         """Return the flow from a state to the strain before the pass and ``added``."""
-        return _ReleaseFlow(self._track, law, self._before, end, added, parts)
+        return _ReleaseFlow(self._modes, law, self._before, end, added, parts)
 
 
 class _ReleaseFlow(_Swept):
@@ -144,13 +144,12 @@ class _ReleaseFlow(_Swept):
     beyond = ""
 
     def __init__(
-        self, track: PrismTrack, law: Law, before: PrismState, end: PrismState, added: Array,
-        parts: int,
-    ) -> None:  # fmt: skip
+        self, modes: Modes, law: Law, before: PrismState, end: PrismState, added: Array, parts: int
+    ) -> None:
         super().__init__(law, end, before, before.strain[:, None] + added, parts)
-        self._track, self._before = track, before
+        self._modes, self._before = modes, before
 
     def left(self) -> tuple[PlasticState, PrismState]:
         """Return the internal variables, and the state without load."""
-        moved = self._track.modes.constant(self.force[:, 0])[1].reshape(3, -1).T
+        moved = self._modes.constant(self.force[:, 0])[1].reshape(3, -1).T
         return self.states, self._last(self._before.displacement + moved)

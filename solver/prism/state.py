@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,3 +39,13 @@ class PrismState:
     def accumulated(self) -> Array:
         """Accumulated plastic strain (n,)."""
         return self.state.accumulated
+
+    @property
+    def mirrored(self) -> PrismState:
+        """The same state, seen along -x."""
+        return replace(
+            self,
+            state=self.state.mirrored,
+            strain=self.strain * [1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
+            displacement=self.displacement * [-1.0, 1.0, 1.0],
+        )

@@ -86,7 +86,7 @@ class PrismTrack:
         self.far = FarField(self.modes, -before * spacing, levels) if levels else None
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
-        self.rim = _rim(section, zone, self.modes.points)
+        self._rim = _rim(section, zone, self.modes.points)
 
     @property
     def elasticity(self) -> Any:
@@ -107,7 +107,7 @@ class PrismTrack:
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
         """Return the flow of a material along the rows of points."""
-        return PrismFlow(self, law, before, added, parts)
+        return PrismFlow(self.modes, self._rim, law, before, added, parts)
 
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""
@@ -185,8 +185,8 @@ def _fading(count: int) -> Array:
     return np.asarray(1 - t**3 * (10 - 15 * t + 6 * t**2))
 
 
-def _rim(section: Section, zone: NDArray[np.bool_], points: NDArray[np.int64]) -> Array:
+def _rim(section: Section, zone: NDArray[np.bool_], points: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the numbers, among those of the zone, of points in elements beside others."""
     outside = np.unique(section.dofs[~zone])
-    beside = np.isin(section.dofs, outside).any(axis=1)
-    return np.flatnonzero(beside[points // section.weights.shape[1]])
+    beside = np.flatnonzero(np.isin(section.dofs, outside).any(axis=1))
+    return np.flatnonzero(np.isin(points // section.weights.shape[1], beside))

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from solver.fem.discretisation import Discretisation
     from solver.steady import Pass, Track
     from solver.steady.fields import TrackFields
+    from solver.steady.layers import Layers
 
     Array = NDArray[np.float64]
 
@@ -125,12 +126,12 @@ class TrackBody:
         touching = converged.touching
         return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
 
-    def under_load(self, found: Pass) -> TrackState:
+    def under_load(self, found: Pass[Layers]) -> TrackState:
         """Return the state under the load of a pass."""
         touching = found.loading if isinstance(found.loading, RollingContact) else None
         return self._state(_LOADED, under_load(self.track, found), touching)
 
-    def left_by(self, found: Pass) -> TrackState:
+    def left_by(self, found: Pass[Layers]) -> TrackState:
         """Return the state after a pass."""
         return self._state(_RELEASED, of_layers(self.track, found.law, found.after), None)
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from solver.scenes.rolling_parameters import RollingParameters
     from solver.scenes.scene import Monitor, Scene
     from solver.steady import Pass, Track
+    from solver.steady.layers import Layers
 
     Array = NDArray[np.float64]
 
@@ -115,8 +116,8 @@ class _SteadyPath:
         self._by_way = {way: _Direction(track, view, way) for way in set(last.directions)}
         self._steps: list[int] = []
         self._traces: list[Trace] = []
-        self._found: Pass | None = None
-        self._previous: Pass | None = None
+        self._found: Pass[Layers] | None = None
+        self._previous: Pass[Layers] | None = None
 
     def runs(
         self, runs: Sequence[RollingParameters], monitor: Monitor, reach: float
@@ -203,7 +204,7 @@ class _Direction:
         np.put_along_axis(each[1:], rows.every, 1.0, axis=1)
         return self.samples.along_depth(self.samples.fields.recovered(body, each))[:, 0].T
 
-    def trace(self, found: Pass) -> Trace:
+    def trace(self, found: Pass[Layers]) -> Trace:
         """Return the trace of a pass, from the state that it leaves."""
         left, elasticity = found.left.whole, self.half_plane.track.elasticity
         strain = np.maximum(self._by_depth @ left.accumulated, 0.0)
@@ -221,7 +222,7 @@ class _Direction:
             peak=float(left.accumulated.max()),
         )
 
-    def states(self, found: Pass) -> dict[str, TrackState]:
+    def states(self, found: Pass[Layers]) -> dict[str, TrackState]:
         """Return the states of a pass by the names of their stages."""
         loaded, left = self.half_plane.under_load(found), self.half_plane.left_by(found)
         view = self.samples.view

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from solver.scenes.rolling_parameters import RollingParameters
     from solver.steady import Pass, Track
+    from solver.steady.layers import Layers
     from solver.steady.load import PassingLoad
 
     Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ _PARTS, _TOLERANCE = 4, 0.01
 
 def steady_passes(
     parameters: RollingParameters, reach: float = 1.0, parts: int | None = None
-) -> Iterator[Pass]:
+) -> Iterator[Pass[Layers]]:
     """Yield the passes in their order.
 
     Parameters

@@ -48,7 +48,7 @@ def of_layers(track: Track, law: Law, layers: Layers) -> TrackFields:
     return TrackFields(_sunk(track, layers), *at(rows.every, n, layers), above)
 
 
-def under_load(track: Track, found: Pass) -> TrackFields:
+def under_load(track: Track, found: Pass[Layers]) -> TrackFields:
     """Return the fields under the load of a pass, which moves along +x."""
     rows, before, after = track.rows, of_layers(track, found.law, found.before), found.after
     grown = after.plastic_strain - found.before.plastic_strain

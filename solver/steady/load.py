@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AppliedLoad:
-    """A load on a track with n unknowns, of which the condensed stiffness keeps m.
+    """A load on a body, which has its own kind of field.
 
     Attributes
     ----------
-    force : (n,) nodal forces, on all nodes of the track [N]
-    u : (m,) displacements with the load [mm]
-    along : (change (m,) of the displacements without the load) -> change (m,) of ``u``
+    force : forces of the load on the body [N]; on a track (n,), at all nodes
+    u : field with the load; on a track displacements (m,) of the kept unknowns [mm]
+    along : (change of the field without the load) -> change of ``u``
     """
 
     force: Array
-    u: Array
-    along: Callable[[Array], Array]
+    u: Any
+    along: Callable[[Any], Any]
 
 
 class PassingLoad(Protocol):
-    """A load that passes over a track along +x."""
+    """A load that passes over a body along +x."""
 
-    def on(self, u: Array) -> AppliedLoad:
-        """Return the applied load, given the displacements (m,) of the track without it."""
+    def on(self, u: Any) -> AppliedLoad:
+        """Return the applied load, given the field of the body without it."""
 
     def scaled(self, share: float) -> PassingLoad:
         """Return the same load with its forces times ``share``."""

@@ -17,12 +17,13 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
+from solver.steady.body import S
 from solver.steady.flow import usual_parts
 
 if TYPE_CHECKING:
@@ -32,10 +33,8 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.materials.state import PlasticState
-    from solver.steady.flow import RowFlow
-    from solver.steady.layers import Layers
+    from solver.steady.body import FlowPast, PassedBody
     from solver.steady.load import AppliedLoad, PassingLoad
-    from solver.steady.track import Track
 
     Array = NDArray[np.float64]
 
@@ -63,15 +62,15 @@ _PATIENCE, _PROGRESS = 14, 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class Pass:
+class Pass(Generic[S]):
     """A steady pass.
 
     Attributes
     ----------
     law : law of the material
     parts : number of increments between two points of a row
-    before, after : state by depth, in the frame in which the load moves along +x
-    strain : (n_rows, n_columns, 4) Mandel strain that the pass adds, at the points of the window
+    before, after : state of the body, in the frame in which the load moves along +x
+    strain : (n_rows, n_columns, n_components) strain that the pass adds at the points, Mandel
     states : internal variables (..., n_rows, n_columns) at these points
     ago : internal variables at the beginning of the last increment before each point
     surface : internal variables (..., n, n_columns) at the surface above the n uppermost rows
@@ -83,8 +82,8 @@ class Pass:
 
     law: Law
     parts: int
-    before: Layers
-    after: Layers
+    before: S
+    after: S
     strain: Array
     states: PlasticState
     ago: PlasticState
@@ -97,7 +96,7 @@ class Pass:
 
     @property
     def plastic_strain(self) -> Array:
-        """Plastic strain (n_rows, n_columns, 4), Mandel."""
+        """Plastic strain (n_rows, n_columns, n_components), Mandel."""
         return np.moveaxis(self.states.plastic_strain, 0, 2)
 
     @property
@@ -111,27 +110,27 @@ class Pass:
         return float((self.accumulated - self.before.accumulated[:, None]).max())
 
     @property
-    def left(self) -> Layers:
+    def left(self) -> S:
         """The state behind the pass, in the coordinates of the track: mirrored for direction -1."""
         return self.after if self.direction == 1 else self.after.mirrored
 
 
 def passing(
-    track: Track,
+    track: PassedBody[S],
     material: Law,
     load: PassingLoad,
-    before: Layers,
+    before: S,
     guess: Array | None = None,
     *,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
-) -> Pass:
-    """Return the steady pass of a load over a half-plane.
+) -> Pass[S]:
+    """Return the steady pass of a load over a body.
 
     Parameters
     ----------
-    track : the half-plane
-    material : law of the half-plane
+    track : the body
+    material : its law
     load : load that passes along +x
     before : state by depth before the pass
     guess : strains (n_rows, n_columns, 4) to start from, for instance of a similar pass
@@ -152,7 +151,7 @@ def passing(
     double_shear = 2 * material.elasticity.shear_modulus
     solves, krylov = 0, _KRYLOV
 
-    def at(added: Array) -> _At:
+    def at(added: Array) -> _At[S]:
         nonlocal solves
         solves += 1
         flow = track.flow(material, before, added, parts)
@@ -184,7 +183,7 @@ def passing(
                 solves=solves,
             )
 
-        def newton(scaled: Array, here: _At = here) -> Array:
+        def newton(scaled: Array, here: _At[S] = here) -> Array:
             nonlocal solves
             solves += 1
             change = scaled.reshape(shape) / scale
@@ -213,17 +212,17 @@ def passing(
 
 
 @dataclass(frozen=True, slots=True)
-class _At:
+class _At(Generic[S]):
     """An iterate of Newton's method: strains, flow and load with them, residual and its norm."""
 
     added: Array
-    flow: RowFlow
+    flow: FlowPast[S]
     loading: AppliedLoad
     residual: Array
     size: float
 
 
-def _along(at: Callable[[Array], _At], here: _At, change: Array) -> _At:
+def _along(at: Callable[[Array], _At[S]], here: _At[S], change: Array) -> _At[S]:
     """Return the iterate after a step, or after the largest share of it that lowers the residual.
 
     The residual has kinks where points begin to yield. If no share lowers it, the whole step is

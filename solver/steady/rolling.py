@@ -68,7 +68,7 @@ def rolling(
     *,
     guess: Array | None = None,
     parts: int | None = None,
-) -> Iterator[Pass]:
+) -> Iterator[Pass[Layers]]:
     """Yield the passes of a load over a track that begins without plastic strain.
 
     Parameters

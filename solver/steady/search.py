@@ -61,7 +61,7 @@ def search(
     *,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
-) -> Pass:
+) -> Pass[Layers]:
     """Return the steady pass that `passing` finds, from this guess or by continuation.
 
     Parameters are those of `passing`.
@@ -73,10 +73,10 @@ def search(
         material without hardening
     """
 
-    def exactly(load: PassingLoad, guess: Array | None = None) -> Pass:
+    def exactly(load: PassingLoad, guess: Array | None = None) -> Pass[Layers]:
         return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
 
-    def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass:
+    def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass[Layers]:
         return passing(
             track, _linear(material, ratio), load, before, guess, parts=_PARTS, tolerance=_TOLERANCE
         )
@@ -128,7 +128,7 @@ def _excessive(ratio: float) -> LimitLoad:
     return LimitLoad(f"{much}: this counts as the limit")
 
 
-def _check_spinning(exactly: Callable[[PassingLoad], Pass], load: PassingLoad) -> None:
+def _check_spinning(exactly: Callable[[PassingLoad], Pass[Layers]], load: PassingLoad) -> None:
     """Raise `Spins` if the moment on a wheel exceeds that of full slip.
 
     Full slip may carry less than friction times load: shear on a slope carries a part of the load,
@@ -144,7 +144,7 @@ def _check_spinning(exactly: Callable[[PassingLoad], Pass], load: PassingLoad) -
         raise Spins(much, carried, 1.0)
 
 
-def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
+def _tried(solve: Callable[..., Pass[Layers]], *given: Any) -> Pass[Layers] | NotConverged:
     """Return a pass, or the reason why it was not found; raise `WindowTooSmall`."""
     try:
         return solve(*given)
@@ -155,11 +155,11 @@ def _tried(solve: Callable[..., Pass], *given: Any) -> Pass | NotConverged:
 
 
 def _fading(
-    eased: Callable[[float, Array | None], Pass],
-    exactly: Callable[[Array | None], Pass],
+    eased: Callable[[float, Array | None], Pass[Layers]],
+    exactly: Callable[[Array | None], Pass[Layers]],
     own: float,
     largest: float,
-) -> Pass:
+) -> Pass[Layers]:
     """Return the pass found by reducing the hardening ratio, in smaller steps if one fails.
 
     No pass may add more plastic strain than ``largest``. If the first pass is not found and the
@@ -174,7 +174,7 @@ def _fading(
     """
     ratio, share = _HARDEST, _SHARE
     stiffest = _STIFFEST if own else _HARDEST
-    found: Pass | None = None
+    found: Pass[Layers] | None = None
     while True:
         guess = found.strain if found else None
         last = ratio <= max(own, _SOFTEST)
@@ -198,12 +198,12 @@ def _fading(
 
 
 def _approached(
-    exactly: Callable[..., Pass],
+    exactly: Callable[..., Pass[Layers]],
     eased: Callable[[float], PassingLoad],
     shares: tuple[float, ...],
-    begun: Pass | NotConverged | None,
+    begun: Pass[Layers] | NotConverged | None,
     failure: NotConverged,
-) -> Pass | NotConverged:
+) -> Pass[Layers] | NotConverged:
     """Return the pass found by changing the load through ``shares`` to 1, or ``failure``.
 
     ``eased`` gives the load for a share; ``begun`` is the pass to start from, None for no guess.

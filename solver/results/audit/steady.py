@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from solver.results.audit.recomputed import BodyFields
     from solver.results.steady import TrackBody
     from solver.steady import Pass, Track
+    from solver.steady.layers import Layers
 
     Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ _LIMITS = {
 
 
 def audit_pass(
-    track: Track, material: Law, found: Pass, previous: Pass | None, direction: int
+    track: Track, material: Law, found: Pass[Layers], previous: Pass[Layers] | None, direction: int
 ) -> Audit:
     """Check a steady pass: the state under load, the state behind it, and the flow of material.
 
@@ -92,7 +93,7 @@ def audit_pass(
     )
 
 
-def _strain(track: Track, found: Pass) -> Strained:
+def _strain(track: Track, found: Pass[Layers]) -> Strained:
     """Return the largest plastic strain behind the pass, which does not depend on x."""
     layers = found.after.whole
     places = np.stack([np.zeros_like(layers.depth), -layers.depth])
@@ -102,7 +103,7 @@ def _strain(track: Track, found: Pass) -> Strained:
 class _Way:
     """The flow of material through the window: for each column, the last increment before it."""
 
-    def __init__(self, track: Track, material: Law, found: Pass) -> None:
+    def __init__(self, track: Track, material: Law, found: Pass[Layers]) -> None:
         self._material, self._found, self._elasticity = material, found, track.elasticity
         at_rest = found.before.strain(track.elasticity)[:, None]
         self._at_rest = np.moveaxis(at_rest, 2, 0)
@@ -168,7 +169,7 @@ class _Way:
         response = Response(self._stress, nothing[0], self._after, nothing[1])
         return float(self._material.dissipation(self._before, response).min())
 
-    def lost(self, previous: Pass | None, direction: int) -> float:
+    def lost(self, previous: Pass[Layers] | None, direction: int) -> float:
         """Return the difference between the state before the pass and that behind the last one.
 
         It is the largest difference of internal variables, as stress over the yield stress. In the
@@ -211,7 +212,7 @@ def _largest(values: Array) -> float:
     return float(np.maximum(values.max(), 0.0))
 
 
-def _of_contact(material: Law, found: Pass) -> dict[str, float]:
+def _of_contact(material: Law, found: Pass[Layers]) -> dict[str, float]:
     """Return the figures of the contact with a wheel; empty without a wheel."""
     touching = found.loading
     if not isinstance(touching, RollingContact):
@@ -239,7 +240,7 @@ class OfPass:
     def __init__(
         self,
         half_plane: TrackBody,
-        found: Pass,
+        found: Pass[Layers],
         moving: TravellingPressure | None,
         released: str,
     ) -> None:

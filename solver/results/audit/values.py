@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from solver.results.audit.recomputed import BodyFields
     from solver.results.steady import TrackBody
     from solver.steady import Pass
+    from solver.steady.layers import Layers
 
     Array = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ class PassFields:
     z. Nodes of the surface have separate values.
     """
 
-    def __init__(self, half_plane: TrackBody, found: Pass, *, loaded: bool) -> None:
+    def __init__(self, half_plane: TrackBody, found: Pass[Layers], *, loaded: bool) -> None:
         self.plain = PlainBody(half_plane.full(""))
         self._track, self._found, self._loaded = half_plane.track, found, loaded
         self._way = found.direction
