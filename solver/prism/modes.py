@@ -8,7 +8,8 @@ station 0 at x = 0; the load moves along +x. With the amplitudes U_m of `solver.
 so that U_m is the discrete Fourier transform over c. Only a window of stations has forces and
 needs results, and only a zone of the section: all else of the section is condensed, wave by wave,
 onto the rim of the zone. The transform from and to a window is a product with a matrix (stations,
-waves); it costs no more than a fast transform over all stations, and leaves the waves together.
+waves), which costs little more than a fast transform over all stations and leaves the waves
+together.
 """
 
 from __future__ import annotations
