@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.linear.solvers import LinearSolver
+    from solver.linear.solvers import Factors
     from solver.prism.section import Section
 
     Array = NDArray[np.float64]
@@ -169,8 +169,8 @@ class Modes:
         """
         nodal = self._nodal(eigenstress, forces)
         u = np.empty_like(nodal)
-        for solver, right, found in zip(self._factors, nodal, u, strict=True):
-            found[:] = solver.solve(right.T).T
+        for wave, right in enumerate(nodal):
+            u[wave] = self._factors.solve(right.T, wave).T
         flat = np.ascontiguousarray(u.reshape(-1, len(self.unknowns)).T)
         strain = self.B0 @ flat + self.B1 @ (flat * self._twice_k)
         return ZoneResponse(
@@ -187,7 +187,8 @@ class Modes:
     def columns(self) -> Array:
         """Displacements (waves, m, n_rows) of the zone for unit forces on the rows [mm2/N]."""
         each = self.rows.T.toarray()
-        return np.stack([solver.solve(each) for solver in self._factors])
+        waves = range(len(self.wavenumbers))
+        return np.stack([self._factors.solve(each, wave) for wave in waves])
 
     @cached_property
     def compliance(self) -> Array:
@@ -308,10 +309,8 @@ def _check(
         raise ModelError("behind", len(behind), f"must have {stations - window} factors, or none")
 
 
-def _factorised(
-    section: Section, zone: Numbers, wavenumbers: Sequence[float]
-) -> list[LinearSolver]:
-    """Return for each wave the inverse of the stiffness on some unknowns, the others condensed."""
+def _factorised(section: Section, zone: Numbers, wavenumbers: Sequence[float]) -> Factors:
+    """Return the factors of the stiffness of each wave on some unknowns, the others condensed."""
     rest = np.setdiff1d(section.free, zone)
     coupled = np.isin(section.dofs, rest).any(axis=1)
     rim = np.intersect1d(section.dofs[coupled], zone)
@@ -328,11 +327,10 @@ def _factorised(
     sparse_slot, dense_slot = np.split(slot, [len(row)])
     indptr = np.searchsorted(keys, np.arange(size + 1) * size)
     pattern = sparse.csr_array((np.zeros(len(keys)), keys % size, indptr), shape=(size, size))
-    factors: list[LinearSolver] = []
-    for k in wavenumbers:
+    factors = linear.analyse_several(pattern, len(wavenumbers))
+    for wave, k in enumerate(wavenumbers):
         data = np.zeros(len(keys))
         data[sparse_slot] = own.at(k)
         data[dense_slot] -= elimination.taken(outside.at(k))[first, second]
-        factors.append(linear.analyse(pattern, small=True))
-        factors[-1].factorise(data)
+        factors.factorise(data, wave)
     return factors
