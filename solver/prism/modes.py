@@ -10,6 +10,9 @@ needs results, and only a zone of the section: all else of the section is conden
 onto the rim of the zone. The transform from and to a window is a product with a matrix (stations,
 waves), which costs little more than a fast transform over all stations and leaves the waves
 together.
+
+Waves shorter than two stations are missing: under forces that differ from station to station,
+stress less than a station's spacing below the surface is not resolved.
 """
 
 from __future__ import annotations
