@@ -51,7 +51,7 @@ class PardisoError(RuntimeError):
 
 
 class Pardiso:
-    """One analysed pattern and the factor of the last matrix.
+    """One analysed pattern and the factor of the last matrix, or those of several matrices.
 
     All unknowns except those ``kept`` are eliminated. The Schur complement on the kept ones is
     factorised densely, so that their compliances cost no sparse solves.
@@ -63,6 +63,7 @@ class Pardiso:
         default
     kind : `POSITIVE_DEFINITE` or `INDEFINITE`
     ordering : `DISSECTION` (nested) or `MINIMUM_DEGREE`
+    count : number of matrices whose factors are held at the same time, none kept of more than one
     """
 
     def __init__(
@@ -71,9 +72,11 @@ class Pardiso:
         kept: NDArray[np.int64] | None = None,
         kind: int = POSITIVE_DEFINITE,
         ordering: int = DISSECTION,
+        count: int = 1,
     ) -> None:
         self.kind = kind
         self.n = upper.shape[0]
+        self._count = count
         self._kept = np.zeros(0, dtype=np.int64) if kept is None else kept
         self._last = np.zeros(self.n, dtype=np.int32)
         self._last[self._kept] = 1
@@ -89,34 +92,34 @@ class Pardiso:
         self._iparm[35] = 2 if len(self._kept) else 0  # Schur complement, and factors to solve with
         nothing = np.zeros(1)
         self._call(_ANALYSE, nothing, nothing)
-        weakref.finalize(self, _release, self._handle, kind, self._iparm)
+        weakref.finalize(self, _release, self._handle, kind, self._iparm, count)
 
-    def factorise(self, data: NDArray[np.float64]) -> None:
-        """Factorise the matrix with these values on the analysed pattern."""
-        schur = self.eliminate(data)
+    def factorise(self, data: NDArray[np.float64], which: int = 0) -> None:
+        """Factorise the matrix with these values on the analysed pattern, as number ``which``."""
+        schur = self.eliminate(data, which)
         if len(self._kept):
             try:
                 self._schur = cho_factor(schur, lower=True)
             except LinAlgError as failure:
                 raise PardisoError(_FACTORISE, NOT_POSITIVE) from failure
 
-    def eliminate(self, data: NDArray[np.float64]) -> NDArray[np.float64]:
+    def eliminate(self, data: NDArray[np.float64], which: int = 0) -> NDArray[np.float64]:
         """Eliminate all unknowns but those kept; return the Schur complement (m, m) on these."""
         self._data = np.ascontiguousarray(data, dtype=float)
         m = len(self._kept)
         schur = np.zeros((m, m)) if m else np.zeros(1)
-        self._call(_FACTORISE, np.zeros(1), schur)
+        self._call(_FACTORISE, np.zeros(1), schur, which)
         return schur
 
-    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the solution for ``b`` (n,) or (n, k)."""
+    def solve(self, b: NDArray[np.float64], which: int = 0) -> NDArray[np.float64]:
+        """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``."""
         # PARDISO reads right-hand sides column by column
         b = np.asfortranarray(b, dtype=float)
         x = np.zeros_like(b)
         if b.size == 0:
             return x
         if not len(self._kept):
-            self._call(_SOLVE, b, x)
+            self._call(_SOLVE, b, x, which)
             return x
         half = self.forward(b)
         return self.backward(half, self.on_kept(half[self._kept]))
@@ -147,10 +150,13 @@ class Pardiso:
         half = solve_triangular(self._schur[0], rows.T, lower=True, check_finite=False)
         return np.asarray(half.T @ half)
 
-    def _call(self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64]) -> None:
+    def _call(
+        self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64], which: int = 0
+    ) -> None:
         _pardiso(
             phase, self._handle, self.kind, self._iparm, self.n, b.shape[1] if b.ndim == 2 else 1,
             (self._data, self._indptr, self._indices), self._last, b, x,
+            self._count, which,
         )  # fmt: skip
 
 
@@ -169,6 +175,8 @@ def _pardiso(
     last: NDArray[Any],
     b: NDArray[Any],
     x: NDArray[Any],
+    factors: int,
+    which: int,
 ) -> None:
     mkl = library()
     if mkl is None:
@@ -179,8 +187,8 @@ def _pardiso(
         return ctypes.byref(ctypes.c_int32(value))
 
     mkl.pardiso(
-        _pointer(handle), integer(1), integer(1), integer(kind), integer(phase), integer(n),
-        *(_pointer(part) for part in matrix), _pointer(last),
+        _pointer(handle), integer(factors), integer(which + 1), integer(kind), integer(phase),
+        integer(n), *(_pointer(part) for part in matrix), _pointer(last),
         integer(count), _pointer(iparm), integer(0), _pointer(b), _pointer(x),
         ctypes.byref(error),
     )  # fmt: skip
@@ -188,7 +196,7 @@ def _pardiso(
         raise PardisoError(phase, error.value)
 
 
-def _release(handle: NDArray[Any], kind: int, iparm: NDArray[Any]) -> None:
+def _release(handle: NDArray[Any], kind: int, iparm: NDArray[Any], factors: int) -> None:
     empty = np.zeros(1, dtype=np.int32)
     _pardiso(_RELEASE, handle, kind, iparm, 1, 1, (np.zeros(1), empty, empty), empty,
-             np.zeros(1), np.zeros(1))  # fmt: skip
+             np.zeros(1), np.zeros(1), factors, 0)  # fmt: skip

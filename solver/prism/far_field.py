@@ -46,7 +46,8 @@ class FarField:
     ----------
     modes : the prism of length L, with surface rows
     x : position at which the resultants act [mm]
-    levels : number of lengths 8 L, 64 L, ...; the last one stands for endless
+    levels : number of lengths 8 L, 64 L, ...; the last one stands for endless. It must be long
+        against the reach of a load: a rail on soft springs rolls, and moves along x, over 10 m
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class FarField:
         if the surface rows cannot carry all four resultants
     """
 
-    def __init__(self, modes: Modes, x: float, levels: int = 3) -> None:
+    def __init__(self, modes: Modes, x: float, levels: int = 4) -> None:
         self._spacing = modes.length / modes.stations
         self._motions = modes.rows @ modes.section.rigid[modes.unknowns]
         size = np.abs(modes.section.rigid).max(axis=0)

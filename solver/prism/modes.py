@@ -8,7 +8,11 @@ station 0 at x = 0; the load moves along +x. With the amplitudes U_m of `solver.
 so that U_m is the discrete Fourier transform over c. Only a window of stations has forces and
 needs results, and only a zone of the section: all else of the section is condensed, wave by wave,
 onto the rim of the zone. The transform from and to a window is a product with a matrix (stations,
-waves); it costs no more than a fast transform over all stations, and leaves the waves together.
+waves), which costs little more than a fast transform over all stations and leaves the waves
+together.
+
+Waves shorter than two stations are missing: under forces that differ from station to station,
+stress less than a station's spacing below the surface is not resolved.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.linear.solvers import LinearSolver
+    from solver.linear.solvers import Factors
     from solver.prism.section import Section
 
     Array = NDArray[np.float64]
@@ -168,8 +172,8 @@ class Modes:
         """
         nodal = self._nodal(eigenstress, forces)
         u = np.empty_like(nodal)
-        for solver, right, found in zip(self._factors, nodal, u, strict=True):
-            found[:] = solver.solve(right.T).T
+        for wave, right in enumerate(nodal):
+            u[wave] = self._factors.solve(right.T, wave).T
         flat = np.ascontiguousarray(u.reshape(-1, len(self.unknowns)).T)
         strain = self.B0 @ flat + self.B1 @ (flat * self._twice_k)
         return ZoneResponse(
@@ -199,7 +203,8 @@ class Modes:
     def columns(self) -> Array:
         """Displacements (waves, m, n_rows) of the zone for unit forces on the rows [mm2/N]."""
         each = self.rows.T.toarray()
-        return np.stack([solver.solve(each) for solver in self._factors])
+        waves = range(len(self.wavenumbers))
+        return np.stack([self._factors.solve(each, wave) for wave in waves])
 
     @cached_property
     def compliance(self) -> Array:
@@ -320,10 +325,8 @@ def _check(
         raise ModelError("behind", len(behind), f"must have {stations - window} factors, or none")
 
 
-def _factorised(
-    section: Section, zone: Numbers, wavenumbers: Sequence[float]
-) -> list[LinearSolver]:
-    """Return for each wave the inverse of the stiffness on some unknowns, the others condensed."""
+def _factorised(section: Section, zone: Numbers, wavenumbers: Sequence[float]) -> Factors:
+    """Return the factors of the stiffness of each wave on some unknowns, the others condensed."""
     rest = np.setdiff1d(section.free, zone)
     coupled = np.isin(section.dofs, rest).any(axis=1)
     rim = np.intersect1d(section.dofs[coupled], zone)
@@ -340,11 +343,10 @@ def _factorised(
     sparse_slot, dense_slot = np.split(slot, [len(row)])
     indptr = np.searchsorted(keys, np.arange(size + 1) * size)
     pattern = sparse.csr_array((np.zeros(len(keys)), keys % size, indptr), shape=(size, size))
-    factors: list[LinearSolver] = []
-    for k in wavenumbers:
+    factors = linear.analyse_several(pattern, len(wavenumbers))
+    for wave, k in enumerate(wavenumbers):
         data = np.zeros(len(keys))
         data[sparse_slot] = own.at(k)
         data[dense_slot] -= elimination.taken(outside.at(k))[first, second]
-        factors.append(linear.analyse(pattern, small=True))
-        factors[-1].factorise(data)
+        factors.factorise(data, wave)
     return factors

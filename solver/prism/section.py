@@ -11,8 +11,8 @@ of strain and stress divided by i, its strain is real for real U, and so is the 
 K_k is symmetric, and positive definite for k != 0. Real and imaginary parts of forces are two
 right-hand sides.
 
-O.C. Zienkiewicz, R.L. Taylor, The Finite Element Method 2 (1991), section 2.12 (semi-analytical
-elements).
+O.C. Zienkiewicz, R.L. Taylor, The Finite Element Method, volume 2 (5th edition, 2000), chapter 9,
+semi-analytical finite elements.
 """
 
 from __future__ import annotations

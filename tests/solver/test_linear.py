@@ -43,6 +43,21 @@ def test_solve_and_compliance_match_dense_algebra(name, shift):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_several_matrices_of_one_pattern_keep_their_factors(name):
+    A, upper = matrix()
+    b = np.random.default_rng(5).standard_normal((A.shape[0], 2))
+    factors = linear.analyse_several(upper, 3, name)
+    for which, shift in enumerate((0.0, 1.0, 5.0)):
+        shifted = upper + shift * sparse.eye_array(A.shape[0])
+        factors.factorise(sparse.csr_array(shifted).data, which)
+    for which, shift in ((2, 5.0), (0, 0.0), (1, 1.0)):
+        exact = np.linalg.solve(A.toarray() + shift * np.eye(A.shape[0]), b)
+        assert factors.solve(b, which) == pytest.approx(exact, abs=1e-9 * np.abs(exact).max())
+    with pytest.raises(linear.Singular):
+        factors.factorise(np.full_like(upper.data, np.nan), 1)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_indefinite_matrix_is_solved_too(name):
     A, upper = matrix(shift=0.51)
     assert np.linalg.eigvalsh(A.toarray()).min() < 0
