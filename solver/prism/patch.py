@@ -253,7 +253,11 @@ class RollingPatch:
         Full slip may carry less than friction times load: spin turns shear, and shear on a slope
         carries a part of the load.
         """
-        wanted = np.array([self.moment, self._lateral or 0.0])
+        if self._drive is None and self._lateral is None:
+            return
+        smooth = np.tensordot(self._sums[1:], self._smooth(self._problem(u)).values, 3)
+        given = np.array([value is not None for value in (self._drive, self._lateral)])
+        wanted = np.where(given, [self.moment, self._lateral or 0.0] - smooth, 0.0)
         size = float(np.hypot(*wanted))
         if not size:
             return
@@ -265,11 +269,11 @@ class RollingPatch:
             found = other._solve(u, None)
         except NoContact:
             return
-        forces = np.tensordot(self._sums[1:], found.values, 3)
+        forces = np.tensordot(self._sums[1:], found.values, 3) - smooth
         carried = float(forces @ wanted) / size**2
         if carried >= 1:
             return
-        if self._lateral:
+        if self._lateral is not None:
             much = f"the wheel slides off: all of its contact slips at {carried:.2%} of the force"
             raise LimitLoad(much, carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"

@@ -15,7 +15,7 @@ LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
         "version", "errors", "parameters", "parts", "tensors", "linear", "mesh", "materials",
-        "model", "fem", "contact", "loading", "steady", "results", "scenes",
+        "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
     ),
     "studies": ("errors", "toml", "scenes", "definition", "storage", "execution", "views"),
     "residua": (
