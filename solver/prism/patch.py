@@ -94,6 +94,8 @@ class RollingPatch:
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
         self._influence = _influence(grid, compliance, wheel)
+        if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
+            raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
         self._sums = self._resultants()
 
     def scaled(self, share: float) -> RollingPatch:
@@ -282,12 +284,13 @@ class RollingPatch:
 
 def _influence(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Influence:
     """Return slip and gap (w_x, g, w_s) from (q_x, p, q_s) on the surface, equal on the wheel."""
-    n = grid.stations
-    distances = np.fft.ifftshift(np.arange(-n, n))
-    turned = np.einsum("iab,dibjc->diajc", grid.axes, compliance[distances % len(compliance)])
-    surface = np.einsum("diajc,jbc->diajb", turned, grid.axes)
+    n, m = grid.stations, len(grid.z)
+    distances = np.fft.ifftshift(np.arange(-n, n)) % len(compliance)
+    turned = grid.axes @ compliance[distances].reshape(2 * n, m, 3, 3 * m)
+    surface = turned.reshape(-1, m, 3).swapaxes(0, 1) @ grid.axes.transpose(0, 2, 1)
     mirrored = half_space(grid.hats.s, grid.spacing, n, wheel.elasticity)
-    apart = surface * _MIRROR[:, None, None] * _MIRROR + mirrored
+    local = surface.swapaxes(0, 1).reshape(mirrored.shape)
+    apart = local * _MIRROR[:, None, None] * _MIRROR + mirrored
     kernel = apart.copy()
     for axis in TANGENTS:
         kernel[:, :, axis] -= np.roll(apart[:, :, axis], 1, axis=0)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 from scipy.special import ellipe, ellipk
 
 from solver.materials import Elasticity
@@ -73,6 +74,13 @@ def ellipse(a: float, b: float, peak: float = 1e-3) -> HertzEllipse:
     return HertzEllipse(a=a, b=b, peak_pressure=peak * modulus, modulus=modulus)
 
 
+def surface_of(grid: PatchGrid, elasticity: Elasticity = STEEL) -> Array:
+    """Return the compliance of a half-space in x, y, z, whose surface follows that of a grid."""
+    local = half_space(grid.hats.s, grid.spacing, grid.stations, elasticity)
+    turn = linalg.block_diag(*grid.axes)
+    return (turn.T @ local.reshape(-1, *turn.shape) @ turn).reshape(local.shape)
+
+
 def pressed(
     hertz: HertzEllipse, along: float, across: float, *, margin: float = 1.25,
     shift: float = 0.0, **given: float,
@@ -92,9 +100,10 @@ def pressed(
         ahead=ahead + shift * along,
         stations=2 * round(ahead / along) + 1,
     )  # fmt: skip
-    rail = half_space(grid.hats.s, along, grid.stations, STEEL)
     wheel = ProfiledWheel(profile=np.zeros_like, radius=rolling, elasticity=STEEL)
-    return RollingPatch(grid, rail, wheel, force=hertz.force, **{"friction": 0.0, **given})
+    return RollingPatch(
+        grid, surface_of(grid), wheel, force=hertz.force, **{"friction": 0.0, **given}
+    )
 
 
 def flat(patch: RollingPatch) -> Array:

@@ -11,7 +11,7 @@ from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_grid import PatchGrid
 from solver.prism.profiled_wheel import ProfiledWheel
-from tests.verification.hertz_ellipse import HertzEllipse
+from tests.verification.hertz_ellipse import HertzEllipse, surface_of
 
 Array = NDArray[np.float64]
 MODULI = {"same": 2e5, "softer": 2e4, "stiffer": 2e6, "rigid": np.inf}
@@ -67,8 +67,7 @@ def random_case(seed: int) -> tuple[RollingPatch, Array, ProfiledWheel, dict[str
         ) * hertz.force
     if "lateral_force" in given:
         given["spin"] = 0.0
-    compliance = half_space(grid.hats.s, grid.spacing, grid.stations, soft)
-    compliance = np.einsum("iab,diajc,jce->dibje", grid.axes, compliance, grid.axes, optimize=True)
+    compliance = surface_of(grid, soft)
     return RollingPatch(grid, compliance, wheel, **given), compliance, wheel, given
 
 
