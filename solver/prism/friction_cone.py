@@ -45,6 +45,9 @@ _SHORTEST = 1 / 16
 """Smallest share of a Newton step in the line search."""
 _AWAY = 3.0
 """Largest growth of the error that a whole step may cause where no share lowers it."""
+_LOST = 1e6
+"""Ratio of the largest |q - d w| to the first resultant on one point, a pressure that no contact
+reaches; above it motions grow without bound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,12 +110,15 @@ def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolutio
         if none was found
     """
     here, tangent = _Iterate(problem, values, rigid), None
+    most = _LOST * abs(problem.resultants[0]) / np.abs(problem.weights[0]).max()
     for step in range(_STEPS):
         if here.error <= _TOLERANCE * here.values[..., NORMAL].max():
             return ConeSolution(here, tangent, step)
         tangent = _Tangent(here)
         here = _searched(here, *tangent.step())
-    raise NoContact(f"no contact forces were found in {_STEPS} steps of Newton's method")
+        if not here.pull.max() < most:
+            break
+    raise NoContact(f"no contact forces were found in {step + 1} steps of Newton's method")
 
 
 def _searched(here: _Iterate, change: Array, rigid: Array) -> _Iterate:
@@ -146,7 +152,7 @@ class _Iterate:
         self.closed = pushed > 0
         self.bound = problem.friction * np.maximum(p, 0)
         pulled = q - self.grip * self.effects[..., TANGENTS]
-        self.pull = np.linalg.norm(pulled, axis=-1)
+        self.pull = np.hypot(pulled[..., 0], pulled[..., 1])
         slips = self.closed & (self.pull > self.bound)
         self.status = np.where(slips, SLIP, np.where(self.closed, STICK, OPEN))
         self.along = np.zeros_like(q)

@@ -51,7 +51,7 @@ def half_space(s: Array, spacing: float, stations: int, elasticity: Elasticity) 
     if np.isinf(elasticity.youngs_modulus):
         return np.zeros((2 * stations, m, 3, m, 3))
     hats = Hats(s)
-    edges = spacing * (stations + 0.5 - np.arange(2 * stations + 1))
+    edges = spacing * np.arange(stations + 0.5, -stations, -1.0)
     point, xx, zz, xz, x, z = (
         hats.mean @ _under_hats(s, hats.points, *pair)
         for pair in _integrals(edges[:, None, None], hats.points[:, None] - s)

@@ -194,7 +194,7 @@ class Modes:
         eigenstress : (n_points, 6) at all stations [MPa]
         """
         flat = eigenstress.T[list(_ORDER)].ravel()
-        u = self._factors[0].solve(self._force0 @ flat)
+        u = self._factors.solve(self._force0 @ flat, 0)
         strain = np.empty((6, len(self.points)))
         strain[list(_ORDER)] = (self.B0 @ u).reshape(6, -1)
         return strain.T, np.asarray(self.rows @ u)

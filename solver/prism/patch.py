@@ -94,6 +94,8 @@ class RollingPatch:
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
         self._influence = _influence(grid, compliance, wheel)
+        if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
+            raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
         self._sums = self._resultants()
 
     def scaled(self, share: float) -> RollingPatch:
@@ -253,7 +255,11 @@ class RollingPatch:
         Full slip may carry less than friction times load: spin turns shear, and shear on a slope
         carries a part of the load.
         """
-        wanted = np.array([self.moment, self._lateral or 0.0])
+        if self._drive is None and self._lateral is None:
+            return
+        smooth = np.tensordot(self._sums[1:], self._smooth(self._problem(u)).values, 3)
+        given = np.array([value is not None for value in (self._drive, self._lateral)])
+        wanted = np.where(given, [self.moment, self._lateral or 0.0] - smooth, 0.0)
         size = float(np.hypot(*wanted))
         if not size:
             return
@@ -265,11 +271,11 @@ class RollingPatch:
             found = other._solve(u, None)
         except NoContact:
             return
-        forces = np.tensordot(self._sums[1:], found.values, 3)
+        forces = np.tensordot(self._sums[1:], found.values, 3) - smooth
         carried = float(forces @ wanted) / size**2
         if carried >= 1:
             return
-        if self._lateral:
+        if self._lateral is not None:
             much = f"the wheel slides off: all of its contact slips at {carried:.2%} of the force"
             raise LimitLoad(much, carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
@@ -278,12 +284,13 @@ class RollingPatch:
 
 def _influence(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Influence:
     """Return slip and gap (w_x, g, w_s) from (q_x, p, q_s) on the surface, equal on the wheel."""
-    n = grid.stations
-    distances = np.fft.ifftshift(np.arange(-n, n))
-    turned = np.einsum("iab,dibjc->diajc", grid.axes, compliance[distances % len(compliance)])
-    surface = np.einsum("diajc,jbc->diajb", turned, grid.axes)
+    n, m = grid.stations, len(grid.z)
+    distances = np.fft.ifftshift(np.arange(-n, n)) % len(compliance)
+    turned = grid.axes @ compliance[distances].reshape(2 * n, m, 3, 3 * m)
+    surface = turned.reshape(-1, m, 3).swapaxes(0, 1) @ grid.axes.transpose(0, 2, 1)
     mirrored = half_space(grid.hats.s, grid.spacing, n, wheel.elasticity)
-    apart = surface * _MIRROR[:, None, None] * _MIRROR + mirrored
+    local = surface.swapaxes(0, 1).reshape(mirrored.shape)
+    apart = local * _MIRROR[:, None, None] * _MIRROR + mirrored
     kernel = apart.copy()
     for axis in TANGENTS:
         kernel[:, :, axis] -= np.roll(apart[:, :, axis], 1, axis=0)

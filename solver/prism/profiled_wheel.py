@@ -43,15 +43,19 @@ class ProfiledWheel:
     def gap(self, grid: PatchGrid) -> Array:
         """Return the gap (n, m) above the surface along its normals, at height 0 [mm].
 
-        Infinite where the wheel does not reach. At height d it is larger by d cos(angle).
+        At height d it is larger by d cos(angle). Raises `ModelError` where there is no wheel above.
         """
         z, y, slope = grid.surface
         height = np.asarray(self.profile(z), dtype=float)
+        if not np.isfinite(height).all():
+            raise ModelError("profile", height, "must be finite at every vertex and between")
         radius = self.radius - height
         below = radius**2 - grid.x[:, None] ** 2
         if not (below > 0).all():
             reach = float(radius.min())
-            raise ModelError("ahead", grid.ahead, f"stations must lie within {reach:g} of x = 0")
+            raise ModelError(
+                "ahead", float(grid.ahead), f"stations must lie within {reach:g} of x = 0"
+            )
         gap = height - y + radius - np.sqrt(below)
         return np.asarray((gap / np.hypot(1, slope)) @ grid.hats.mean.T)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 from scipy.special import ellipe, ellipk
 
 from solver.materials import Elasticity
@@ -67,32 +68,42 @@ class HertzEllipse:
         return self.peak_pressure * np.sqrt(np.maximum(0.0, inside))
 
 
-def ellipse(a: float, b: float, elasticity: Elasticity = STEEL) -> HertzEllipse:
-    """Return a contact of two equal bodies, much smaller than their radii."""
-    modulus = elasticity.plane_strain_modulus / 2
-    return HertzEllipse(a=a, b=b, peak_pressure=1e-3 * modulus, modulus=modulus)
+def ellipse(a: float, b: float, peak: float = 1e-3) -> HertzEllipse:
+    """Return a contact of two equal bodies; ``peak`` is the largest pressure over E*."""
+    modulus = STEEL.plane_strain_modulus / 2
+    return HertzEllipse(a=a, b=b, peak_pressure=peak * modulus, modulus=modulus)
+
+
+def surface_of(grid: PatchGrid, elasticity: Elasticity = STEEL) -> Array:
+    """Return the compliance of a half-space in x, y, z, whose surface follows that of a grid."""
+    local = half_space(grid.hats.s, grid.spacing, grid.stations, elasticity)
+    turn = linalg.block_diag(*grid.axes)
+    return (turn.T @ local.reshape(-1, *turn.shape) @ turn).reshape(local.shape)
 
 
 def pressed(
-    hertz: HertzEllipse, along: float, across: float, *, elasticity: Elasticity = STEEL,
-    margin: float = 1.25, **given: float | None,
+    hertz: HertzEllipse, along: float, across: float, *, margin: float = 1.25,
+    shift: float = 0.0, **given: float,
 ) -> RollingPatch:  # fmt: skip
     """Return a cylinder on a crowned rail whose contact has this ellipse.
 
     ``along`` and ``across`` are the distances of stations and vertices, ``given`` friction, drive,
     creepages and so on.
+    Stations and vertices are symmetric about the middle but for a ``shift``, over their distance.
     """
     rolling, crown = hertz.radii
     half = np.ceil(margin * hertz.b / across) * across
-    z = np.linspace(-half, half, 2 * round(half / across) + 1)
+    z = np.linspace(-half, half, 2 * round(half / across) + 1) + shift * across
     ahead = np.ceil(margin * hertz.a / along) * along
     grid = PatchGrid(
-        z=z, y=-(z**2) / (2 * crown), angle=-np.arctan(z / crown), spacing=along, ahead=ahead,
+        z=z, y=-(z**2) / (2 * crown), angle=-np.arctan(z / crown), spacing=along,
+        ahead=ahead + shift * along,
         stations=2 * round(ahead / along) + 1,
     )  # fmt: skip
-    rail = half_space(grid.hats.s, along, grid.stations, elasticity)
-    wheel = ProfiledWheel(profile=np.zeros_like, radius=rolling, elasticity=elasticity)
-    return RollingPatch(grid, rail, wheel, force=hertz.force, **{"friction": 0.0, **given})
+    wheel = ProfiledWheel(profile=np.zeros_like, radius=rolling, elasticity=STEEL)
+    return RollingPatch(
+        grid, surface_of(grid), wheel, force=hertz.force, **{"friction": 0.0, **given}
+    )
 
 
 def flat(patch: RollingPatch) -> Array:
