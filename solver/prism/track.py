@@ -46,6 +46,7 @@ class PrismTrack:
 
     Attributes
     ----------
+    section : the cross-section
     weights : (n_points, window) volume of the points [mm3]
     grid : stations and vertices where the load may act
 
@@ -76,7 +77,7 @@ class PrismTrack:
         if 2 * near > min(before, window - 1 - before):
             allowed = "must be at most half of what the window has ahead and behind"
             raise ModelError("reach", reach, allowed)
-        self._section, self._before, self._near = section, before, near
+        self.section, self._before, self._near = section, before, near
         surface = RunningSurface(section, boundary)
         self.grid = surface.grid(spacing, near * spacing, 2 * near + 1)
         self.modes = Modes(
@@ -91,7 +92,12 @@ class PrismTrack:
     @property
     def elasticity(self) -> Any:
         """Elastic constants."""
-        return self._section.elasticity
+        return self.section.elasticity
+
+    @property
+    def points(self) -> Array:
+        """Positions (2, n_points) of the rows of points in the section: z, y [mm]."""
+        return self.section.points.reshape(2, -1)[:, self.modes.points]
 
     def virgin(self, law: Law) -> PrismState:
         """Return the state before any load."""

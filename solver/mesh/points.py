@@ -1,0 +1,56 @@
+"""Curves given by points, in memory or in a file."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+def read_points(path: str | Path) -> Array:
+    """Return the points (2, n) of a file of comma-separated values: z, y in each line [mm].
+
+    A first line without numbers is a heading. `checked_points` says what is allowed.
+
+    Raises
+    ------
+    ModelError
+        for ``file``, if it cannot be read or a line does not have two numbers; for ``points``
+    """
+    try:
+        lines = list(csv.reader(Path(path).read_text().splitlines()))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError("file", str(path), f"must be a readable text file: {error}") from None
+    points = []
+    for number, line in enumerate(lines, 1):
+        try:
+            z, y = (float(each) for each in line)
+        except ValueError:
+            if number == 1 or not line:
+                continue
+            allowed = f"must have two numbers in each line; line {number} is {','.join(line)!r}"
+            raise ModelError("file", str(path), allowed) from None
+        points.append((z, y))
+    return checked_points(np.array(points).reshape(-1, 2).T)
+
+
+def checked_points(points: Array) -> Array:
+    """Return points (2, n) of a curve from left to right, or raise `ModelError` for ``points``.
+
+    They must be at least four finite points, the first coordinate increasing.
+    """
+    X = np.asarray(points, dtype=float)
+    if X.ndim != 2 or len(X) != 2 or X.shape[1] < 4 or not np.isfinite(X).all():
+        raise ModelError("points", X.shape, "must be two rows of at least four finite numbers")
+    for k in np.flatnonzero(np.diff(X[0]) <= 0)[:1]:
+        raise ModelError("points", X[:, k + 1].tolist(), f"must lie to the right of {X[0, k]:g}")
+    return X

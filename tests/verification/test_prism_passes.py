@@ -1,0 +1,265 @@
+"""Steady passes over a prism: against passes in plane strain, and by what must hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from solver.errors import WindowTooSmall
+from solver.linear.threads import one_thread
+from solver.materials import (
+    ArmstrongFrederick,
+    Chaboche,
+    Layered,
+    Material,
+    TrescaMaterial,
+    Voce,
+)  # fmt: skip
+from solver.materials.law import Law
+from solver.mesh import grid, within
+from solver.prism.given_patch import EllipticPatch
+from solver.prism.passing_patch import PatchPassing
+from solver.prism.patch import RollingPatch
+from solver.prism.patch_contact import PatchContact
+from solver.prism.profiled_wheel import ProfiledWheel
+from solver.prism.section import Section
+from solver.prism.state import PrismState
+from solver.prism.track import PrismTrack
+from solver.steady import track_of
+from solver.steady.passing import Pass, passing
+from solver.tensors import von_mises
+
+Array = NDArray[np.float64]
+RE = 502.0
+PERFECT = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=RE)
+HARDENS = Material(
+    youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=RE, hardening="kinematic",
+    hardening_ratio=0.02,
+)  # fmt: skip
+"""Steel of the thesis: 4 000 MPa of kinematic hardening."""
+
+
+def lines(fine: float, h: float, far: float, growth: float) -> Array:
+    """Positions from 0: sides h up to ``fine``, then growing up to ``far``."""
+    at, side = list(np.linspace(0.0, fine, round(fine / h) + 1)), h
+    while at[-1] < far:
+        side = min(side * growth, far / 5)
+        at.append(at[-1] + side)
+    return np.array(at)
+
+
+@cache
+def block(h: float = 2.0, length: float = 64.0) -> PrismTrack:
+    """A block 150 mm wide and 75 deep, held at its bottom; elements of h in 20 by 14 mm."""
+    half = lines(10.0, h, 75.0, 1.4)
+    z, y = np.concatenate([-half[:0:-1], half]), -lines(14.0, h, 75.0, 1.4)[::-1]
+    mesh = within(grid(z, y), "running", ["top"], x=(-10.001, 10.001))
+    section = Section(mesh, PERFECT.elasticity, supports={"bottom": "xyz"})
+    at = section.points.mean(axis=2)
+    zone = (np.abs(at[0]) < 10) & (at[1] > -14)
+    return PrismTrack(
+        section, zone, "running", length=length, spacing=h, ahead=20.0, behind=24.0, reach=10.0,
+        levels=0,
+    )  # fmt: skip
+
+
+def rolled(track: PrismTrack, law: Law, load: PatchPassing, count: int = 1) -> Pass[PrismState]:
+    """The last of so many passes."""
+    state, guess = track.virgin(law), None
+    with one_thread():
+        for _ in range(count):
+            found = passing(track, law, load, state, guess)
+            state, guess = found.after, found.strain
+    return found
+
+
+def residual(law: Law, state: PrismState) -> Array:
+    """Residual stress (6, n) at the points, Mandel [MPa]."""
+    return law.stiffness(6) @ (state.strain - state.plastic_strain).T
+
+
+def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> PatchPassing:
+    """The pressure of the wheel on the rail of the thesis, of another peak [MPa]."""
+    a, b = 8.33, 6.27
+    return PatchPassing(
+        EllipticPatch(grid=track.grid, force=2 * np.pi * a * b * peak / 3, a=a, b=b, **shear)
+    )
+
+
+def wheel(track: PrismTrack, friction: float, drive: float, middle: float = 0.0) -> PatchPassing:
+    """A wheel of 460 mm with a crown of 300 mm, 150 kN."""
+    crowned = ProfiledWheel(
+        profile=lambda z: (z - middle) ** 2 / 600.0, radius=460.0, elasticity=PERFECT.elasticity
+    )
+    return PatchPassing(
+        RollingPatch(
+            track.grid, track.compliance, crowned, friction=friction, force=150e3, drive=drive
+        )
+    )
+
+
+# -- a strip held across is plane strain ----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line pressure with shear in proportion, uniform across; see `PatchLoad`."""
+
+    track: PrismTrack
+    a: float
+    peak: float
+    shear: float
+
+    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+        """See `PatchLoad`."""
+        own = self.track.grid
+        ends = own.ahead + own.spacing * (0.5 - np.arange(own.stations + 1))
+        x = np.clip(ends, -self.a, self.a) / self.a
+        share = (x * np.sqrt(1 - x**2) + np.arcsin(x)) / 2
+        pressure = -np.diff(share) * self.a * self.peak / own.spacing
+        traction = pressure[:, None, None] * np.array([self.shear, -1.0, 0.0])
+        return PatchContact(
+            grid=own,
+            traction=np.repeat(traction, len(own.z), axis=1),
+            gap=np.full_like(u[..., 0], np.nan),
+            slip=np.full_like(u[..., :2], np.nan),
+            status=np.zeros(u.shape[:2], dtype=np.int64),
+            along=np.zeros_like,
+        )
+
+
+def strip(length: float) -> PrismTrack:
+    """A strip held across and at its bottom, 400 mm deep; elements and stations of 2 mm."""
+    section = Section(
+        grid(np.array([0.0, 1.0, 2.0]), -lines(14.0, 2.0, 400.0, 1.3)[::-1]),
+        PERFECT.elasticity,
+        supports={"bottom": "xyz", "left": "z", "right": "z"},
+    )
+    return PrismTrack(
+        section, section.points[1].mean(axis=1) > -26.0, "top",
+        length=length, spacing=2.0, ahead=24.0, behind=32.0, reach=10.0, levels=0,
+    )  # fmt: skip
+
+
+def test_a_strip_held_across_has_the_pass_of_plane_strain() -> None:
+    """With a shear of 0.09 p, on elements of 2 mm; the error of a length is as 1 / length."""
+    a, peak, depths = 8.29, 1360.0, np.array([3.0, 5.0, 8.0, 12.0])
+    each = []
+    for length in (256.0, 512.0):
+        track = strip(length)
+        load = PatchPassing(Line(track, a, peak, -0.09))  # type: ignore[arg-type]
+        left = rolled(track, PERFECT, load).after
+        stress = residual(PERFECT, left)
+        assert np.abs(stress[[1, 3, 4, 5]]).max() < 1e-3 * RE
+        down = np.argsort(-track.points[1])
+        each.append([np.interp(depths, -track.points[1][down], stress[k][down]) for k in (0, 2)])
+    endless = 2 * np.array(each[1]) - each[0]
+    half_plane = track_of(a, 2.0, 1.15, PERFECT.elasticity)
+    before = half_plane.rows.virgin(PERFECT)
+    plane = passing(half_plane, PERFECT, half_plane.hertz(peak, -0.09), before).after
+    own = plane.stress(PERFECT.elasticity)
+    exact = [np.interp(depths, plane.depth, own[:, k]) for k in (0, 2)]
+    assert np.abs(endless - exact).max() < 0.025 * RE
+    assert left.accumulated.max() == pytest.approx(plane.accumulated.max(), rel=0.03)
+
+
+# -- what must hold -------------------------------------------------------------------------------
+
+
+LAWS: dict[str, Law] = {
+    "perfect": PERFECT,
+    "linear": HARDENS,
+    "recall": Chaboche(
+        elasticity=PERFECT.elasticity,
+        curve=Voce(yield_stress=RE),
+        back_stresses=(ArmstrongFrederick(2e4, 100.0), ArmstrongFrederick(2e3, 0.0)),
+    ),
+    "layered": Layered.of_curve(
+        PERFECT.elasticity, (RE / 2e5, 0.005, 0.02), (RE, 560.0, 650.0), slope=1000.0
+    ),
+    "tresca": TrescaMaterial(
+        elasticity=PERFECT.elasticity, curve=Voce(yield_stress=RE, modulus=4000.0)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_state_left_is_inside_the_yield_surface(name: str) -> None:
+    law = LAWS[name]
+    left = rolled(block(), law, ellipse(block(), 1360.0)).after
+    assert left.accumulated.max() > 0.005
+    assert law.yield_value(residual(law, left), left.state).max() < 1e-6 * RE
+
+
+def test_material_far_behind_is_where_the_release_says() -> None:
+    """The state without load is another one than that of the last station."""
+    found = rolled(block(), PERFECT, ellipse(block(), 1360.0))
+    last = found.strain[:, -1] - np.moveaxis(found.states.plastic_strain[..., -1], 0, 1)
+    stress = PERFECT.stiffness(6) @ last.T
+    assert 3.0 < np.abs(stress - residual(PERFECT, found.after)).max() < 0.3 * RE
+
+
+def test_a_wheel_beside_the_middle_leaves_the_mirror_image() -> None:
+    track = block()
+    left, right = (
+        rolled(track, HARDENS, wheel(track, 0.3, 0.75, middle)).after for middle in (-1.0, 1.0)
+    )
+    places = track.points.round(6)
+    mirrored = np.lexsort((places[1], -places[0])), np.lexsort((places[1], places[0]))
+    stress = [
+        residual(HARDENS, each)[:, order]
+        for each, order in zip((left, right), mirrored, strict=True)
+    ]
+    sign = np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0])[:, None]
+    assert np.abs(stress[0] - sign * stress[1]).max() < 2e-3 * RE
+    assert von_mises(stress[0]).max() > 100.0
+
+
+def test_traction_turns_the_layer_below_the_surface() -> None:
+    """A braked wheel draws it with its motion, a driven one against."""
+    track = block()
+    braked, driven = (rolled(track, HARDENS, wheel(track, 0.3, drive)) for drive in (0.75, -0.75))
+    middle = len(track.grid.z) // 2
+    assert braked.after.displacement[middle, 0] > 0 > driven.after.displacement[middle, 0]
+    force = braked.loading.contact.force  # type: ignore[attr-defined]
+    assert force == pytest.approx([0.75 * 0.3 * 150e3, -150e3, 0.0], rel=1e-3, abs=200.0)
+
+
+def test_a_length_twice_as_long_changes_little() -> None:
+    short, long = (
+        residual(HARDENS, rolled(track, HARDENS, ellipse(track, 1360.0)).after)
+        for track in (block(length=64.0), block(length=128.0))
+    )
+    assert np.abs(short - long).max() < 0.04 * RE
+
+
+def test_passes_shake_down_below_the_limit_and_not_above() -> None:
+    """The limit of a frictionless circle is 4.68 k, 2.70 Re (Ponter, Hearle, Johnson, 1985)."""
+    track = block()
+    added = {}
+    for ratio in (2.3, 3.2):
+        load, state, guess = ellipse(track, ratio * RE), track.virgin(PERFECT), None
+        each = []
+        with one_thread():
+            for _ in range(5):
+                found = passing(track, PERFECT, load, state, guess)
+                each.append(float((found.after.accumulated - state.accumulated).max()))
+                state, guess = found.after, found.strain
+        added[ratio] = each
+    assert added[2.3][-1] < 0.02 * added[2.3][0]
+    assert added[3.2][-1] > 0.1 * added[3.2][0]
+
+
+def test_a_zone_that_is_too_small_is_told() -> None:
+    section = block().section
+    at = section.points.mean(axis=2)
+    small = PrismTrack(
+        section, (np.abs(at[0]) < 10) & (at[1] > -5), "running",
+        length=64.0, spacing=2.0, ahead=20.0, behind=24.0, reach=10.0, levels=0,
+    )  # fmt: skip
+    with pytest.raises(WindowTooSmall, match="around"):
+        rolled(small, PERFECT, ellipse(small, 1360.0))
