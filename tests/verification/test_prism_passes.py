@@ -22,7 +22,7 @@ from solver.materials import (
 from solver.materials.law import Law
 from solver.mesh import grid, within
 from solver.prism.given_patch import EllipticPatch
-from solver.prism.passing_patch import PatchPassing
+from solver.prism.patch_passing import PatchPassing
 from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.profiled_wheel import ProfiledWheel
