@@ -22,9 +22,9 @@ from solver.materials import (
 from solver.materials.law import Law
 from solver.mesh import grid, within
 from solver.prism.given_patch import EllipticPatch
-from solver.prism.patch_passing import PatchPassing
 from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
+from solver.prism.patch_passing import PatchPassing
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
