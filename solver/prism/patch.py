@@ -63,6 +63,11 @@ class RollingPatch:
         if ``creepage`` is given
     lateral_force : force on the surface along z [N]; None if ``lateral_creepage`` is given
     creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
+
+    Attributes
+    ----------
+    grid, wheel, friction, force, drive, lateral_force : as given; without friction neither drive
+        nor lateral force
     """
 
     def __init__(
@@ -87,9 +92,10 @@ class RollingPatch:
             raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
             raise ModelError("force", force, "must be positive")
-        self.grid, self._friction, self._force = grid, friction, force
-        self._drive = drive if friction else None
-        self._lateral = lateral_force if friction else None
+        self.grid, self.wheel = grid, wheel
+        self.friction, self.force = friction, force
+        self.drive = drive if friction else None
+        self.lateral_force = lateral_force if friction else None
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
@@ -101,29 +107,29 @@ class RollingPatch:
     def scaled(self, share: float) -> RollingPatch:
         """See `PatchLoad`."""
         other = copy(self)
-        other._force *= share
-        if other._lateral is not None:
-            other._lateral *= share
+        other.force *= share
+        if other.lateral_force is not None:
+            other.lateral_force *= share
         return other
 
     def driven(self, share: float) -> RollingPatch:
         """See `PatchLoad`."""
         other = copy(self)
-        if other._drive is not None:
-            other._drive *= share
+        if other.drive is not None:
+            other.drive *= share
         return other
 
     @property
     def moment(self) -> float:
         """See `PatchLoad`."""
-        return (self._drive or 0.0) * self._friction * self._force
+        return (self.drive or 0.0) * self.friction * self.force
 
     @property
     def slipping(self) -> RollingPatch:
         """See `PatchLoad`."""
         other = copy(self)
         if self.moment:
-            other._drive = None
+            other.drive = None
             other._given = self._given.copy()
             other._given[1] += np.sign(self.moment) * _SLIDES
         return other
@@ -181,7 +187,7 @@ class RollingPatch:
     @property
     def _free(self) -> list[int]:
         """Numbers of the rigid motions whose resultant is given: height and creepages."""
-        given = (self._force, self._drive, self._lateral)
+        given = (self.force, self.drive, self.lateral_force)
         return [number for number, value in enumerate(given) if value is not None]
 
     def _resultants(self) -> Array:
@@ -208,14 +214,14 @@ class RollingPatch:
     def _problem(self, u: Array) -> ConeProblem:
         """Return the frictional problem of a surface with these displacements (n, m, 3)."""
         free = self._free
-        drive = 0.0 if self._drive is None else self._drive * self._friction * self._force
-        resultants = np.array([self._force, drive, self._lateral or 0.0])
+        drive = 0.0 if self.drive is None else self.drive * self.friction * self.force
+        resultants = np.array([self.force, drive, self.lateral_force or 0.0])
         given = self._given.copy()
         given[free] = 0.0
         return ConeProblem(
             influence=self._influence,
             offset=self._rest + self._offset(u) + np.tensordot(given, self._motions, 1),
-            friction=self._friction,
+            friction=self.friction,
             motions=self._motions[free],
             weights=self._sums[free],
             resultants=resultants[free],
@@ -245,7 +251,7 @@ class RollingPatch:
         nearest = np.argsort(gap)
         area = np.cumsum(np.broadcast_to(self._area, problem.offset.shape[:2]).ravel()[nearest])
         own = problem.influence.own()[:, NORMAL, NORMAL].mean()
-        approach = own * self._force / np.sqrt(area * self._area.mean())
+        approach = own * self.force / np.sqrt(area * self._area.mean())
         inside = gap[nearest] - gap[nearest[0]] <= _PRESSED * approach
         return float(gap[nearest[np.flatnonzero(inside)[-1]]])
 
@@ -255,16 +261,16 @@ class RollingPatch:
         Full slip may carry less than friction times load: spin turns shear, and shear on a slope
         carries a part of the load.
         """
-        if self._drive is None and self._lateral is None:
+        if self.drive is None and self.lateral_force is None:
             return
         smooth = np.tensordot(self._sums[1:], self._smooth(self._problem(u)).values, 3)
-        given = np.array([value is not None for value in (self._drive, self._lateral)])
-        wanted = np.where(given, [self.moment, self._lateral or 0.0] - smooth, 0.0)
+        given = np.array([value is not None for value in (self.drive, self.lateral_force)])
+        wanted = np.where(given, [self.moment, self.lateral_force or 0.0] - smooth, 0.0)
         size = float(np.hypot(*wanted))
         if not size:
             return
         other = copy(self)
-        other._drive = other._lateral = None
+        other.drive = other.lateral_force = None
         other._given = self._given.copy()
         other._given[1:3] += _SLIDES * wanted / size
         try:
@@ -275,7 +281,7 @@ class RollingPatch:
         carried = float(forces @ wanted) / size**2
         if carried >= 1:
             return
-        if self._lateral is not None:
+        if self.lateral_force is not None:
             much = f"the wheel slides off: all of its contact slips at {carried:.2%} of the force"
             raise LimitLoad(much, carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
