@@ -41,8 +41,9 @@ NORMAL, TANGENTS = 1, (0, 2)
 _TOLERANCE = 1e-9
 """Largest error of a condition, over the largest pressure, of a solution."""
 _STEPS = 40
-_SHORTEST = 1 / 16
-"""Smallest share of a Newton step in the line search."""
+_SHORTEST = 1 / 256
+"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
+found by its moment may overshoot a hundredfold."""
 _AWAY = 3.0
 """Largest growth of the error that a whole step may cause where no share lowers it."""
 _LOST = 1e6

@@ -93,7 +93,8 @@ class RollingPatch:
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
-        self._influence = _influence(grid, compliance, wheel)
+        with one_thread():
+            self._influence = _influence(grid, compliance, wheel)
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
         self._sums = self._resultants()
@@ -171,12 +172,13 @@ class RollingPatch:
             except NoContact:  # the contact may be elsewhere
                 pass
         smooth = self._smooth(problem)
-        rigid = np.append(smooth.rigid, np.zeros(len(problem.resultants) - 1))
         try:
-            return solve_cone(problem, smooth.values, rigid)
+            found = solve_cone(problem, smooth.values, self._rolling_freely(problem, smooth))
         except NoContact:
             self._check_sliding(u)
             raise
+        found.steps += smooth.steps
+        return found
 
     @property
     def _free(self) -> list[int]:
@@ -235,6 +237,14 @@ class RollingPatch:
         )  # fmt: skip
         height = np.array([-self._expected_edge(problem)])
         return solve_cone(smooth, np.zeros_like(problem.offset), height)
+
+    @staticmethod
+    def _rolling_freely(problem: ConeProblem, smooth: ConeSolution) -> Array:
+        """Return rigid motions (k,): free creepages make slip least, weighted with the pressure."""
+        share = np.sqrt(np.maximum(smooth.values[..., NORMAL, None], 0.0))
+        slip = (share * smooth.effects[..., TANGENTS]).ravel()
+        motions = (share * problem.motions[1:][..., TANGENTS]).reshape(-1, slip.size)
+        return np.append(smooth.rigid, np.linalg.lstsq(motions.T, -slip)[0])
 
     def _expected_edge(self, problem: ConeProblem) -> float:
         """Return the gap of undeformed bodies at the edge of the contact, roughly [mm].
