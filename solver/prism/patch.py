@@ -23,6 +23,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
+from solver.model.friction import LEAST_FRICTION
 from solver.prism.friction_cone import NORMAL, OPEN, TANGENTS, ConeProblem, solve_cone
 from solver.prism.half_space import half_space
 from solver.prism.influence import Influence
@@ -57,7 +58,7 @@ class RollingPatch:
         along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
         stations that repeats itself has every d once
     wheel : the wheel
-    friction : coefficient of friction
+    friction : coefficient of friction; without it moment and lateral force are left out
     force : vertical force on the axle [N]
     drive : moment on the axle over radius, positive when braking, over friction times force; None
         if ``creepage`` is given
@@ -87,9 +88,10 @@ class RollingPatch:
             raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
             raise ModelError("force", force, "must be positive")
-        self.grid, self._friction, self._force = grid, friction, force
-        self._drive = drive if friction else None
-        self._lateral = lateral_force if friction else None
+        self.grid, self._force = grid, force
+        self._friction = friction if friction > LEAST_FRICTION else 0.0
+        self._drive = drive if self._friction else None
+        self._lateral = lateral_force if self._friction else None
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
