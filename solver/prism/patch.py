@@ -23,6 +23,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
+from solver.model.friction import LEAST_FRICTION
 from solver.prism.friction_cone import NORMAL, OPEN, TANGENTS, ConeProblem, solve_cone
 from solver.prism.half_space import half_space
 from solver.prism.influence import Influence
@@ -57,7 +58,7 @@ class RollingPatch:
         along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
         stations that repeats itself has every d once
     wheel : the wheel
-    friction : coefficient of friction
+    friction : coefficient of friction; without it moment and lateral force are left out
     force : vertical force on the axle [N]
     drive : moment on the axle over radius, positive when braking, over friction times force; None
         if ``creepage`` is given
@@ -66,8 +67,7 @@ class RollingPatch:
 
     Attributes
     ----------
-    grid, wheel, friction, force, drive, lateral_force : as given; without friction neither drive
-        nor lateral force
+    grid, wheel, friction, force, drive, lateral_force : as above; what is left out is None
     """
 
     def __init__(
@@ -92,14 +92,15 @@ class RollingPatch:
             raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
             raise ModelError("force", force, "must be positive")
-        self.grid, self.wheel = grid, wheel
-        self.friction, self.force = friction, force
-        self.drive = drive if friction else None
-        self.lateral_force = lateral_force if friction else None
+        self.grid, self.wheel, self.force = grid, wheel, force
+        self.friction = friction if friction > LEAST_FRICTION else 0.0
+        self.drive = drive if self.friction else None
+        self.lateral_force = lateral_force if self.friction else None
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
-        self._influence = _influence(grid, compliance, wheel)
+        with one_thread():
+            self._influence = _influence(grid, compliance, wheel)
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
         self._sums = self._resultants()
@@ -177,12 +178,13 @@ class RollingPatch:
             except NoContact:  # the contact may be elsewhere
                 pass
         smooth = self._smooth(problem)
-        rigid = np.append(smooth.rigid, np.zeros(len(problem.resultants) - 1))
         try:
-            return solve_cone(problem, smooth.values, rigid)
+            found = solve_cone(problem, smooth.values, self._rolling_freely(problem, smooth))
         except NoContact:
             self._check_sliding(u)
             raise
+        found.steps += smooth.steps
+        return found
 
     @property
     def _free(self) -> list[int]:
@@ -241,6 +243,14 @@ class RollingPatch:
         )  # fmt: skip
         height = np.array([-self._expected_edge(problem)])
         return solve_cone(smooth, np.zeros_like(problem.offset), height)
+
+    @staticmethod
+    def _rolling_freely(problem: ConeProblem, smooth: ConeSolution) -> Array:
+        """Return rigid motions (k,): free creepages make slip least, weighted with the pressure."""
+        share = np.sqrt(np.maximum(smooth.values[..., NORMAL, None], 0.0))
+        slip = (share * smooth.effects[..., TANGENTS]).ravel()
+        motions = (share * problem.motions[1:][..., TANGENTS]).reshape(-1, slip.size)
+        return np.append(smooth.rigid, np.linalg.lstsq(motions.T, -slip)[0])
 
     def _expected_edge(self, problem: ConeProblem) -> float:
         """Return the gap of undeformed bodies at the edge of the contact, roughly [mm].
