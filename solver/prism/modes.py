@@ -76,6 +76,7 @@ class Modes:
     ----------
     wavenumbers : (n / 2 + 1,) k_m [1/mm]
     x : (window,) positions of the stations [mm]
+    behind : the factors behind the window, as given
     unknowns : (m,) unknowns of the section that the zone has, without supported ones
     points : (n_points,) numbers of the points of the zone in the section, element by element
     weights : (n_points,) area of the points [mm2]
@@ -120,7 +121,8 @@ class Modes:
         self._force0 = sparse.csr_array(self.B0.T @ areas)
         self._force1 = sparse.csr_array(self.B1.T @ areas)
         self._set_rows(surface, zone)
-        self._set_transforms(window, np.asarray(behind, dtype=float))
+        self.behind = np.asarray(behind, dtype=float)
+        self._set_transforms(window, self.behind)
         self._factors = _factorised(section, self.unknowns, self.wavenumbers.tolist())
 
     def _set_rows(self, surface: sparse.csr_array | None, zone: NDArray[np.bool_]) -> None:
