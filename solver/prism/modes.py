@@ -17,6 +17,7 @@ stress less than a station's spacing below the surface is not resolved.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -124,6 +125,14 @@ class Modes:
         self.behind = np.asarray(behind, dtype=float)
         self._set_transforms(window, self.behind)
         self._factors = _factorised(section, self.unknowns, self.wavenumbers.tolist())
+
+    @cached_property
+    def everywhere(self) -> Modes:
+        """The same waves, with forces and results at all stations."""
+        other = copy(self)
+        other.x, other.behind = -self.length / self.stations * np.arange(self.stations), np.zeros(0)
+        other._set_transforms(self.stations, other.behind)
+        return other
 
     def _set_rows(self, surface: sparse.csr_array | None, zone: NDArray[np.bool_]) -> None:
         """Restrict the surface rows to the zone."""

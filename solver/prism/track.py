@@ -49,6 +49,7 @@ class PrismTrack:
     section : the cross-section
     weights : (n_points, window) volume of the points [mm3]
     grid : stations and vertices where the load may act
+    rim : numbers of the points beside elements outside the zone, which must not yield
 
     Raises
     ------
@@ -87,7 +88,7 @@ class PrismTrack:
         self.far = FarField(self.modes, -before * spacing, levels) if levels else None
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
-        self._rim = _rim(section, zone, self.modes.points)
+        self.rim = _rim(section, zone, self.modes.points)
 
     @property
     def elasticity(self) -> Any:
@@ -113,7 +114,7 @@ class PrismTrack:
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
         """Return the flow of a material along the rows of points."""
-        return PrismFlow(self.modes, self._rim, law, before, added, parts)
+        return PrismFlow(self.modes, self.rim, law, before, added, parts)
 
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""
@@ -123,7 +124,7 @@ class PrismTrack:
         """Return the strain (n_points, window, 6) of a field, Mandel."""
         if field.eigenstress is None and field.traction is None:
             return np.zeros((*self.weights.shape, 6))
-        forces = None if field.traction is None else self._on_rows(field.traction)
+        forces = None if field.traction is None else self.on_rows(field.traction)
         strain = self.modes.solve(field.eigenstress, forces).strain
         if self.far is not None and forces is not None:
             strain += self.far.strain @ self.far.resultants(forces)
@@ -141,7 +142,7 @@ class PrismTrack:
         moved = self.modes.displacement(eigenstress)[:, self._stations]
         return moved.reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
 
-    def _on_rows(self, traction: Array) -> Array:
+    def on_rows(self, traction: Array) -> Array:
         """Return the forces (n_rows, window) of tractions (n, m, 3), per length [N/mm]."""
         forces = np.zeros((len(self._width), self.weights.shape[1]))
         each = traction.transpose(2, 1, 0).reshape(len(forces), -1)

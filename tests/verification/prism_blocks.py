@@ -24,6 +24,8 @@ HARDENS = Material(
     hardening_ratio=0.02,
 )  # fmt: skip
 """Steel of the thesis: 4 000 MPa of kinematic hardening."""
+AHEAD = 20.0
+"""Where the window of the block begins, ahead of the load [mm]."""
 A, B = 8.33, 6.27
 """Semi-axes of the ellipse of the wheel on the rail of the thesis [mm]."""
 
@@ -40,21 +42,22 @@ def lines(fine: float, h: float, far: float, growth: float) -> Array:
 @cache
 def block(
     h: float = 2.0, length: float = 64.0, spacing: float | None = None, far: float = 75.0,
-    growth: float = 1.4,
+    growth: float = 1.4, levels: int = 0, zone_depth: float = 14.0,
 ) -> PrismTrack:  # fmt: skip
     """A block as deep as half its width ``far``, held at its bottom.
 
     Elements of h in 20 by 14 mm, growing beside and below; stations ``spacing`` apart, h if None.
+    Those down to ``zone_depth`` may yield.
     """
     half, down = (lines(fine, h, far, growth) for fine in (10.0, 14.0))
     z, y = np.concatenate([-half[:0:-1], half]), -down[::-1]
     mesh = within(grid(z, y), "running", ["top"], x=(-10.001, 10.001))
     section = Section(mesh, PERFECT.elasticity, supports={"bottom": "xyz"})
     at = section.points.mean(axis=2)
-    zone = (np.abs(at[0]) < 10) & (at[1] > -14)
+    zone = (np.abs(at[0]) < 10) & (at[1] > -zone_depth)
     return PrismTrack(
-        section, zone, "running", length=length, spacing=spacing or h, ahead=20.0, behind=24.0,
-        reach=10.0, levels=0,
+        section, zone, "running", length=length, spacing=spacing or h, ahead=AHEAD, behind=24.0,
+        reach=10.0, levels=levels,
     )  # fmt: skip
 
 

@@ -28,10 +28,10 @@ from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
 from solver.steady.passing import Pass, passing
 from tests.verification.bricks import Bricks, BrickState
-from tests.verification.prism_blocks import HARDENS, PERFECT, block, ellipse
+from tests.verification.prism_blocks import AHEAD, HARDENS, PERFECT, block, ellipse
 
 Array = NDArray[np.float64]
-AHEAD, SPACING, INCREMENTS = 20.0, 1.0, 2
+SPACING, INCREMENTS = 1.0, 2
 
 
 @cache

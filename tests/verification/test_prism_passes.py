@@ -217,11 +217,6 @@ def test_passes_shake_down_below_the_limit_and_not_above() -> None:
 
 
 def test_a_zone_that_is_too_small_is_told() -> None:
-    section = block().section
-    at = section.points.mean(axis=2)
-    small = PrismTrack(
-        section, (np.abs(at[0]) < 10) & (at[1] > -5), "running",
-        length=64.0, spacing=2.0, ahead=20.0, behind=24.0, reach=10.0, levels=0,
-    )  # fmt: skip
+    small = block(zone_depth=5.0)
     with pytest.raises(WindowTooSmall, match="around"):
         rolled(small, PERFECT, ellipse(small, 1360.0))
