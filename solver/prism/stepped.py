@@ -2,25 +2,26 @@
 
 This is the second method behind steady passes: the same waves, but the state is that of fixed
 points of the whole length, which repeats itself. In each increment the load advances by one
-station. With its strain e_load, where it is now, equilibrium is the fixed point
+station. Equilibrium is the fixed point
 
-    e = Phi(e) = e_load + S 2G ep(e)
+    e = Phi(e) = S s + E t(U s),    s = 2G ep(e)
 
-S gives the strain of an eigenstress, and ep(e) is the plastic strain by the response of the law
-from its state after the last increment. Plastic strain changes no volume, so that 2 G dep/de is
-C - tangent. Newton's equation
+S and U give strain and displacement of the surface by an eigenstress, E the strain by tractions
+where the load is now, t the tractions on a surface with such displacements. ep(e) is the plastic
+strain by the response of the law from its state after the last increment. Plastic strain changes no
+volume, so that 2 G dep/de is C - tangent. Newton's equation
 
-    d = Phi(e) - e + S (C - tangent) d
+    d = Phi(e) - e + (S + E t' U) (C - tangent) d
 
 is solved by GMRES on the points that yield, on which alone the right side depends.
 
-J.C. Simo, T.J.R. Hughes, Computational Inelasticity (1998), section 3.3.2: the consistent tangent.
+J.C. Simo, T.J.R. Hughes, Computational Inelasticity (1998), box 3.2, p. 124: the tangent.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.materials.state import PlasticState, Response
+    from solver.prism.patch_contact import PatchContact
     from solver.prism.track import PrismTrack
 
     Array = NDArray[np.float64]
@@ -70,6 +72,32 @@ class SteppedState:
         return self.state.accumulated.reshape(self.strain.shape[:2])
 
 
+class SteppedLoad(Protocol):
+    """A load that rolls by increments, as `EllipticPatch` and `SteppedPatch`."""
+
+    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+        """Return the contact on a surface with displacements (n, m, 3); see `PatchLoad`."""
+
+    def advanced(self, u: Array, contact: PatchContact) -> Self:
+        """Return the load one station on, after a contact and its displacements (n, m, 3)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SteppedIncrement:
+    """An increment.
+
+    Attributes
+    ----------
+    state : the state after it
+    contact : the contact in it
+    displacement : (n, m, 3) displacement of the grid under the load by plastic strain [mm]
+    """
+
+    state: SteppedState
+    contact: PatchContact
+    displacement: Array
+
+
 class SteppedPrism:
     """A prism that repeats itself, and the law of its zone.
 
@@ -98,15 +126,14 @@ class SteppedPrism:
         points, stations, _ = self._shape
         return SteppedState(self._law.initial(points * stations, 6), np.zeros(self._shape))
 
-    def rolled(self, before: SteppedState, traction: Array, advance: int) -> SteppedState:
+    def rolled(self, before: SteppedState, load: SteppedLoad, advance: int) -> SteppedIncrement:
         """Return the state, without load, after a load has rolled over some stations to x = 0.
 
         The load is set down where it begins, rolls by one station in each increment, and is taken
-        off in the last one.
+        off in the last one. Of that the contact is the last one.
 
         Parameters
         ----------
-        traction : (n, m, 3) tractions on the grid of the track, which do not change [MPa]
         advance : number of stations over which the load rolls
 
         Raises
@@ -118,64 +145,64 @@ class SteppedPrism:
         NotConverged
             if an increment has no equilibrium
         """
-        most = self._modes.stations - len(traction)
+        most = self._modes.stations - self._track.grid.stations
         if not 0 <= advance <= most:
             raise ModelError("advance", advance, f"must be in 0 to {most} stations")
-        forces = np.zeros((len(self._modes.along), self._modes.stations))
-        forces[:, : len(self._track.modes.x)] = self._track.on_rows(traction)
-        load = self._modes.solve(forces=forces).strain
-        state, advanced = before, None
+        state = before
+        contact: PatchContact | None = None
+        advanced: Array | None = None
         for left in range(advance, -1, -1):
             # under a load that rolls, the last increment's change comes again one station on
             guess = None if advanced is None else state.strain + np.roll(advanced, -1, axis=1)
-            after = self.increment(state, np.roll(load, left, axis=1), guess)
-            advanced = after.strain - state.strain if left < advance else None
-            state = after
-        state = self.increment(state, np.zeros(self._shape))
+            after = self._increment(state, load, left, contact, guess)
+            advanced = after.state.strain - state.strain if left < advance else None
+            state, contact = after.state, after.contact
+            load = load.advanced(after.displacement, after.contact)
+        state = self._increment(state, _NoLoad(after.contact), 0, None, None).state
         self._check_rim(before, state)
-        return state
+        return SteppedIncrement(state, after.contact, after.displacement)
 
-    def increment(
-        self, before: SteppedState, load: Array, guess: Array | None = None
-    ) -> SteppedState:
-        """Return the state after one increment, by Newton's method.
+    def _increment(
+        self, before: SteppedState, load: SteppedLoad, left: int, start: PatchContact | None,
+        guess: Array | None,
+    ) -> SteppedIncrement:  # fmt: skip
+        """Return an increment by Newton's method; the load is ``left`` stations behind x = 0."""
 
-        Parameters
-        ----------
-        load : (n, stations, 6) strain of the load at the end of the increment, Mandel
-        guess : strain to start from, by default that without further flow
+        def at(strain: Array, start: PatchContact | None) -> _AtStrain:
+            flat = np.ascontiguousarray(strain.reshape(-1, 6).T)
+            response = self._law.respond(flat, before.state)
+            plastic = response.state.plastic_strain.T.reshape(self._shape)
+            eigenstress = self._double_shear * plastic
+            u = self._surface(eigenstress, left)
+            contact = load.solve(u, start)
+            made = self._strain(eigenstress, contact.traction, left)
+            return _AtStrain(strain, response, u, contact, made - strain)
 
-        Raises
-        ------
-        NotConverged
-            if no equilibrium is found
-        """
-        start = load + self._by(before.plastic_strain) if guess is None else guess
-        here = self._at(before, load, start)
+        here = at(before.strain if guess is None else guess, start)
         for _ in range(_STEPS):
             size = np.linalg.norm(deviator(here.residual.reshape(-1, 6).T), axis=0).max()
             if size * self._double_shear < _TOLERANCE * self._law.yield_stress:
-                return SteppedState(here.response.state, here.strain)
-            change, length = self._newton(here), 1.0
-            there = self._at(before, load, here.strain + change)
+                state = SteppedState(here.response.state, here.strain)
+                return SteppedIncrement(state, here.contact, here.displacement)
+            change, length = self._newton(here, left), 1.0
+            there = at(here.strain + change, here.contact)
             while there.size >= here.size and length > _SHORTEST:
                 length /= 2
-                there = self._at(before, load, here.strain + length * change)
+                there = at(here.strain + length * change, here.contact)
             here = there
         raise NotConverged("no equilibrium was found in an increment of a rolling load")
 
-    def _by(self, plastic_strain: Array) -> Array:
-        """Return the strain (n, stations, 6) that a plastic strain of that shape makes."""
-        return self._modes.solve(self._double_shear * plastic_strain).strain
+    def _surface(self, eigenstress: Array, left: int) -> Array:
+        """Return the displacement (n, m, 3) of the grid under the load by an eigenstress [mm]."""
+        return self._track.on_grid(np.roll(self._modes.displacement(eigenstress), -left, axis=1))
 
-    def _at(self, before: SteppedState, load: Array, strain: Array) -> _AtStrain:
-        """Return the iterate at a strain (n, stations, 6)."""
-        flat = np.ascontiguousarray(strain.reshape(-1, 6).T)
-        response = self._law.respond(flat, before.state)
-        plastic = response.state.plastic_strain.T.reshape(self._shape)
-        return _AtStrain(strain, response, load + self._by(plastic) - strain)
+    def _strain(self, eigenstress: Array, traction: Array, left: int) -> Array:
+        """Return the strain (n, stations, 6) of an eigenstress, and of tractions of the load."""
+        forces = np.zeros((len(self._modes.along), self._modes.stations))
+        forces[:, : len(self._track.modes.x)] = self._track.on_rows(traction)
+        return self._modes.solve(eigenstress, np.roll(forces, left, axis=1)).strain
 
-    def _newton(self, here: _AtStrain) -> Array:
+    def _newton(self, here: _AtStrain, left: int) -> Array:
         """Return the change d of strain by Newton's equation."""
         residual, soft = here.residual.reshape(-1, 6), np.flatnonzero(here.response.yielding)
         if not len(soft):
@@ -185,7 +212,9 @@ class SteppedPrism:
         def made(change: Array) -> Array:
             eigenstress = np.zeros_like(residual)
             eigenstress[soft] = np.matmul(loss, change.reshape(-1, 6, 1))[..., 0]
-            return self._modes.solve(eigenstress.reshape(self._shape)).strain
+            eigenstress = eigenstress.reshape(self._shape)
+            traction = here.contact.along(self._surface(eigenstress, left))
+            return self._strain(eigenstress, traction, left)
 
         def equation(change: Array) -> Array:
             return np.asarray(change - made(change).reshape(-1, 6)[soft].ravel())
@@ -205,13 +234,34 @@ class SteppedPrism:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AtStrain:
-    """An iterate of Newton's method: strain, response of the law and residual Phi(e) - e."""
+    """An iterate of Newton's method.
+
+    ``residual`` is Phi(e) - e, ``displacement`` (n, m, 3) that of the surface by plastic strain.
+    """
 
     strain: Array
     response: Response
+    displacement: Array
+    contact: PatchContact
     residual: Array
 
     @property
     def size(self) -> float:
         """Norm of the residual."""
         return float(np.linalg.norm(self.residual))
+
+
+@dataclass(frozen=True, slots=True)
+class _NoLoad:
+    """No tractions, on the grid of a contact; see `SteppedLoad`."""
+
+    contact: PatchContact
+
+    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+        """See `SteppedLoad`."""
+        nothing = np.zeros_like(self.contact.traction)
+        return replace(self.contact, traction=nothing, along=np.zeros_like)
+
+    def advanced(self, u: Array, contact: PatchContact) -> _NoLoad:
+        """See `SteppedLoad`."""
+        return self

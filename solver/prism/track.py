@@ -139,8 +139,11 @@ class PrismTrack:
 
     def surface_displacement(self, eigenstress: Array) -> Array:
         """Return the displacement (n, m, 3) of the grid by an eigenstress [mm]."""
-        moved = self.modes.displacement(eigenstress)[:, self._stations]
-        return moved.reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
+        return self.on_grid(self.modes.displacement(eigenstress))
+
+    def on_grid(self, moved: Array) -> Array:
+        """Return the displacement (n, m, 3) of the grid from that of the rows (n_rows, window)."""
+        return moved[:, self._stations].reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
 
     def on_rows(self, traction: Array) -> Array:
         """Return the forces (n_rows, window) of tractions (n, m, 3), per length [N/mm]."""

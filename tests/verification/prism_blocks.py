@@ -12,6 +12,7 @@ from solver.materials.law import Law
 from solver.mesh import grid, within
 from solver.prism.given_patch import EllipticPatch
 from solver.prism.patch_passing import PatchPassing
+from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
@@ -70,4 +71,11 @@ def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> Pat
     """The pressure of the wheel on the rail of the thesis, of another peak [MPa]."""
     return PatchPassing(
         EllipticPatch(grid=track.grid, force=2 * np.pi * A * B * peak / 3, a=A, b=B, **shear)
+    )
+
+
+def crowned(middle: float = 0.0) -> ProfiledWheel:
+    """A wheel of 460 mm with a crown of 300 mm."""
+    return ProfiledWheel(
+        profile=lambda z: (z - middle) ** 2 / 600.0, radius=460.0, elasticity=PERFECT.elasticity
     )

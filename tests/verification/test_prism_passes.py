@@ -22,7 +22,6 @@ from solver.mesh import grid
 from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_passing import PatchPassing
-from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
@@ -34,6 +33,7 @@ from tests.verification.prism_blocks import (
     PERFECT,
     RE,
     block,
+    crowned,
     ellipse,
     lines,
     residual,
@@ -53,15 +53,9 @@ def rolled(track: PrismTrack, law: Law, load: PatchPassing, count: int = 1) -> P
 
 
 def wheel(track: PrismTrack, friction: float, drive: float, middle: float = 0.0) -> PatchPassing:
-    """A wheel of 460 mm with a crown of 300 mm, 150 kN."""
-    crowned = ProfiledWheel(
-        profile=lambda z: (z - middle) ** 2 / 600.0, radius=460.0, elasticity=PERFECT.elasticity
-    )
-    return PatchPassing(
-        RollingPatch(
-            track.grid, track.compliance, crowned, friction=friction, force=150e3, drive=drive
-        )
-    )
+    """The crowned wheel, 150 kN."""
+    body, of = crowned(middle), (track.grid, track.compliance)
+    return PatchPassing(RollingPatch(*of, body, friction=friction, force=150e3, drive=drive))
 
 
 # -- a strip held across is plane strain ----------------------------------------------------------
