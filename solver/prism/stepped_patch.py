@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 class SteppedPatch(RollingPatch):
     """A wheel that rolls by increments of one station, for `SteppedPrism.rolled`.
 
-    Parameters are those of `RollingPatch`. Before the first increment nothing has moved.
+    Parameters are those of `RollingPatch`. Before the first increment nothing has moved. A wheel
+    that is driven or braked needs a given ``creepage``: with a ``drive`` other than 0 the first
+    increment may find no contact.
     """
 
     def __init__(self, *given: Any, **named: Any) -> None:
