@@ -15,6 +15,8 @@ from solver.prism.patch_passing import PatchPassing
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
+from solver.prism.stepped import SteppedPrism, SteppedState
+from solver.prism.stepped_patch import SteppedPatch
 from solver.prism.track import PrismTrack
 
 __all__ = [
@@ -28,5 +30,8 @@ __all__ = [
     "ProfiledWheel",
     "RollingPatch",
     "Section",
+    "SteppedPatch",
+    "SteppedPrism",
+    "SteppedState",
     "ZoneResponse",
 ]

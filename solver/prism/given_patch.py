@@ -74,6 +74,10 @@ class EllipticPatch:
             along=np.zeros_like,
         )
 
+    def advanced(self, u: Array, contact: PatchContact) -> EllipticPatch:
+        """See `SteppedLoad`; the tractions do not change."""
+        return self
+
     def scaled(self, share: float) -> EllipticPatch:
         """See `PatchLoad`."""
         return replace(self, force=share * self.force)

@@ -17,6 +17,7 @@ stress less than a station's spacing below the surface is not resolved.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,6 +77,7 @@ class Modes:
     ----------
     wavenumbers : (n / 2 + 1,) k_m [1/mm]
     x : (window,) positions of the stations [mm]
+    behind : the factors behind the window, as given
     unknowns : (m,) unknowns of the section that the zone has, without supported ones
     points : (n_points,) numbers of the points of the zone in the section, element by element
     weights : (n_points,) area of the points [mm2]
@@ -120,8 +122,17 @@ class Modes:
         self._force0 = sparse.csr_array(self.B0.T @ areas)
         self._force1 = sparse.csr_array(self.B1.T @ areas)
         self._set_rows(surface, zone)
-        self._set_transforms(window, np.asarray(behind, dtype=float))
+        self.behind = np.asarray(behind, dtype=float)
+        self._set_transforms(window, self.behind)
         self._factors = _factorised(section, self.unknowns, self.wavenumbers.tolist())
+
+    @cached_property
+    def everywhere(self) -> Modes:
+        """The same waves, with forces and results at all stations."""
+        other = copy(self)
+        other.x, other.behind = -self.length / self.stations * np.arange(self.stations), np.zeros(0)
+        other._set_transforms(self.stations, other.behind)
+        return other
 
     def _set_rows(self, surface: sparse.csr_array | None, zone: NDArray[np.bool_]) -> None:
         """Restrict the surface rows to the zone."""

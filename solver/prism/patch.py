@@ -100,7 +100,7 @@ class RollingPatch:
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
         with one_thread():
-            self._influence = _influence(grid, compliance, wheel)
+            self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
         self._sums = self._resultants()
@@ -185,6 +185,14 @@ class RollingPatch:
             raise
         found.steps += smooth.steps
         return found
+
+    @staticmethod
+    def _kernel(apart: Array) -> Array:
+        """Return slip and gap (w_x, g, w_s) by tractions, from the motions and gap they make."""
+        kernel = apart.copy()
+        for axis in TANGENTS:
+            kernel[:, :, axis] -= np.roll(apart[:, :, axis], 1, axis=0)
+        return kernel
 
     @property
     def _free(self) -> list[int]:
@@ -298,16 +306,15 @@ class RollingPatch:
         raise Spins(much, carried, 1.0)
 
 
-def _influence(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Influence:
-    """Return slip and gap (w_x, g, w_s) from (q_x, p, q_s) on the surface, equal on the wheel."""
+def _apart(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Array:
+    """Return the motion of the surface over the wheel, and the gap, by (q_x, p, q_s) of each point.
+
+    That of the wheel is equal; axes are those of `Influence`.
+    """
     n, m = grid.stations, len(grid.z)
     distances = np.fft.ifftshift(np.arange(-n, n)) % len(compliance)
     turned = grid.axes @ compliance[distances].reshape(2 * n, m, 3, 3 * m)
     surface = turned.reshape(-1, m, 3).swapaxes(0, 1) @ grid.axes.transpose(0, 2, 1)
     mirrored = half_space(grid.hats.s, grid.spacing, n, wheel.elasticity)
     local = surface.swapaxes(0, 1).reshape(mirrored.shape)
-    apart = local * _MIRROR[:, None, None] * _MIRROR + mirrored
-    kernel = apart.copy()
-    for axis in TANGENTS:
-        kernel[:, :, axis] -= np.roll(apart[:, :, axis], 1, axis=0)
-    return Influence(kernel)
+    return np.asarray(local * _MIRROR[:, None, None] * _MIRROR + mirrored)

@@ -52,6 +52,7 @@ class PrismTrack:
     weights : (n_points, window) volume of the points [mm3]
     rim : numbers of the points at the edge of the zone, which must not yield
     grid : stations and vertices where the load may act
+    rim : numbers of the points beside elements outside the zone, which must not yield
 
     Raises
     ------
@@ -127,7 +128,7 @@ class PrismTrack:
         """Return the strain (n_points, window, 6) of a field, Mandel."""
         if field.eigenstress is None and field.traction is None:
             return np.zeros((*self.weights.shape, 6))
-        forces = None if field.traction is None else self._on_rows(field.traction)
+        forces = None if field.traction is None else self.on_rows(field.traction)
         strain = self.modes.solve(field.eigenstress, forces).strain
         if self.far is not None and forces is not None:
             strain += self.far.strain @ self.far.resultants(forces)
@@ -142,10 +143,13 @@ class PrismTrack:
 
     def surface_displacement(self, eigenstress: Array) -> Array:
         """Return the displacement (n, m, 3) of the grid by an eigenstress [mm]."""
-        moved = self.modes.displacement(eigenstress)[:, self.near]
-        return moved.reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
+        return self.on_grid(self.modes.displacement(eigenstress))
 
-    def _on_rows(self, traction: Array) -> Array:
+    def on_grid(self, moved: Array) -> Array:
+        """Return the displacement (n, m, 3) of the grid from that of the rows (n_rows, window)."""
+        return moved[:, self.near].reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
+
+    def on_rows(self, traction: Array) -> Array:
         """Return the forces (n_rows, window) of tractions (n, m, 3), per length [N/mm]."""
         forces = np.zeros((len(self._width), self.weights.shape[1]))
         each = traction.transpose(2, 1, 0).reshape(len(forces), -1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import pytest
@@ -15,56 +14,32 @@ from solver.materials import (
     ArmstrongFrederick,
     Chaboche,
     Layered,
-    Material,
     TrescaMaterial,
     Voce,
 )  # fmt: skip
 from solver.materials.law import Law
-from solver.mesh import grid, within
-from solver.prism.given_patch import EllipticPatch
+from solver.mesh import grid
 from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_passing import PatchPassing
-from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
 from solver.steady import track_of
 from solver.steady.passing import Pass, passing
 from solver.tensors import von_mises
+from tests.verification.prism_blocks import (
+    HARDENS,
+    PERFECT,
+    RE,
+    block,
+    crowned,
+    ellipse,
+    lines,
+    residual,
+)
 
 Array = NDArray[np.float64]
-RE = 502.0
-PERFECT = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=RE)
-HARDENS = Material(
-    youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=RE, hardening="kinematic",
-    hardening_ratio=0.02,
-)  # fmt: skip
-"""Steel of the thesis: 4 000 MPa of kinematic hardening."""
-
-
-def lines(fine: float, h: float, far: float, growth: float) -> Array:
-    """Positions from 0: sides h up to ``fine``, then growing up to ``far``."""
-    at, side = list(np.linspace(0.0, fine, round(fine / h) + 1)), h
-    while at[-1] < far:
-        side = min(side * growth, far / 5)
-        at.append(at[-1] + side)
-    return np.array(at)
-
-
-@cache
-def block(h: float = 2.0, length: float = 64.0) -> PrismTrack:
-    """A block 150 mm wide and 75 deep, held at its bottom; elements of h in 20 by 14 mm."""
-    half = lines(10.0, h, 75.0, 1.4)
-    z, y = np.concatenate([-half[:0:-1], half]), -lines(14.0, h, 75.0, 1.4)[::-1]
-    mesh = within(grid(z, y), "running", ["top"], x=(-10.001, 10.001))
-    section = Section(mesh, PERFECT.elasticity, supports={"bottom": "xyz"})
-    at = section.points.mean(axis=2)
-    zone = (np.abs(at[0]) < 10) & (at[1] > -14)
-    return PrismTrack(
-        section, zone, "running", length=length, spacing=h, ahead=20.0, behind=24.0, reach=10.0,
-        levels=0,
-    )  # fmt: skip
 
 
 def rolled(track: PrismTrack, law: Law, load: PatchPassing, count: int = 1) -> Pass[PrismState]:
@@ -77,29 +52,10 @@ def rolled(track: PrismTrack, law: Law, load: PatchPassing, count: int = 1) -> P
     return found
 
 
-def residual(law: Law, state: PrismState) -> Array:
-    """Residual stress (6, n) at the points, Mandel [MPa]."""
-    return law.stiffness(6) @ (state.strain - state.plastic_strain).T
-
-
-def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> PatchPassing:
-    """The pressure of the wheel on the rail of the thesis, of another peak [MPa]."""
-    a, b = 8.33, 6.27
-    return PatchPassing(
-        EllipticPatch(grid=track.grid, force=2 * np.pi * a * b * peak / 3, a=a, b=b, **shear)
-    )
-
-
 def wheel(track: PrismTrack, friction: float, drive: float, middle: float = 0.0) -> PatchPassing:
-    """A wheel of 460 mm with a crown of 300 mm, 150 kN."""
-    crowned = ProfiledWheel(
-        profile=lambda z: (z - middle) ** 2 / 600.0, radius=460.0, elasticity=PERFECT.elasticity
-    )
-    return PatchPassing(
-        RollingPatch(
-            track.grid, track.compliance, crowned, friction=friction, force=150e3, drive=drive
-        )
-    )
+    """The crowned wheel, 150 kN."""
+    body, of = crowned(middle), (track.grid, track.compliance)
+    return PatchPassing(RollingPatch(*of, body, friction=friction, force=150e3, drive=drive))
 
 
 # -- a strip held across is plane strain ----------------------------------------------------------
@@ -255,11 +211,6 @@ def test_passes_shake_down_below_the_limit_and_not_above() -> None:
 
 
 def test_a_zone_that_is_too_small_is_told() -> None:
-    section = block().section
-    at = section.points.mean(axis=2)
-    small = PrismTrack(
-        section, (np.abs(at[0]) < 10) & (at[1] > -5), "running",
-        length=64.0, spacing=2.0, ahead=20.0, behind=24.0, reach=10.0, levels=0,
-    )  # fmt: skip
+    small = block(zone_depth=5.0)
     with pytest.raises(WindowTooSmall, match="around"):
         rolled(small, PERFECT, ellipse(small, 1360.0))

@@ -1,0 +1,81 @@
+"""A coarse block over which loads roll, as a prism."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.materials import Material
+from solver.materials.law import Law
+from solver.mesh import grid, within
+from solver.prism.given_patch import EllipticPatch
+from solver.prism.patch_passing import PatchPassing
+from solver.prism.profiled_wheel import ProfiledWheel
+from solver.prism.section import Section
+from solver.prism.state import PrismState
+from solver.prism.track import PrismTrack
+
+Array = NDArray[np.float64]
+RE = 502.0
+PERFECT = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=RE)
+HARDENS = Material(
+    youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=RE, hardening="kinematic",
+    hardening_ratio=0.02,
+)  # fmt: skip
+"""Steel of the thesis: 4 000 MPa of kinematic hardening."""
+AHEAD = 20.0
+"""Where the window of the block begins, ahead of the load [mm]."""
+A, B = 8.33, 6.27
+"""Semi-axes of the ellipse of the wheel on the rail of the thesis [mm]."""
+
+
+def lines(fine: float, h: float, far: float, growth: float) -> Array:
+    """Positions from 0: sides h up to ``fine``, then growing up to ``far``."""
+    at, side = list(np.linspace(0.0, fine, round(fine / h) + 1)), h
+    while at[-1] < far:
+        side = min(side * growth, far / 5)
+        at.append(at[-1] + side)
+    return np.array(at)
+
+
+@cache
+def block(
+    h: float = 2.0, length: float = 64.0, spacing: float | None = None, far: float = 75.0,
+    growth: float = 1.4, levels: int = 0, zone_depth: float = 14.0,
+) -> PrismTrack:  # fmt: skip
+    """A block as deep as half its width ``far``, held at its bottom.
+
+    Elements of h in 20 by 14 mm, growing beside and below; stations ``spacing`` apart, h if None.
+    Those down to ``zone_depth`` may yield.
+    """
+    half, down = (lines(fine, h, far, growth) for fine in (10.0, 14.0))
+    z, y = np.concatenate([-half[:0:-1], half]), -down[::-1]
+    mesh = within(grid(z, y), "running", ["top"], x=(-10.001, 10.001))
+    section = Section(mesh, PERFECT.elasticity, supports={"bottom": "xyz"})
+    at = section.points.mean(axis=2)
+    zone = (np.abs(at[0]) < 10) & (at[1] > -zone_depth)
+    return PrismTrack(
+        section, zone, "running", length=length, spacing=spacing or h, ahead=AHEAD, behind=24.0,
+        reach=10.0, levels=levels,
+    )  # fmt: skip
+
+
+def residual(law: Law, state: PrismState) -> Array:
+    """Residual stress (6, n) at the points, Mandel [MPa]."""
+    return law.stiffness(6) @ (state.strain - state.plastic_strain).T
+
+
+def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> PatchPassing:
+    """The pressure of the wheel on the rail of the thesis, of another peak [MPa]."""
+    return PatchPassing(
+        EllipticPatch(grid=track.grid, force=2 * np.pi * A * B * peak / 3, a=A, b=B, **shear)
+    )
+
+
+def crowned(middle: float = 0.0) -> ProfiledWheel:
+    """A wheel of 460 mm with a crown of 300 mm."""
+    return ProfiledWheel(
+        profile=lambda z: (z - middle) ** 2 / 600.0, radius=460.0, elasticity=PERFECT.elasticity
+    )
