@@ -6,7 +6,7 @@ the load they are known in the zone that may yield; elsewhere they are NaN.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from solver.contact.state import State
 from solver.fem.fields import Sampler, recovery
 from solver.materials.state import Response
 from solver.model.body import Body
+from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,11 +43,13 @@ class PrismStage:
     state : displacements; its time is 0 under the load and 1 after it
     response : stress and internal variables at the points of the section
     touching : the contact, None after it
+    lowest : (6,) smallest stress components at any station of the window, None after it [MPa]
     """
 
     state: State
     response: Response
-    touching: PatchContact | None
+    touching: PatchContact | None = None
+    lowest: Array | None = None
 
 
 class PrismBody:
@@ -121,19 +124,21 @@ class PrismBody:
         u[track.modes.unknowns] += track.left_by(before.plastic_strain)[track.modes.unknowns]
         whole = np.full((track.section.weights.size, 6), np.nan)
         whole[track.modes.points] = strain
-        return self._stage(_LOADED, u, whole, inside, applied.contact)
+        stage = self._stage(_LOADED, u, whole, inside)
+        elastic = before.strain[:, None] + found.strain - found.plastic_strain
+        stress = np.einsum("ab,pcb->apc", self._law.stiffness(6), elastic)
+        lowest = to_tensor(stress.reshape(6, -1)).min(axis=1)
+        return replace(stage, touching=applied.contact, lowest=lowest)
 
     def left_by(self, found: Pass[PrismState]) -> PrismStage:
         """Return the state after a pass, in the whole section."""
         section, after = self.track.section, found.after
         u = self.track.left_by(after.plastic_strain)
         strain = np.einsum("eqab,eb->eqa", section.B0, u[section.dofs]).reshape(-1, 6)
-        return self._stage(_RELEASED, u, strain, after.state, None)
+        return self._stage(_RELEASED, u, strain, after.state)
 
-    def _stage(
-        self, time: float, u: Array, strain: Array, inside: PlasticState,
-        touching: PatchContact | None,
-    ) -> PrismStage:  # fmt: skip
+    def _stage(self, time: float, u: Array, strain: Array, inside: PlasticState) -> PrismStage:
+        """Return a state with these displacements, strains and, in the zone, internal variables."""
         n, points = len(strain), self.track.modes.points
         whole = self._law.initial(n, 6)
         packed = whole.packed.copy()
@@ -142,7 +147,7 @@ class PrismBody:
         stress = self._law.stiffness(6) @ (strain.T - plastic.plastic_strain)
         nothing = np.zeros((6, 6, 0)), np.zeros(0, dtype=bool)
         response = Response(stress, nothing[0], plastic, nothing[1])
-        return PrismStage(State(time, (u,), (plastic,), ()), response, touching)
+        return PrismStage(State(time, (u,), (plastic,), ()), response)
 
 
 def in_space(plane: Array) -> Array:

@@ -77,10 +77,10 @@ RUNNING_SURFACE_RESIDUAL = declare(
     "MPa", dims=("component", "z"),
 )  # fmt: skip
 LOWEST_LOADED = declare(
-    "lowest_loaded", "smallest stress under the wheel, at integration points at x = 0", "MPa",
+    "lowest_loaded", "smallest stress around the wheel, at integration points", "MPa",
     dims=("component",),
 )  # fmt: skip
-HIGHEST_MISES = declare("highest_mises", "largest von Mises stress under the wheel", "MPa")
+HIGHEST_MISES = declare("highest_mises", "largest von Mises stress at x = 0 under the wheel", "MPa")
 HIGHEST_MISES_DEPTH = declare(
     "highest_mises_depth", "depth below the top of the largest von Mises stress", "mm"
 )
@@ -178,12 +178,12 @@ def section(run: FinishedRun) -> Values:
     ]
     X, mises, _ = run.samples.fields.at_points(run.loaded, name)
     accumulated = run.samples.fields.at_points(run.unloaded, name)[2]
-    loaded = run.system.response(name, run.loaded).stress
+    loaded: Any = run.loaded
     yielded = -X[1, accumulated > _YIELDED]
     most = int(np.nanargmax(mises))
     return {
         RUNNING_SURFACE_RESIDUAL: np.stack(at_surface),
-        LOWEST_LOADED: np.nanmin(loaded, axis=1) / np.array([1, 1, 1, *[np.sqrt(2.0)] * 3]),
+        LOWEST_LOADED: loaded.lowest,
         HIGHEST_MISES: float(mises[most]),
         HIGHEST_MISES_DEPTH: float(-X[1, most]),
         MOST_STRAINED_Z: float(X[2, accumulated.argmax()]) if len(yielded) else np.nan,
@@ -247,6 +247,6 @@ WHEEL_RAIL = Scene(
     effort=effort,
     advice={
         Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
-        Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy",
+        Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy or position",
     },
 )

@@ -46,6 +46,8 @@ _BESIDE, _DEPTH = 0.35, 1.5
 _REACH, _AHEAD, _BEHIND, _LENGTH = 1.15, 2.2, 2.6, 7.0
 """Half the length where the load may act over half that of the contact; over it, the window ahead
 and behind, and the length after which waves repeat."""
+_STEEPEST = math.radians(80.0)
+"""Steepest slope of the running surface within the zone [rad]."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _LEVELS = 4
@@ -147,7 +149,13 @@ class RailGeometry:
 
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
-    """Return the geometry; ``reach`` is the ratio of zone and window to their usual size."""
+    """Return the geometry; ``reach`` is the ratio of zone and window to their usual size.
+
+    Raises
+    ------
+    ModelError
+        for ``lateral_position``, if the zone would reach the side of the head
+    """
     p, contact = parameters, expected_contact(parameters)
 
     def whole(length: float, size: float) -> float:
@@ -155,12 +163,22 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
 
     h = p.element_size
     mean = math.sqrt(contact.across * contact.along)
+    half_width = whole((1 + _BESIDE) * contact.across, h)
+    outline, (right, left) = (section := _rail(p.cant)).outline, section.running
+    ends = outline.reaching(0, contact.middle, section.running) + half_width * np.array([-1, 1])
+    inside = right < ends[0] and ends[1] < left
+    if not inside or abs(outline.direction(ends)[0]).min() < math.cos(_STEEPEST):
+        raise ModelError(
+            "lateral_position", p.lateral_position,
+            f"must keep the contact, expected at z = {contact.middle:g} mm, farther than "
+            f"{half_width:g} mm from the sides of the head",
+        )  # fmt: skip
     return RailGeometry(
         cant=p.cant,
         foundation=p.foundation,
         elasticity=(p.youngs_modulus, p.poisson_ratio),
         at=contact.middle,
-        half_width=whole((1 + _BESIDE) * contact.across, h),
+        half_width=half_width,
         depth=whole(_DEPTH * mean, h),
         size=h,
         spacing=p.spacing,
