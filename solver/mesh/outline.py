@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 _POINTS = 16
 """Gauss points of each piece in integrals; exact to rounding for arcs up to a half circle."""
+_SAMPLES = 2001
+"""Points among which the highest one is looked for."""
 _SHORT = 1e-9
 """Ratio of a piece to the whole; shorter ones are left out."""
 
@@ -139,32 +141,17 @@ class Outline:
         piece = np.searchsorted(starts, s, side="right") - 1
         return piece, s - starts[piece]
 
-    def reaching(self, axis: int, value: float, between: Pair) -> float:
-        """Return the length at which a coordinate has a value, in a part where it is monotonic.
-
-        Parameters
-        ----------
-        axis : 0 or 1
-        between : lengths at the ends of the part [mm]
-
-        Raises
-        ------
-        ModelError
-            for ``z`` or ``y``, if the part does not reach the value
-        """
-        from scipy.optimize import brentq
-
-        ends = self.at(np.array(between))[axis]
-        if not ends.min() <= value <= ends.max():
-            allowed = f"must be from {ends.min():.6g} to {ends.max():.6g} [mm]"
-            raise ModelError("zy"[axis], value, allowed)
-        return float(brentq(lambda s: self.at(np.array(s))[axis] - value, *between, xtol=1e-12))
-
     def highest(self, between: Pair) -> float:
-        """Return the length of the highest point of a part that has one horizontal tangent."""
+        """Return the length of the highest point of a part [mm]."""
         from scipy.optimize import brentq
 
-        return float(brentq(lambda s: self.direction(np.array(s))[1], *between, xtol=1e-12))
+        s = np.linspace(*between, _SAMPLES)
+        k = int(self.at(s)[1].argmax())
+        near = s[max(k - 1, 0)], s[min(k + 1, _SAMPLES - 1)]
+        before, after = self.direction(np.array(near))[1]
+        if not before > 0 > after:
+            return float(s[k])
+        return float(brentq(lambda s: self.direction(np.array(s))[1], *near, xtol=1e-12))
 
     # -- area ----------------------------------------------------------------------------------
 

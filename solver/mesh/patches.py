@@ -101,7 +101,7 @@ def smooth_patch(sides: Sides, u: Array, v: Array) -> Array:
 
 
 def joined_patches(patches: Sequence[Array], names: Mapping[str, Array]) -> MeshQuad2:
-    """Return the mesh of patches (2, n, m).
+    """Return the mesh of patches (2, n, m), elements counterclockwise.
 
     Parameters
     ----------
@@ -121,13 +121,13 @@ def _mesh(X: Array) -> MeshQuad2:
         (X[:, :-1:2, 1::2] + X[:, 2::2, 1::2] + X[:, 1::2, :-1:2] + X[:, 1::2, 2::2]) / 2
         - (X[:, :-1:2, :-1:2] + X[:, 2::2, :-1:2] + X[:, :-1:2, 2::2] + X[:, 2::2, 2::2]) / 4
     )  # fmt: skip
-    x, y = (np.arange((count + 1) // 2, dtype=float) for count in X.shape[1:])
+    along, up = (np.arange((count + 1) // 2, dtype=float) for count in X.shape[1:])
 
     def node(at: Array) -> Array:
-        i, j = np.rint(2 * at).astype(int)
+        j, i = np.rint(2 * at).astype(int)
         return np.ascontiguousarray(nodes[:, i, j])
 
-    return mapped(grid(x, y), node)
+    return mapped(grid(up, along), node)  # corners of a grid are clockwise: of this, the other way
 
 
 def _straighten(X: Array) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.mesh.outline import Outline, RoundedCorner, arcs, smooth_curve
 
 if TYPE_CHECKING:
@@ -86,6 +87,23 @@ class RailSection:
         """
         left, right = self.places["heads"]
         return right, self.outline.length + left
+
+    def place(self, at: float) -> float:
+        """Return the length along the outline of the point of the running surface at z [mm].
+
+        Raises
+        ------
+        ModelError
+            for ``at``, if the head does not reach so far
+        """
+        from scipy.optimize import brentq
+
+        ends = np.sort(self.outline.at(np.array(self.running))[0])
+        if not ends[0] <= at <= ends[1]:
+            raise ModelError("at", at, f"must be from {ends[0]:.4g} to {ends[1]:.4g} [mm]")
+        return float(
+            brentq(lambda s: self.outline.at(np.array(s))[0] - at, *self.running, xtol=1e-12)
+        )
 
     def canted(self, slope: float) -> RailSection:
         """Return the section turned about its top, counterclockwise by atan(slope).

@@ -1,9 +1,9 @@
 """Meshes of plane sections with a zone of small equal elements under a contact.
 
-All are 8-node quadrilaterals, their coordinates (z, y). In the zone elements lie in columns that go
-down from the running surface, all in one direction, so that the rows are copies of the surface.
-Columns and rows continue through the section, with growing distances. The boundary ``running`` is
-the surface of the zone, its facets in the order of increasing z.
+All are 8-node quadrilaterals, their coordinates (z, y). The zone has rows along the running surface
+and straight columns, which turn with the surface, but less. Columns and rows continue through the
+section, with growing distances. The boundary ``running`` is the surface of the zone, its facets in
+the order of increasing z.
 """
 
 from __future__ import annotations
@@ -84,14 +84,18 @@ class Zone:
 def rail_mesh(section: RailSection, zone: Zone) -> MeshQuad2:
     """Return the mesh of a rail; its boundaries are ``running`` and ``foot``, the base.
 
+    With zones of 20 x 14 mm and less in the middle of the head, up to 25 mm from its axis, angles
+    of elements are from 30 to 150 degrees. Corners of the rail are flattened a little: the area of
+    the mesh is 0.1 % too small.
+
     Raises
     ------
     ModelError
-        for ``z`` or ``half_width``, if the zone leaves the running surface; for ``depth``, if it is
-        deeper than the head
+        for ``at`` or ``half_width``, if the zone leaves the running surface; for ``depth``, if it
+        is deeper than the head
     """
     outline, places, (right, left) = section.outline, section.places, section.running
-    middle = outline.reaching(0, zone.at, section.running)
+    middle = section.place(zone.at)
     low, high = middle - zone.half_width, middle + zone.half_width
     if not right < low < high < left:
         most = min(middle - right, left - middle)

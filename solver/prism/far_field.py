@@ -55,6 +55,7 @@ class FarField:
     displacement : (n_rows, window, 4) of the surface rows for unit resultants [mm/N, 1/N]
     strain : (n_points, window, 6, 4) Mandel strain at the points of the zone [1/N, 1/(N mm)]
     beneath : (m, 4) displacement of the zone's unknowns at the resultants [mm/N, 1/N]
+    last : (n_points, 1, 6, 4) strain of the last level alone, where the resultants act
 
     Raises
     ------
@@ -76,7 +77,12 @@ class FarField:
         phase = np.outer(k, modes.x - x)
         along = np.any(self._motions[modes.along] != 0, axis=0)
 
-        def summed(amplitudes: Array, carrying: NDArray[np.bool_]) -> Array:
+        def summed(
+            amplitudes: Array,
+            carrying: NDArray[np.bool_],
+            phase: Array = phase,
+            share: Array = share,
+        ) -> Array:
             each = amplitudes.reshape(len(carrying), *u.shape[1:])
             return superposed(each, phase, share, carrying, along).swapaxes(1, 2)
 
@@ -85,6 +91,11 @@ class FarField:
         axis = modes.unknowns % 3 == I_AXIS
         at_load = superposed(u, np.zeros((len(k), 1)), share, axis, along)
         self.beneath = at_load[..., 0]
+        only = _waves(modes.length * _RATIO ** (levels - 1), 1)
+        last = np.zeros_like(share)
+        last[np.abs(only[0][:, None] - k).argmin(axis=1)] = only[1]
+        here = np.zeros((len(k), 1))
+        self.last = modes.by_point(summed(strain, modes.carrying, here, last))
 
     def resultants(self, forces: Array) -> Array:
         """Return the resultants (4,) of forces (n_rows, window) on the surface rows [N/mm]."""

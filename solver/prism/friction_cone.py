@@ -39,10 +39,11 @@ NORMAL, TANGENTS = 1, (0, 2)
 """Places of the normal and of the tangents among local axes (x, normal, tangent across)."""
 
 _TOLERANCE = 1e-9
-"""Largest error of a condition, over the largest pressure, of a solution."""
+"""Largest error of a condition over the largest pressure, or over friction times it for shear."""
 _STEPS = 40
-_SHORTEST = 1 / 16
-"""Smallest share of a Newton step in the line search."""
+_SHORTEST = 1 / 256
+"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
+found by its moment may overshoot a hundredfold."""
 _AWAY = 3.0
 """Largest growth of the error that a whole step may cause where no share lowers it."""
 _LOST = 1e6
@@ -63,7 +64,7 @@ class ConeProblem:
     friction : coefficient mu
     motions : (k, n, m, 3) effects of the rigid motions
     weights : (k, n, m, 3) sums of values that are given, such as areas [mm2]
-    resultants : (k,) what they are [N]
+    resultants : (k,) what they are [N]; the first is the load
     """
 
     influence: Influence
@@ -162,9 +163,12 @@ class _Iterate:
         self.unbalanced = problem.resultants - np.tensordot(problem.weights, values, values.ndim)
         largest = np.abs(problem.weights).max(axis=(1, 2, 3))
         balance = self.unbalanced / largest / np.sqrt(max(self.closed.sum(), 1))
-        misses = [p - np.maximum(pushed, 0), self.missed, balance]
-        self.error = max(float(np.abs(part).max(initial=0)) for part in misses)
-        self.size = float(np.sqrt(sum((part**2).sum() for part in misses)))
+        normal = np.append(p - np.maximum(pushed, 0), balance[0])
+        tangential = np.append(self.missed, balance[1:])
+        self.error = float(max(
+            np.abs(normal).max(), np.abs(tangential).max() / (problem.friction or 1.0)
+        ))  # fmt: skip
+        self.size = float(np.hypot(np.linalg.norm(normal), np.linalg.norm(tangential)))
 
 
 class _Tangent:

@@ -170,15 +170,22 @@ class Modes:
             C eigenstrain, Mandel [MPa]
         forces : (n_rows, window) forces on the surface rows, per length along x [N/mm]
         """
-        nodal = self._nodal(eigenstress, forces)
-        u = np.empty_like(nodal)
-        for wave, right in enumerate(nodal):
-            u[wave] = self._factors.solve(right.T, wave).T
+        u = self.solved(self._nodal(eigenstress, forces))
         flat = np.ascontiguousarray(u.reshape(-1, len(self.unknowns)).T)
         strain = self.B0 @ flat + self.B1 @ (flat * self._twice_k)
         return ZoneResponse(
             self._strain_at_stations(strain), self._rows_at_stations(self.rows @ flat)
         )
+
+    def solved(self, nodal: Array) -> Array:
+        """Return the amplitudes (waves, 2, m) of the zone for nodal forces of that shape [N/mm].
+
+        Real and imaginary parts; those of unknowns along x are divided by i.
+        """
+        u = np.empty_like(nodal)
+        for wave, right in enumerate(nodal):
+            u[wave] = self._factors.solve(right.T, wave).T
+        return u
 
     def displacement(self, eigenstress: Array | None = None, forces: Array | None = None) -> Array:
         """Return the surface displacement (n_rows, window) as `solve` does, by `columns` [mm]."""

@@ -23,6 +23,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
+from solver.model.friction import LEAST_FRICTION
 from solver.prism.friction_cone import NORMAL, OPEN, TANGENTS, ConeProblem, solve_cone
 from solver.prism.half_space import half_space
 from solver.prism.influence import Influence
@@ -57,12 +58,16 @@ class RollingPatch:
         along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
         stations that repeats itself has every d once
     wheel : the wheel
-    friction : coefficient of friction
+    friction : coefficient of friction; without it moment and lateral force are left out
     force : vertical force on the axle [N]
     drive : moment on the axle over radius, positive when braking, over friction times force; None
         if ``creepage`` is given
     lateral_force : force on the surface along z [N]; None if ``lateral_creepage`` is given
     creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
+
+    Attributes
+    ----------
+    grid, wheel, friction, force, drive, lateral_force : as above; what is left out is None
     """
 
     def __init__(
@@ -87,13 +92,15 @@ class RollingPatch:
             raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
             raise ModelError("force", force, "must be positive")
-        self.grid, self._friction, self._force = grid, friction, force
-        self._drive = drive if friction else None
-        self._lateral = lateral_force if friction else None
+        self.grid, self.wheel, self.force = grid, wheel, force
+        self.friction = friction if friction > LEAST_FRICTION else 0.0
+        self.drive = drive if self.friction else None
+        self.lateral_force = lateral_force if self.friction else None
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
         self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
-        self._influence = _influence(grid, compliance, wheel)
+        with one_thread():
+            self._influence = _influence(grid, compliance, wheel)
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
         self._sums = self._resultants()
@@ -101,29 +108,29 @@ class RollingPatch:
     def scaled(self, share: float) -> RollingPatch:
         """See `PatchLoad`."""
         other = copy(self)
-        other._force *= share
-        if other._lateral is not None:
-            other._lateral *= share
+        other.force *= share
+        if other.lateral_force is not None:
+            other.lateral_force *= share
         return other
 
     def driven(self, share: float) -> RollingPatch:
         """See `PatchLoad`."""
         other = copy(self)
-        if other._drive is not None:
-            other._drive *= share
+        if other.drive is not None:
+            other.drive *= share
         return other
 
     @property
     def moment(self) -> float:
         """See `PatchLoad`."""
-        return (self._drive or 0.0) * self._friction * self._force
+        return (self.drive or 0.0) * self.friction * self.force
 
     @property
     def slipping(self) -> RollingPatch:
         """See `PatchLoad`."""
         other = copy(self)
         if self.moment:
-            other._drive = None
+            other.drive = None
             other._given = self._given.copy()
             other._given[1] += np.sign(self.moment) * _SLIDES
         return other
@@ -171,17 +178,18 @@ class RollingPatch:
             except NoContact:  # the contact may be elsewhere
                 pass
         smooth = self._smooth(problem)
-        rigid = np.append(smooth.rigid, np.zeros(len(problem.resultants) - 1))
         try:
-            return solve_cone(problem, smooth.values, rigid)
+            found = solve_cone(problem, smooth.values, self._rolling_freely(problem, smooth))
         except NoContact:
             self._check_sliding(u)
             raise
+        found.steps += smooth.steps
+        return found
 
     @property
     def _free(self) -> list[int]:
         """Numbers of the rigid motions whose resultant is given: height and creepages."""
-        given = (self._force, self._drive, self._lateral)
+        given = (self.force, self.drive, self.lateral_force)
         return [number for number, value in enumerate(given) if value is not None]
 
     def _resultants(self) -> Array:
@@ -208,14 +216,14 @@ class RollingPatch:
     def _problem(self, u: Array) -> ConeProblem:
         """Return the frictional problem of a surface with these displacements (n, m, 3)."""
         free = self._free
-        drive = 0.0 if self._drive is None else self._drive * self._friction * self._force
-        resultants = np.array([self._force, drive, self._lateral or 0.0])
+        drive = 0.0 if self.drive is None else self.drive * self.friction * self.force
+        resultants = np.array([self.force, drive, self.lateral_force or 0.0])
         given = self._given.copy()
         given[free] = 0.0
         return ConeProblem(
             influence=self._influence,
             offset=self._rest + self._offset(u) + np.tensordot(given, self._motions, 1),
-            friction=self._friction,
+            friction=self.friction,
             motions=self._motions[free],
             weights=self._sums[free],
             resultants=resultants[free],
@@ -236,6 +244,14 @@ class RollingPatch:
         height = np.array([-self._expected_edge(problem)])
         return solve_cone(smooth, np.zeros_like(problem.offset), height)
 
+    @staticmethod
+    def _rolling_freely(problem: ConeProblem, smooth: ConeSolution) -> Array:
+        """Return rigid motions (k,): free creepages make slip least, weighted with the pressure."""
+        share = np.sqrt(np.maximum(smooth.values[..., NORMAL, None], 0.0))
+        slip = (share * smooth.effects[..., TANGENTS]).ravel()
+        motions = (share * problem.motions[1:][..., TANGENTS]).reshape(-1, slip.size)
+        return np.append(smooth.rigid, np.linalg.lstsq(motions.T, -slip)[0])
+
     def _expected_edge(self, problem: ConeProblem) -> float:
         """Return the gap of undeformed bodies at the edge of the contact, roughly [mm].
 
@@ -245,7 +261,7 @@ class RollingPatch:
         nearest = np.argsort(gap)
         area = np.cumsum(np.broadcast_to(self._area, problem.offset.shape[:2]).ravel()[nearest])
         own = problem.influence.own()[:, NORMAL, NORMAL].mean()
-        approach = own * self._force / np.sqrt(area * self._area.mean())
+        approach = own * self.force / np.sqrt(area * self._area.mean())
         inside = gap[nearest] - gap[nearest[0]] <= _PRESSED * approach
         return float(gap[nearest[np.flatnonzero(inside)[-1]]])
 
@@ -255,16 +271,16 @@ class RollingPatch:
         Full slip may carry less than friction times load: spin turns shear, and shear on a slope
         carries a part of the load.
         """
-        if self._drive is None and self._lateral is None:
+        if self.drive is None and self.lateral_force is None:
             return
         smooth = np.tensordot(self._sums[1:], self._smooth(self._problem(u)).values, 3)
-        given = np.array([value is not None for value in (self._drive, self._lateral)])
-        wanted = np.where(given, [self.moment, self._lateral or 0.0] - smooth, 0.0)
+        given = np.array([value is not None for value in (self.drive, self.lateral_force)])
+        wanted = np.where(given, [self.moment, self.lateral_force or 0.0] - smooth, 0.0)
         size = float(np.hypot(*wanted))
         if not size:
             return
         other = copy(self)
-        other._drive = other._lateral = None
+        other.drive = other.lateral_force = None
         other._given = self._given.copy()
         other._given[1:3] += _SLIDES * wanted / size
         try:
@@ -275,7 +291,7 @@ class RollingPatch:
         carried = float(forces @ wanted) / size**2
         if carried >= 1:
             return
-        if self._lateral is not None:
+        if self.lateral_force is not None:
             much = f"the wheel slides off: all of its contact slips at {carried:.2%} of the force"
             raise LimitLoad(much, carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"

@@ -35,7 +35,7 @@ class PatchContact:
         ``traction``
     height : displacement of the wheel along y [mm]
     creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
-    steps : Newton steps
+    steps : Newton steps, with and without friction
     """
 
     grid: PatchGrid

@@ -19,9 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AppliedPatch(AppliedLoad):
-    """A load on a prism, with its contact."""
+    """A load on a prism.
+
+    Attributes
+    ----------
+    contact : tractions, gap and slip
+    load : the load whose contact it is
+    """
 
     contact: PatchContact
+    load: PatchLoad
 
 
 class PatchPassing:
@@ -45,7 +52,8 @@ class PatchPassing:
         def along(change: PrismField) -> PrismField:
             return replace(change, traction=found.along(change.displacement))
 
-        return AppliedPatch(found.force, replace(u, traction=found.traction), along, found)
+        loaded = replace(u, traction=found.traction)
+        return AppliedPatch(found.force, loaded, along, found, self._load)
 
     def scaled(self, share: float) -> PatchPassing:
         """See `PassingLoad`."""

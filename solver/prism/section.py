@@ -71,6 +71,7 @@ class Section:
     plane : nodes and points in the plane, with the boundaries of the mesh; ``plane.X`` is (z, y)
     n : number of unknowns
     dofs : (n_elements, 24) unknowns of the elements
+    springs : boundary -> stiffness (3,) along x, y and z [N/mm3]
     free : unknowns that no support holds
     points : (2, n_elements, 4) positions (z, y) of the points [mm]
     weights : (n_elements, 4) area of the points [mm2]
@@ -109,7 +110,7 @@ class Section:
         # d/dx is i k: of a component that carries i it makes -k
         self.B1 = strain_operator(N, np.stack([N, nothing, nothing]), self.weights, "")
         self.B1[:, :, 0] *= -1.0
-        self._springs = {name: self._checked(name, each) for name, each in (springs or {}).items()}
+        self.springs = {name: self._checked(name, each) for name, each in (springs or {}).items()}
         held = self._held(supports or {})
         self.free = np.setdiff1d(np.arange(self.n), held)
         self._check_held(held)
@@ -138,12 +139,12 @@ class Section:
         """Raise `ModelError` if neither supports nor springs hold a motion of the whole prism."""
         motions = self.rigid / np.abs(self.rigid).max(axis=0)
         rows = [motions[held]]
-        for boundary, along in self._springs.items():
+        for boundary, along in self.springs.items():
             nodes = self.plane.boundary_nodes(boundary)
             rows += [motions[3 * nodes + axis] for axis in range(3) if along[axis] > 0]
         if np.linalg.matrix_rank(np.concatenate(rows), tol=_LOOSE) < motions.shape[1]:
             allowed = "must hold the prism, with its supports: along x, y, z and about x"
-            raise ModelError("springs", sorted(self._springs), allowed)
+            raise ModelError("springs", sorted(self.springs), allowed)
 
     @cached_property
     def rigid(self) -> Array:
@@ -170,7 +171,7 @@ class Section:
         K0, K1, K2 = (
             product(*both) for both in ((self.B0, self.B0), (self.B0, self.B1), (self.B1, self.B1))
         )
-        for boundary, along in self._springs.items():
+        for boundary, along in self.springs.items():
             self._add_springs(K0, boundary, along)
         return K0, K1 + K1.swapaxes(1, 2), K2
 

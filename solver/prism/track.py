@@ -49,7 +49,10 @@ class PrismTrack:
     Attributes
     ----------
     section : the cross-section
+    boundary : chain of edges on which a load may act
+    before : number of the station at x = 0, where a load is
     weights : (n_points, window) volume of the points [mm3]
+    rim : numbers of the points at the edge of the zone, which must not yield
     grid : stations and vertices where the load may act
 
     Raises
@@ -79,7 +82,8 @@ class PrismTrack:
         if 2 * near > min(before, window - 1 - before):
             allowed = "must be at most half of what the window has ahead and behind"
             raise ModelError("reach", reach, allowed)
-        self.section, self._before, self._near = section, before, near
+        self.section, self.boundary, self.before = section, boundary, before
+        self._near = near
         surface = RunningSurface(section, boundary)
         self.grid = surface.grid(spacing, near * spacing, 2 * near + 1)
         self.modes = Modes(
@@ -89,7 +93,7 @@ class PrismTrack:
         self.far = FarField(self.modes, -before * spacing, levels) if levels else None
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
-        self._rim = _rim(section, zone, self.modes.points)
+        self.rim = _rim(section, zone, self.modes.points)
 
     @property
     def elasticity(self) -> Any:
@@ -115,7 +119,7 @@ class PrismTrack:
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
         """Return the flow of a material along the rows of points."""
-        return PrismFlow(self.modes, self._rim, law, before, added, parts)
+        return PrismFlow(self.modes, self.rim, law, before, added, parts)
 
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""
@@ -131,11 +135,6 @@ class PrismTrack:
             strain += self.far.strain @ self.far.resultants(forces)
         return strain
 
-    @property
-    def middle(self) -> int:
-        """The station of the window at x = 0, where the load is."""
-        return self._before
-
     def beneath(self, field: PrismField) -> Array:
         """Return the displacement (m,) of the zone's unknowns by a field, at x = 0 [mm]."""
         forces = np.zeros((len(self._width), self.weights.shape[1]))
@@ -144,7 +143,7 @@ class PrismTrack:
         eigenstress = field.eigenstress
         if eigenstress is None:
             eigenstress = np.zeros((*self.weights.shape, 6))
-        moved = self.modes.at_station(self.middle, eigenstress, forces)
+        moved = self.modes.at_station(self.before, eigenstress, forces)
         return moved if self.far is None else moved + self.far.beneath @ self.far.resultants(forces)
 
     @cached_property
@@ -176,20 +175,20 @@ class PrismTrack:
     # -- the surface ---------------------------------------------------------------------------
 
     @property
-    def _stations(self) -> slice:
+    def near(self) -> slice:
         """The stations of the window at which the load may act."""
-        return slice(self._before - self._near, self._before + self._near + 1)
+        return slice(self.before - self._near, self.before + self._near + 1)
 
     def surface_displacement(self, eigenstress: Array) -> Array:
         """Return the displacement (n, m, 3) of the grid by an eigenstress [mm]."""
-        moved = self.modes.displacement(eigenstress)[:, self._stations]
+        moved = self.modes.displacement(eigenstress)[:, self.near]
         return moved.reshape(3, len(self.grid.z), -1).transpose(2, 1, 0)
 
     def _on_rows(self, traction: Array) -> Array:
         """Return the forces (n_rows, window) of tractions (n, m, 3), per length [N/mm]."""
         forces = np.zeros((len(self._width), self.weights.shape[1]))
         each = traction.transpose(2, 1, 0).reshape(len(forces), -1)
-        forces[:, self._stations] = self._width[:, None] * each
+        forces[:, self.near] = self._width[:, None] * each
         return forces
 
     @cached_property
@@ -201,7 +200,7 @@ class PrismTrack:
             unit[np.arange(len(unit)), np.arange(len(unit)), 0] = self._width
             resultants = np.stack([self.far.resultants(each) for each in unit])
             for apart in range(-2 * self._near, 2 * self._near + 1):
-                moved = self.far.displacement[:, self._before + apart] @ resultants.T
+                moved = self.far.displacement[:, self.before + apart] @ resultants.T
                 kernel[:, :, apart] += moved
         m = len(self.grid.z)
         return np.ascontiguousarray(kernel.reshape(3, m, 3, m, -1).transpose(4, 1, 0, 3, 2))

@@ -115,7 +115,7 @@ class PrismBody:
 
     def under_load(self, found: Pass[PrismState]) -> PrismStage:
         """Return the state under the load of a pass; NaN outside the zone."""
-        track, before, middle = self.track, found.before, self.track.middle
+        track, before, middle = self.track, found.before, self.track.before
         applied: Any = found.loading
         inside = found.states.unpacked(found.states.packed[..., middle])
         strain = before.strain + found.strain[:, middle]

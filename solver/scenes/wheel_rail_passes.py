@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from solver.linear.threads import one_thread
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.prism.patch_passing import AppliedPatch, PatchPassing
+from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
 from solver.results.audit.prism_values import OfPrismPass
 from solver.results.prism import PatchTractions, PrismBody
@@ -115,6 +117,11 @@ class _Path:
         except NotConverged as failure:
             self.error = failure
 
+    @cached_property
+    def _plain(self) -> PlainPrism:
+        """The second evaluation of the rail, for the audit."""
+        return PlainPrism(self._track)
+
     def _roll(self) -> None:
         """Compute the next pass."""
         found = self._found
@@ -148,7 +155,7 @@ class _Path:
 
         def check() -> Audit:
             assert found is not None
-            return audit_prism(self._track, self._law, found, previous)
+            return audit_prism(self._track, self._law, found, previous, self._plain)
 
         return FinishedRun(
             parameters=run,

@@ -164,10 +164,11 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     h = p.element_size
     mean = math.sqrt(contact.across * contact.along)
     half_width = whole((1 + _BESIDE) * contact.across, h)
-    outline, (right, left) = (section := _rail(p.cant)).outline, section.running
-    ends = outline.reaching(0, contact.middle, section.running) + half_width * np.array([-1, 1])
+    section = _rail(p.cant)
+    right, left = section.running
+    ends = section.place(contact.middle) + half_width * np.array([-1, 1])
     inside = right < ends[0] and ends[1] < left
-    if not inside or abs(outline.direction(ends)[0]).min() < math.cos(_STEEPEST):
+    if not inside or abs(section.outline.direction(ends)[0]).min() < math.cos(_STEEPEST):
         raise ModelError(
             "lateral_position", p.lateral_position,
             f"must keep the contact, expected at z = {contact.middle:g} mm, farther than "

@@ -18,12 +18,12 @@ OUTLINE = RAIL.outline
 
 def surface(z):
     """Points of the running surface at positions z."""
-    s = [OUTLINE.reaching(0, each, RAIL.running) for each in z]
+    s = [RAIL.place(each) for each in z]
     return OUTLINE.at(np.array(s))
 
 
 def radius_at(section, z):
-    s = section.outline.reaching(0, z, section.running)
+    s = section.place(z)
     return 1 / float(section.outline.curvature(np.array(s)))
 
 
@@ -31,6 +31,8 @@ def test_a_rounded_square_has_the_area_and_moments_of_its_closed_form():
     a, r = 6.0, 2.0
     corners = [(1, -1), (1, 1), (-1, 1), (-1, -1)]
     square = Outline.rounded([RoundedCorner((a / 2 * x, a / 2 * y), (r,)) for x, y in corners])
+    sharp = Outline.rounded([RoundedCorner((a / 2 * x, a / 2 * y)) for x, y in corners])
+    assert sharp.area == pytest.approx(a**2, rel=1e-14)
     missing = (4 - math.pi) * r**2
     assert square.area == pytest.approx(a**2 - missing, rel=1e-14)
     assert square.length == pytest.approx(4 * (a - 2 * r) + 2 * math.pi * r, rel=1e-14)
@@ -156,5 +158,5 @@ def test_arcs_that_do_not_fit_are_refused():
     corners = [RoundedCorner(at, (3.0,)) for at in ((5.0, 0.0), (5.0, 5.0), (0.0, 5.0), (0.0, 0.0))]
     with pytest.raises(ModelError, match="leave room"):
         Outline.rounded(corners)
-    with pytest.raises(ModelError, match="z = 40"):
-        OUTLINE.reaching(0, 40.0, RAIL.running)
+    with pytest.raises(ModelError, match="at = 40"):
+        RAIL.place(40.0)

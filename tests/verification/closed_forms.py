@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
 Array = NDArray[np.float64]
 
@@ -70,19 +71,50 @@ class HertzLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HertzEllipse:
-    """The pressure of two frictionless curved bodies on an elliptic contact, on a half-space.
+    """A frictionless contact with semi-axes ``a`` along x and ``b`` along z [mm]; y is up.
 
-    Semi-axes ``along`` x and ``across`` it, along z [mm], largest pressure ``peak`` [MPa]; y is up.
+    ``modulus`` is E* with 1/E* the sum of (1 - nu^2)/E of both bodies; pressure and stress do not
+    depend on it. K.L. Johnson, Contact Mechanics (1985), 4.26: written for the longer axis along x.
     """
 
-    along: float
-    across: float
-    peak: float
+    a: float
+    b: float
+    peak_pressure: float
+    modulus: float = np.nan
 
-    def pressure(self, x: Array | float, z: Array | float) -> Array:
-        """Return the pressure at (x, z) [MPa]."""
-        inside = 1 - (np.asarray(x) / self.along) ** 2 - (np.asarray(z) / self.across) ** 2
-        return np.asarray(self.peak * np.sqrt(np.maximum(0.0, inside)))
+    @property
+    def _terms(self) -> tuple[float, float, float]:
+        """Approach, and curvatures 1/(2 R) along the longer and the shorter axis."""
+        long, short = max(self.a, self.b), min(self.a, self.b)
+        e2 = 1 - (short / long) ** 2
+        K, E = ellipk(e2), ellipe(e2)
+        level = self.peak_pressure * short / self.modulus
+        if e2 == 0:
+            return level * K, np.pi / 4 * level / long**2, np.pi / 4 * level / long**2
+        over = level / (e2 * long**2)
+        return level * K, over * (K - E), over * ((long / short) ** 2 * E - K)
+
+    @property
+    def approach(self) -> float:
+        """Approach of the bodies [mm]."""
+        return self._terms[0]
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Relative radii in the planes of x and z [mm]."""
+        _, long, short = self._terms
+        along, across = (long, short) if self.a >= self.b else (short, long)
+        return 1 / (2 * along), 1 / (2 * across)
+
+    @property
+    def force(self) -> float:
+        """Force [N]."""
+        return 2 / 3 * np.pi * self.a * self.b * self.peak_pressure
+
+    def pressure(self, x: Array, z: Array) -> Array:
+        """Return the pressure at positions of the surface."""
+        inside = 1 - (x / self.a) ** 2 - (z / self.b) ** 2
+        return self.peak_pressure * np.sqrt(np.maximum(0.0, inside))
 
     def stress(self, x: Array, depth: Array, z: Array, poisson_ratio: float) -> Array:
         """Return the Mandel stress xx, yy, zz, xy, yz, zx (6, n) below the surface [MPa].
@@ -95,8 +127,8 @@ class HertzEllipse:
         angle, turn = (xi + 1) * pi / 4, np.arange(240) * pi / 120
         r, level = np.sin(angle)[:, None], np.cos(angle)[:, None]
         share = pi / 4 * weight[:, None] * r * level**2 * (pi / 120) * np.ones(len(turn))
-        force = (self.peak * self.along * self.across * share).ravel()
-        at = np.stack([self.along * r * np.cos(turn), self.across * r * np.sin(turn)])
+        force = (self.peak_pressure * self.a * self.b * share).ravel()
+        at = np.stack([self.a * r * np.cos(turn), self.b * r * np.sin(turn)])
         return np.stack([
             _point_force(x0 - at[0].ravel(), d, z0 - at[1].ravel(), poisson_ratio) @ force
             for x0, d, z0 in zip(x, depth, z, strict=True)

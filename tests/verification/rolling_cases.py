@@ -11,7 +11,8 @@ from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_grid import PatchGrid
 from solver.prism.profiled_wheel import ProfiledWheel
-from tests.verification.hertz_ellipse import HertzEllipse, surface_of
+from tests.verification.closed_forms import HertzEllipse
+from tests.verification.hertz_ellipse import surface_of
 
 Array = NDArray[np.float64]
 MODULI = {"same": 2e5, "softer": 2e4, "stiffer": 2e6, "rigid": np.inf}

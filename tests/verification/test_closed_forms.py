@@ -34,7 +34,7 @@ def test_hertz_pressure_carries_the_force():
 
 def test_stress_under_a_circle_is_hubers_on_the_axis():
     """K.L. Johnson, Contact Mechanics (1985), (3.45): closed forms on the axis."""
-    circle, nu = HertzEllipse(along=2.0, across=2.0, peak=1.0), 0.3
+    circle, nu = HertzEllipse(a=2.0, b=2.0, peak_pressure=1.0), 0.3
     depth = np.array([0.4, 1.0, 3.0])
     zeta, on_axis = depth / 2.0, np.full(3, 1e-9)
     down = -1 / (1 + zeta**2)
@@ -46,7 +46,7 @@ def test_stress_under_a_circle_is_hubers_on_the_axis():
 
 def test_stress_under_an_ellipse_is_in_equilibrium():
     """Central differences of step 0.01; their truncation is 1e-4 of the slopes."""
-    ellipse, step = HertzEllipse(along=2.0, across=1.0, peak=1.0), 0.01
+    ellipse, step = HertzEllipse(a=2.0, b=1.0, peak_pressure=1.0), 0.01
     place, root = np.array([0.7, 0.8, 0.3]), sqrt(2.0)
 
     def slope(axis):

@@ -213,6 +213,20 @@ def test_a_cone_that_rolls_spins() -> None:
     )
 
 
+def test_a_wheel_that_touches_at_a_smaller_radius_turns_faster() -> None:
+    """Free rolling at R - 3 mm: (1 - creepage) (R - 3) = R, beyond the creepage of full slip."""
+    hertz = ellipse(1.0, 1.0)
+    patch = pressed(hertz, 1 / 6, 1 / 5)
+    grid, radius = patch.grid, hertz.radii[0]
+    wheel = ProfiledWheel(profile=lambda z: 0 * z + 3.0, radius=radius, elasticity=STEEL)
+    rolled = RollingPatch(
+        grid, surface_of(grid), wheel, friction=FRICTION, force=hertz.force, drive=0.0
+    )
+    contact = rolled.solve(flat(rolled))
+    assert contact.creepage == pytest.approx(1 - radius / (radius - 3.0), rel=1e-4)
+    assert np.linalg.norm(contact.shear, axis=-1).max() < 0.01 * contact.pressure.max()
+
+
 def test_two_crowns_share_the_load() -> None:
     """Each is the contact of a ball with half the load, 10 contact radii apart."""
     hertz = ellipse(1.0, 1.0)

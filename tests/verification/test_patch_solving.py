@@ -23,7 +23,7 @@ def test_random_contacts_are_found_and_meet_every_condition(seed: int) -> None:
     """Gap and slip of every tenth are summed up here anew; those of all meet the conditions."""
     patch, compliance, wheel, given = random_case(seed)
     contact = patch.solve(flat(patch))
-    assert contact.steps <= 20
+    assert contact.steps <= 30
     gap, slip = contact.gap, contact.slip[1:]
     if seed % 10 == 0:
         gap, slip = moved(contact, compliance, wheel)

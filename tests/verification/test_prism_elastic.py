@@ -324,7 +324,7 @@ def pressed(length: float, h: float) -> tuple[Modes, Array, Array]:
     return modes, (near + far.strain @ far.resultants(forces)) @ C, near @ C
 
 
-ELLIPSE = HertzEllipse(along=8.3, across=6.3, peak=1360.0)
+ELLIPSE = HertzEllipse(a=8.3, b=6.3, peak_pressure=1360.0)
 
 
 def deeper(modes: Modes) -> NDArray[np.int64]:
@@ -348,7 +348,7 @@ def test_stress_under_an_elliptic_pressure_is_that_of_the_half_space(
     for station in (centre, centre - round(4.0 / h)):
         ahead = np.full(len(some), modes.x[station] - modes.x[centre])
         exact = ELLIPSE.stress(ahead, -y, z, STEEL.poisson_ratio).T
-        error = np.abs(stress[some, station] - exact).max() / ELLIPSE.peak
+        error = np.abs(stress[some, station] - exact).max() / ELLIPSE.peak_pressure
         assert error < below
 
 
@@ -359,7 +359,7 @@ def test_the_surface_under_a_circular_pressure_is_hertzs_paraboloid() -> None:
     mostly along the prism, where stations sample the edge of the pressure; stations of 1 and 0.5 mm
     leave 0.45 and 0.14 %.
     """
-    circle = HertzEllipse(along=8.0, across=8.0, peak=1000.0)
+    circle = HertzEllipse(a=8.0, b=8.0, peak_pressure=1000.0)
     section, zone = block(2.0, half=10.0, deep=10.0, reach=300.0, ratio=2.0)
     x = 2.0 * (4 - np.arange(9))
     nodes, forces = sampled_hertz(section, 10.0, x, circle)
@@ -371,7 +371,7 @@ def test_the_surface_under_a_circular_pressure_is_hertzs_paraboloid() -> None:
     middle = int(np.abs(z).argmin())
     modulus = STEEL.plane_strain_modulus
     inside = z[:, None] ** 2 + x**2 < 6.0**2
-    exact = np.pi * circle.peak / (4 * circle.along * modulus) * (z[:, None] ** 2 + x**2)
+    exact = np.pi * circle.peak_pressure / (4 * circle.a * modulus) * (z[:, None] ** 2 + x**2)
     raised = up - up[middle, 4]
     assert raised[inside] == pytest.approx(exact[inside], abs=0.01 * exact[inside].max())
 
@@ -380,7 +380,7 @@ def test_the_far_field_stands_for_a_longer_prism() -> None:
     """Without it, stress errs by the loads at the distance L; with it, L does not matter."""
     short, long = pressed(64.0, 2.0), pressed(128.0, 2.0)
     some = deeper(short[0])
-    far, near = (np.abs(short[k] - long[k])[some].max() / ELLIPSE.peak for k in (1, 2))
+    far, near = (np.abs(short[k] - long[k])[some].max() / ELLIPSE.peak_pressure for k in (1, 2))
     assert far < 3e-4
     assert near > 3e-3
 

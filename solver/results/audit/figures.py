@@ -79,6 +79,11 @@ _DECLARED = [
         "of equilibrium in a steady pass, as a ratio to the yield stress",
     ),
     declare(
+        "audit_length",
+        "ratio of the stress that the longest length of the far field of a prism adds to the yield "
+        "stress",
+    ),
+    declare(
         "audit_plastic_strain", "largest equivalent plastic strain away from singular points"
     ),
     declare(

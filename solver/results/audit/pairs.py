@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_PRESSED = 1e-6
+PRESSED = 1e-6
 """Ratio of the normal force to the force level; below it a vertex counts as open."""
-_GAP = 2e-3
+GAP = 2e-3
 """Ratio of the largest permitted gap to the elastic approach."""
-_OVERLAP = (0.02, 2.5e-3)
+OVERLAP = (0.02, 2.5e-3)
 """Ratios of the largest permitted overlap to the elastic approach, and to the side of an element;
 the larger limit counts."""
-_COARSE = 0.36
+COARSE = 0.36
 """Ratio of the largest permitted edge to the width of the contact of curved surfaces: about three
 vertices across it, with which Hertz's pressure has an error of 4 %."""
 _LITTLE = 0.01
 """Ratio of the force of a pair to the force level; below it the resolution of its contact does not
 count."""
-_STILL = 1e-3
+STILL = 1e-3
 """Ratio of the least slip to the elastic approach in the friction work that is the scale of wrong
 slip."""
 
@@ -76,7 +76,7 @@ def untouched(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
 
 
 def _closed(state: State, number: int) -> NDArray[np.bool_]:
-    return np.asarray(state.contacts[number].normal > _PRESSED * state.force_scale)
+    return np.asarray(state.contacts[number].normal > PRESSED * state.force_scale)
 
 
 def _words(pair: ContactPair) -> str:
@@ -144,11 +144,11 @@ class AuditedPair:
     def limits(self) -> dict[str, float]:
         """Limits of this pair: gap and overlap [mm], and coarseness of the contact."""
         edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
-        overlap = max(_OVERLAP[0] * self.approach, _OVERLAP[1] * float(edges.mean()))
+        overlap = max(OVERLAP[0] * self.approach, OVERLAP[1] * float(edges.mean()))
         return {
-            "audit_closed_gap": max(_GAP * self.approach, self.rounding),
+            "audit_closed_gap": max(GAP * self.approach, self.rounding),
             "audit_overlap": max(overlap, self.rounding),
-            "audit_contact_resolution": _COARSE,
+            "audit_contact_resolution": COARSE,
         }
 
     @cached_property
@@ -253,7 +253,7 @@ class AuditedPair:
         before = self._start.contacts[self._number].touching
         judged = self._closed & before & (self.touching.area > 0)
         bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
-        least = max(_STILL * self.approach, self.rounding)
+        least = max(STILL * self.approach, self.rounding)
         should = float(bound @ np.maximum(np.abs(slip), least))
         if should == 0.0:
             return 0.0

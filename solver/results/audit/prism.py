@@ -1,4 +1,4 @@
-"""The audit of a steady pass over a prism: yield, history, and what the window cuts off."""
+"""The audit of a steady pass over a prism, in the frame of the load."""
 
 from __future__ import annotations
 
@@ -6,65 +6,157 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.materials.state import Response
-from solver.results.audit.report import Audit, broken, limits_at
+from solver.prism.patch_passing import AppliedPatch
+from solver.results.audit.flow import AuditedFlow, difference, largest
+from solver.results.audit.patch import AuditedPatch
+from solver.results.audit.plain_prism import PlainPrism
+from solver.results.audit.report import Audit, broken, limits_at, warnings
 from solver.results.audit.theory import largest_strain
-from solver.steady.flow import INFLOW, LEAST
+from solver.steady.flow import INFLOW, usual_parts
 from solver.steady.passing import TOLERANCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.materials.law import Law
-    from solver.prism.state import PrismState
-    from solver.prism.track import PrismTrack
+    from solver.prism import PrismState, PrismTrack
     from solver.steady import Pass
 
     Array = NDArray[np.float64]
 
-_LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": TOLERANCE}
+_LENGTH = 0.01
+"""Largest stress of the last level of the far field, over the yield stress."""
+_ROWS = 16
+"""Number of rows of points along which the law is repeated: those that yield most, and others."""
+_LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": TOLERANCE, "audit_length": _LENGTH}
 
 
 def audit_prism(
-    track: PrismTrack, law: Law, found: Pass[PrismState], previous: Pass[PrismState] | None
+    track: PrismTrack,
+    law: Law,
+    found: Pass[PrismState],
+    previous: Pass[PrismState] | None,
+    plain: PlainPrism | None = None,
 ) -> Audit:
-    """Check a steady pass over a prism.
+    """Check a steady pass over a prism: the state under load, that behind it, and the flow.
 
     Parameters
     ----------
+    law : the declared law of the prism
     previous : the pass before it, None for the first one
+    plain : second evaluation of the track, to be shared by passes over it
+
+    Returns
+    -------
+    The figures, those of the contact only for a wheel.
     """
-    strain = np.moveaxis(found.before.strain[:, None] + found.strain, 2, 0).reshape(6, -1)
-    after, before = (
-        each.unpacked(each.packed.reshape(len(each.packed), -1))
-        for each in (found.states, found.ago)
+    loading = found.loading
+    assert isinstance(loading, AppliedPatch)
+    plain = plain or PlainPrism(track)
+    traction = loading.contact.traction
+    before, after = found.before, found.after
+    stiff = 2 * law.elasticity.shear_modulus
+    waves = plain.waves(stiff * (found.plastic_strain - before.plastic_strain[:, None]), traction)
+    surface = plain.surface(waves, traction) + before.displacement
+    patch = AuditedPatch(
+        law, loading.load, loading.contact, plain.width, surface,
+        strength=float(law.shear_strength(after.state).max()),
+    )  # fmt: skip
+    left_strain, left_surface = plain.constant(
+        stiff * (after.plastic_strain - before.plastic_strain)
     )
-    stress = law.stiffness(6) @ (strain - after.plastic_strain)
-    response = Response(stress, np.zeros((6, 6, 0)), after, np.zeros(0, dtype=bool))
-    yield_strain = law.yield_stress / law.elasticity.youngs_modulus
-    most = max(LEAST * yield_strain, found.most_added)
-    double_shear = 2 * law.elasticity.shear_modulus
-    left = law.initial(len(found.before.accumulated), 6) if previous is None else None
-    earlier = left if previous is None else previous.after.state
-    assert earlier is not None
-    lost = np.abs(found.before.plastic_strain.T - earlier.plastic_strain).max()
-    z, y = track.points
-    large = largest_strain([("rail", np.stack([z, y]), found.after.accumulated)])
+    unsteady = _deviation(plain.strain(waves) - found.strain)
+    unsteady_behind = _deviation(left_strain - (after.strain - before.strain))
+    moved = after.displacement - before.displacement
+    residual = law.stiffness(6) @ (after.strain - after.plastic_strain).T
+    flow = AuditedFlow(law, found, before.strain)
+    rim = (found.accumulated - before.accumulated[:, None])[track.rim]
+    strain = largest_strain([("section", track.points, after.accumulated)])
     figures = {
-        "audit_law": _largest(law.misfit(strain, stress, before, after)) / law.yield_stress,
-        "audit_yield": _largest(law.yield_value(stress, after)) / law.yield_stress,
-        "audit_dissipation": float(law.dissipation(before, response).min()),
-        "audit_history": float(lost) * double_shear / law.yield_stress,
-        "audit_inflow": _largest(found.accumulated[:, 0] - found.before.accumulated) / most,
-        "audit_outflow": _largest(found.after.accumulated - found.accumulated[:, -1]) / most,
-        "audit_steadiness": double_shear * found.left_over / law.yield_stress,
-        "audit_plastic_strain": large.value,
-    }
-    limits = {name: at for name, at in (limits_at(1.0) | _LIMITS).items() if name in figures}
-    violations = broken(figures, limits, law.yield_stress)
-    return Audit(figures, violations=violations, outside=large.outside)
+        "audit_residual": plain.unbalanced(waves) / patch.force,
+        "audit_reactions": max(
+            patch.missing(), largest(np.abs(plain.reactions(waves))[:3]) / patch.force
+        ),
+        "audit_law": max(flow.misfit(), flow.retraced(_rows(found)), _released(law, found))
+        / law.yield_stress,
+        "audit_yield": max(flow.beyond(), largest(law.yield_value(residual, after.state)))
+        / law.yield_stress,
+        "audit_dissipation": flow.dissipation(),
+        "audit_history": max(_lost(law, found, previous), _apart(moved, left_surface)),
+        "audit_inflow": max(flow.inflow(), flow.over_most(rim) if rim.size else 0.0),
+        "audit_outflow": flow.outflow(),
+        "audit_steadiness": stiff * max(unsteady, unsteady_behind) / law.yield_stress,
+        "audit_length": _far(track, law, plain.resultants(waves.pulled)) / law.yield_stress,
+        "audit_plastic_strain": strain.value,
+        **patch.figures,
+    }  # fmt: skip
+    limits = limits_at(patch.force) | _LIMITS
+    if patch.figures:
+        limits |= patch.limits
+    limits = {name: at for name, at in limits.items() if name in figures}
+    return Audit(
+        figures,
+        violations=broken(figures, limits, law.yield_stress),
+        warnings=warnings(figures),
+        outside=strain.outside,
+    )
 
 
-def _largest(values: Array) -> float:
-    """Return the largest value, not below zero, or NaN where one is NaN."""
-    return float(np.maximum(values.max(), 0.0))
+def _deviation(strain: Array) -> float:
+    """Return the largest norm of the deviators of strains (..., 6)."""
+    mean = strain[..., :3].mean(axis=-1)
+    square = (strain**2).sum(axis=-1) - 3 * mean**2
+    return float(np.sqrt(np.maximum(square.max(), 0.0)))
+
+
+def _rows(found: Pass[PrismState]) -> NDArray[np.int64]:
+    """Return the rows along which the law is repeated: half yield most, half lie anywhere."""
+    added = (found.accumulated - found.before.accumulated[:, None]).max(axis=1)
+    count = min(_ROWS, len(added)) // 2
+    anywhere = np.linspace(0, len(added) - 1, count).astype(np.int64)
+    return np.unique(np.append(np.argsort(-added)[:count], anywhere))
+
+
+def _released(law: Law, found: Pass[PrismState]) -> float:
+    """Return the difference of the state behind from that of the law [MPa].
+
+    It follows from the last station, on the way to the strain without load.
+    """
+    before, after, parts = found.before, found.after, usual_parts(law)
+    start = (before.strain + found.strain[:, -1]).T
+    state = after.state.unpacked(found.states.packed[..., -1])
+    for part in range(1, parts + 1):
+        state = law.respond(start + part / parts * (after.strain.T - start), state).state
+    return difference(law, after.state, state)
+
+
+def _lost(law: Law, found: Pass[PrismState], previous: Pass[PrismState] | None) -> float:
+    """Return the difference between the state before the pass and that behind the last one.
+
+    It is the largest difference of internal variables and strain, as stress over the yield stress,
+    or of displacement, over the largest. A pass in the opposite direction begins with the mirrored
+    state.
+    """
+    before = found.before
+    if previous is None:
+        state = law.initial(len(before.strain), 6)
+        strain, displacement = np.zeros_like(before.strain), np.zeros_like(before.displacement)
+    else:
+        left = previous.left if found.direction == 1 else previous.left.mirrored
+        state, strain, displacement = left.state, left.strain, left.displacement
+    stress = 2 * law.elasticity.shear_modulus * float(np.abs(before.strain - strain).max())
+    off = max(difference(law, before.state, state), stress) / law.yield_stress
+    return max(off, _apart(before.displacement, displacement))
+
+
+def _apart(one: Array, other: Array) -> float:
+    """Return the largest difference of displacements, over the largest of them."""
+    off = float(np.abs(one - other).max())
+    return off / float(max(np.abs(one).max(), np.abs(other).max())) if off else 0.0
+
+
+def _far(track: PrismTrack, law: Law, resultants: Array) -> float:
+    """Return the stress that the last level of the far field adds where the load is [MPa]."""
+    if track.far is None:
+        return 0.0
+    return float(np.abs((track.far.last @ resultants) @ law.stiffness(6)).max())

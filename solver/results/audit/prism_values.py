@@ -68,7 +68,7 @@ class ZoneFields:
     @cached_property
     def _points(self) -> tuple[Array, Array]:
         """Stress (6, n), tensor components, and accumulated strain (n,) at the points."""
-        found, at, zone = self._found, self._track.middle, self._track.modes.points
+        found, at, zone = self._found, self._track.before, self._track.modes.points
         n = self.plain.points.shape[1]
         accumulated, plastic = np.zeros(n), np.zeros((6, n))
         if self._u is None:

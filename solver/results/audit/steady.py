@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.materials.state import Response
+from solver.results.audit.flow import AuditedFlow, difference, largest
 from solver.results.audit.plain import PlainBody, load_factor
 from solver.results.audit.recomputed import Acting
 from solver.results.audit.report import (
@@ -24,14 +23,13 @@ from solver.results.audit.theory import Strained, largest_strain
 from solver.results.audit.values import PassFields
 from solver.steady import RollingContact
 from solver.steady.fields import of_layers, under_load
-from solver.steady.flow import INFLOW, LEAST
+from solver.steady.flow import INFLOW
 from solver.steady.passing import TOLERANCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.materials.law import Law
-    from solver.materials.state import PlasticState
     from solver.model.motion import TravellingPressure
     from solver.results.audit.recomputed import BodyFields
     from solver.results.steady import TrackBody
@@ -65,16 +63,18 @@ def audit_pass(
     held.ravel()[track.part.free] = False
     lacking = plain.forces(stress) - load
     level = float(np.abs(load).sum(axis=0).max()) or 1.0
-    way, strain = _Way(track, material, found), _strain(track, found)
+    flow = AuditedFlow(material, found, found.before.strain(track.elasticity))
+    strain = _strain(track, found)
     figures = {
         "audit_residual": float(np.linalg.norm(lacking[~held])) / level,
-        "audit_reactions": _largest(abs((load + np.where(held, lacking, 0)).sum(axis=0))) / level,
-        "audit_law": max(way.misfit(), way.retraced()) / material.yield_stress,
-        "audit_yield": way.beyond() / material.yield_stress,
-        "audit_dissipation": way.dissipation(),
-        "audit_history": way.lost(previous, direction),
-        "audit_inflow": way.inflow(),
-        "audit_outflow": way.outflow(),
+        "audit_reactions": largest(abs((load + np.where(held, lacking, 0)).sum(axis=0))) / level,
+        "audit_law": max(flow.misfit(), flow.retraced(), _released(track, material, found))
+        / material.yield_stress,
+        "audit_yield": flow.beyond() / material.yield_stress,
+        "audit_dissipation": flow.dissipation(),
+        "audit_history": _lost(material, found, previous, direction),
+        "audit_inflow": flow.inflow(),
+        "audit_outflow": flow.outflow(),
         "audit_steadiness": (
             2 * material.elasticity.shear_modulus * found.left_over / material.yield_stress
         ),
@@ -100,116 +100,33 @@ def _strain(track: Track, found: Pass[Layers]) -> Strained:
     return largest_strain([(track.part.body.name, places, layers.accumulated)])
 
 
-class _Way:
-    """The flow of material through the window: for each column, the last increment before it."""
+def _released(track: Track, material: Law, found: Pass[Layers]) -> float:
+    """Return the difference of the state behind the load from that of the law [MPa].
 
-    def __init__(self, track: Track, material: Law, found: Pass[Layers]) -> None:
-        self._material, self._found, self._elasticity = material, found, track.elasticity
-        at_rest = found.before.strain(track.elasticity)[:, None]
-        self._at_rest = np.moveaxis(at_rest, 2, 0)
-        self._strain = np.moveaxis(at_rest + found.strain, 2, 0).reshape(4, -1)
-        self._after, self._before = (
-            each.unpacked(_flat(each.packed)) for each in (found.states, found.ago)
-        )
-        self._stress = material.stiffness(4) @ (self._strain - self._after.plastic_strain)
-
-    def misfit(self) -> float:
-        """Return the misfit of the increments to the law [MPa]."""
-        off = self._material.misfit(self._strain, self._stress, self._before, self._after)
-        return _largest(off)
-
-    def retraced(self) -> float:
-        """Return the difference of the states from those of the law, column by column [MPa].
-
-        All increments between two columns are repeated with the law, from the state at the upstream
-        column. The first column starts from the state before the pass. The state behind the load is
-        one increment from the last column.
-        """
-        found, law = self._found, self._material
-        states = found.states.packed
-        strain = self._strain.reshape(4, *states.shape[1:])
-        before = np.concatenate([found.before.state.packed[..., None], states], axis=2)
-        first = _flat(np.concatenate([self._at_rest, strain[..., :-1]], axis=2))
-        state = self._after.unpacked(_flat(before[..., :-1]))
-        for part in range(1, found.parts + 1):
-            share = part / found.parts
-            state = law.respond(first + share * (self._strain - first), state).state
-        last = found.before.state.unpacked(before[..., -1])
-        left = law.respond(found.after.strain(self._elasticity).T, last)
-        across = float(np.abs(left.stress[[1, 3]]).max())
-        return max(
-            across,
-            self._difference(self._after, state),
-            self._difference(found.after.state, left.state),
-        )
-
-    def _difference(self, one: PlasticState, other: PlasticState) -> float:
-        """Return the largest difference of internal variables, as stress [MPa].
-
-        Strain is multiplied by 2 G; any other variable counts relative to its largest value.
-        """
-        double_shear, worst = 2 * self._material.elasticity.shear_modulus, []
-        for name in (f.name for f in fields(one)):
-            values, others = getattr(one, name), getattr(other, name)
-            off = float(np.abs(values - others).max(initial=0.0))
-            if name in ("plastic_strain", "accumulated"):
-                worst.append(off * double_shear)
-            elif off:
-                size = max(np.abs(values).max(), np.abs(others).max())
-                worst.append(off / float(size) * self._material.yield_stress)
-        return float(np.max(worst))
-
-    def beyond(self) -> float:
-        """Return the stress beyond yield [MPa]."""
-        return _largest(self._material.yield_value(self._stress, self._after))
-
-    def dissipation(self) -> float:
-        """Return the least plastic dissipation of an increment [N mm/mm3]."""
-        nothing = np.zeros((4, 4, 0)), np.zeros(0, dtype=bool)
-        response = Response(self._stress, nothing[0], self._after, nothing[1])
-        return float(self._material.dissipation(self._before, response).min())
-
-    def lost(self, previous: Pass[Layers] | None, direction: int) -> float:
-        """Return the difference between the state before the pass and that behind the last one.
-
-        It is the largest difference of internal variables, as stress over the yield stress. In the
-        opposite direction shear has the opposite sign.
-        """
-        found = self._found
-        before = found.before.whole.state
-        if previous is None:
-            left = self._material.initial(len(before.accumulated), 4)
-        else:
-            left = previous.after.whole.state
-            left = left if previous.direction == direction else left.mirrored
-        turned = float(found.direction != direction)
-        return max(turned, self._difference(before, left) / self._material.yield_stress)
-
-    def inflow(self) -> float:
-        """Return the plastic strain added in the first column, over that of the pass."""
-        found = self._found
-        return _largest(found.accumulated[:, 0] - found.before.accumulated) / self._most_added
-
-    def outflow(self) -> float:
-        """Return the plastic strain added behind the window, over that of the pass."""
-        found = self._found
-        return _largest(found.after.accumulated - found.accumulated[:, -1]) / self._most_added
-
-    @property
-    def _most_added(self) -> float:
-        """The largest plastic strain that the pass adds, at least `LEAST` of the yield strain."""
-        yield_strain = self._material.yield_stress / self._elasticity.youngs_modulus
-        return max(LEAST * yield_strain, self._found.most_added)
+    It is one increment from the last column; planes y = const must be free of stress.
+    """
+    states = found.states.packed
+    last = found.before.state.unpacked(states[..., -1])
+    left = material.respond(found.after.strain(track.elasticity).T, last)
+    across = float(np.abs(left.stress[[1, 3]]).max())
+    return max(across, difference(material, found.after.state, left.state))
 
 
-def _flat(values: Array) -> Array:
-    """Return values (n, n_points) of points in rows (n, n_rows, n_columns)."""
-    return values.reshape(len(values), -1)
+def _lost(material: Law, found: Pass[Layers], previous: Pass[Layers] | None, way: int) -> float:
+    """Return the difference between the state before the pass and that behind the last one.
 
-
-def _largest(values: Array) -> float:
-    """Return the largest value, not below zero, or NaN where one is NaN."""
-    return float(np.maximum(values.max(), 0.0))
+    It is the largest difference of internal variables, as stress over the yield stress. In the
+    opposite direction shear has the opposite sign.
+    """
+    before = found.before.whole.state
+    if previous is None:
+        left = material.initial(len(before.accumulated), 4)
+    else:
+        left = previous.after.whole.state
+        left = left if previous.direction == way else left.mirrored
+    return max(
+        float(found.direction != way), difference(material, before, left) / material.yield_stress
+    )
 
 
 def _of_contact(material: Law, found: Pass[Layers]) -> dict[str, float]:
@@ -219,12 +136,12 @@ def _of_contact(material: Law, found: Pass[Layers]) -> dict[str, float]:
         return {}
     strength = float(material.shear_strength(found.after.state).max())
     return {
-        "audit_tension": _largest(-touching.normal),
-        "audit_friction_excess": _largest(
+        "audit_tension": largest(-touching.normal),
+        "audit_friction_excess": largest(
             np.abs(touching.tangential) - np.nan_to_num(touching.bound)
         ),
-        "audit_surface_shear": _largest(np.abs(touching.shear)) / strength,
-        "audit_friction_over_strength": _largest(touching.most_shear) / strength,
+        "audit_surface_shear": largest(np.abs(touching.shear)) / strength,
+        "audit_friction_over_strength": largest(touching.most_shear) / strength,
     }
 
 

@@ -1,0 +1,118 @@
+"""The audit of material that flows along rows of points in a steady pass."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.materials.state import Response
+from solver.steady.flow import LEAST
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.materials.law import Law
+    from solver.materials.state import PlasticState
+    from solver.steady import Pass
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.int64] | slice
+
+
+class AuditedFlow:
+    """The flow of material through the window: for each column, the last increment before it.
+
+    Parameters
+    ----------
+    at_rest : (n_rows, n_components) strain before the pass, Mandel
+    """
+
+    def __init__(self, material: Law, found: Pass[Any], at_rest: Array) -> None:
+        self._material, self._found = material, found
+        self._at_rest = np.moveaxis(at_rest[:, None], 2, 0)
+        self._path = np.moveaxis(at_rest[:, None] + found.strain, 2, 0)
+        self._strain = _flat(self._path)
+        self._after, self._before = (
+            each.unpacked(_flat(each.packed)) for each in (found.states, found.ago)
+        )
+        stiffness = material.stiffness(len(self._strain))
+        self._stress = stiffness @ (self._strain - self._after.plastic_strain)
+
+    def misfit(self) -> float:
+        """Return the misfit of the increments to the law [MPa]."""
+        off = self._material.misfit(self._strain, self._stress, self._before, self._after)
+        return largest(off)
+
+    def retraced(self, rows: Rows = slice(None)) -> float:
+        """Return the difference of the states from those of the law, column by column [MPa].
+
+        All increments between two columns are repeated with the law, from the state at the upstream
+        column. The first column starts from the state before the pass.
+        """
+        found, law = self._found, self._material
+        states = found.states.packed[:, rows]
+        strain = self._path[:, rows]
+        earlier = found.before.state.packed[:, rows, None]
+        before = np.concatenate([earlier, states[..., :-1]], axis=2)
+        first = _flat(np.concatenate([self._at_rest[:, rows], strain[..., :-1]], axis=2))
+        state, last = self._after.unpacked(_flat(before)), _flat(strain)
+        for part in range(1, found.parts + 1):
+            state = law.respond(first + part / found.parts * (last - first), state).state
+        return difference(law, self._after.unpacked(_flat(states)), state)
+
+    def beyond(self) -> float:
+        """Return the stress beyond yield [MPa]."""
+        return largest(self._material.yield_value(self._stress, self._after))
+
+    def dissipation(self) -> float:
+        """Return the least plastic dissipation of an increment [N mm/mm3]."""
+        n = len(self._strain)
+        nothing = np.zeros((n, n, 0)), np.zeros(0, dtype=bool)
+        response = Response(self._stress, nothing[0], self._after, nothing[1])
+        return float(self._material.dissipation(self._before, response).min())
+
+    def inflow(self) -> float:
+        """Return the plastic strain added in the first column, over that of the pass."""
+        return self.over_most(self._found.accumulated[:, 0] - self._found.before.accumulated)
+
+    def outflow(self) -> float:
+        """Return the plastic strain added behind the window, over that of the pass."""
+        return self.over_most(self._found.after.accumulated - self._found.accumulated[:, -1])
+
+    def over_most(self, added: Array) -> float:
+        """Return the largest added plastic strain over that of the pass.
+
+        The pass counts with at least `LEAST` of the yield strain.
+        """
+        material = self._material
+        yield_strain = material.yield_stress / material.elasticity.youngs_modulus
+        return largest(added) / max(LEAST * yield_strain, self._found.most_added)
+
+
+def difference(material: Law, one: PlasticState, other: PlasticState) -> float:
+    """Return the largest difference of internal variables, as stress [MPa].
+
+    Strain is multiplied by 2 G; any other variable counts relative to its largest value.
+    """
+    double_shear, worst = 2 * material.elasticity.shear_modulus, []
+    for name in (f.name for f in fields(one)):
+        values, others = getattr(one, name), getattr(other, name)
+        off = float(np.abs(values - others).max(initial=0.0))
+        if name in ("plastic_strain", "accumulated"):
+            worst.append(off * double_shear)
+        elif off:
+            size = max(np.abs(values).max(), np.abs(others).max())
+            worst.append(off / float(size) * material.yield_stress)
+    return float(np.max(worst))
+
+
+def largest(values: Array) -> float:
+    """Return the largest value, not below zero, or NaN where one is NaN."""
+    return float(np.maximum(values.max(), 0.0))
+
+
+def _flat(values: Array) -> Array:
+    """Return values (n, n_points) of points in rows (n, n_rows, n_columns)."""
+    return values.reshape(len(values), -1)
