@@ -34,6 +34,17 @@ class WheelRailParameters(MaterialParameters):
         "ratio of the longitudinal force to that of full slip, friction times load: positive "
         "brakes, negative accelerates",
     )
+    control: Literal["moment", "creepage"] = described(
+        "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
+    )
+    given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
+    )
+    lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.0,
+        "velocity of the wheel along z over that along x, relative to rolling: the yaw angle of a "
+        "wheel whose heading is turned towards the middle of the track",
+    )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
         -4.0,
         "position z of the wheel's running circle from the axis of the upright rail; z points to "
@@ -71,6 +82,11 @@ class WheelRailParameters(MaterialParameters):
         MaterialParameters.__post_init__(self)
         if self.traction and not self.friction:
             raise ModelError("traction", self.traction, "must be 0 without friction")
+        prescribed = self.control == "creepage"
+        if prescribed and self.traction:
+            raise ModelError("traction", self.traction, "must be 0 with control = creepage")
+        if self.given_creepage and not prescribed:
+            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
 
     @property
     def idle(self) -> Mapping[str, str]:

@@ -223,5 +223,7 @@ def wheel_on(track: PrismTrack, parameters: WheelRailParameters) -> RollingPatch
         elasticity=p.wheel_elasticity,
     )
     return RollingPatch(
-        track.grid, track.compliance, wheel, friction=p.friction, force=p.load, drive=p.traction
-    )
+        track.grid, track.compliance, wheel, friction=p.friction, force=p.load,
+        drive=None if p.control == "creepage" else p.traction,
+        creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
+    )  # fmt: skip

@@ -129,6 +129,23 @@ def test_braking_and_accelerating_shear_the_rail_in_opposite_directions() -> Non
     assert forces[0] == pytest.approx(-forces[1], rel=1e-3)
 
 
+def test_the_creepage_of_a_moment_makes_that_moment() -> None:
+    moment, *_ = rolled(("friction", 0.3), ("traction", -0.75))
+    own = moment.scalars["creepage"]
+    (given,) = rolled(("friction", 0.3), ("control", "creepage"), ("given_creepage", own))
+    for name in ("longitudinal_force", "max_plastic_strain", "creepage"):
+        assert given.scalars[name] == pytest.approx(moment.scalars[name], rel=1e-3), name
+
+
+def test_lateral_creepage_drags_the_rail_along_up_to_friction() -> None:
+    forces = [
+        rolled(*CROWNED.items(), ("lateral_creepage", creepage))[0].scalars["lateral_force"]
+        for creepage in (-0.03, 0.0, 0.03)
+    ]
+    full = 0.17 * 100e3
+    np.testing.assert_allclose(forces, [-full, 0.0, full], atol=0.03 * full)
+
+
 def test_a_crowned_wheel_on_an_elastic_rail_presses_as_hertz() -> None:
     """Relative radii of 460 mm along and 150 across; the contact is four elements wide."""
     (record,) = rolled(*CROWNED.items(), ("yield_stress", 3000.0), ("friction", 0.0))
@@ -174,6 +191,15 @@ def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
         next(by_passes(SCENE, [parameters], lambda share: None))
 
 
-def test_traction_needs_friction() -> None:
-    with pytest.raises(ModelError, match=r"traction = 0\.5: must be 0 without friction"):
-        WheelRailParameters(friction=0.0, traction=0.5)
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"friction": 0.0, "traction": 0.5}, r"traction = 0\.5: must be 0 without friction"),
+        ({"control": "creepage", "traction": 0.5}, r"traction = 0\.5: must be 0 with control"),
+        ({"given_creepage": 0.01}, r"given_creepage = 0\.01: needs control = creepage"),
+        ({"load": 0.0}, r"load = 0\.0: must be greater than 0"),
+    ],
+)
+def test_parameters_that_do_not_fit_are_refused(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(ModelError, match=told):
+        WheelRailParameters(**given)
