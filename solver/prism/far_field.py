@@ -19,6 +19,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.linear import solvers as linear
 from solver.prism.modes import superposed
+from solver.prism.section import I_AXIS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,6 +54,7 @@ class FarField:
     ----------
     displacement : (n_rows, window, 4) of the surface rows for unit resultants [mm/N, 1/N]
     strain : (n_points, window, 6, 4) Mandel strain at the points of the zone [1/N, 1/(N mm)]
+    beneath : (m, 4) displacement of the zone's unknowns at the resultants [mm/N, 1/N]
     last : (n_points, 1, 6, 4) strain of the last level alone, where the resultants act
 
     Raises
@@ -86,6 +88,9 @@ class FarField:
 
         self.displacement = summed(modes.rows @ flat, modes.along)
         self.strain = modes.by_point(summed(strain, modes.carrying))
+        axis = modes.unknowns % 3 == I_AXIS
+        at_load = superposed(u, np.zeros((len(k), 1)), share, axis, along)
+        self.beneath = at_load[..., 0]
         only = _waves(modes.length * _RATIO ** (levels - 1), 1)
         last = np.zeros_like(share)
         last[np.abs(only[0][:, None] - k).argmin(axis=1)] = only[1]

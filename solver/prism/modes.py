@@ -204,6 +204,14 @@ class Modes:
         amplitudes = np.matmul(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
+    def at_station(self, station: int, eigenstress: Array, forces: Array) -> Array:
+        """Return the displacement (m,) of the zone's unknowns at a station [mm]; see `solve`."""
+        nodal = self._nodal(eigenstress, forces)
+        u = np.stack([self._factors.solve(right.T, wave) for wave, right in enumerate(nodal)])
+        flat = u.swapaxes(0, 1).reshape(len(self.unknowns), -1)  # each u is (m, 2)
+        plain, carrying = (back[:, station] for back in self._back)
+        return np.where(self.unknowns % 3 == I_AXIS, flat @ carrying, flat @ plain)
+
     def constant(self, eigenstress: Array) -> tuple[Array, Array]:
         """Return strain (n_points, 6) and displacement (n_rows,) of what is constant along x.
 

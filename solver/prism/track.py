@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import ModelError
+from solver.linear.solvers import analyse
 from solver.prism.far_field import FarField
 from solver.prism.flow import PrismFlow
 from solver.prism.modes import Modes
@@ -24,6 +25,7 @@ from solver.prism.surface import RunningSurface
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.linear.solvers import LinearSolver
     from solver.materials.law import Law
     from solver.prism.section import Section
 
@@ -133,6 +135,43 @@ class PrismTrack:
         if self.far is not None and forces is not None:
             strain += self.far.strain @ self.far.resultants(forces)
         return strain
+
+    def beneath(self, field: PrismField) -> Array:
+        """Return the displacement (m,) of the zone's unknowns by a field, at x = 0 [mm]."""
+        forces = np.zeros((len(self._width), self.weights.shape[1]))
+        if field.traction is not None:
+            forces = self._on_rows(field.traction)
+        eigenstress = field.eigenstress
+        if eigenstress is None:
+            eigenstress = np.zeros((*self.weights.shape, 6))
+        moved = self.modes.at_station(self.before, eigenstress, forces)
+        return moved if self.far is None else moved + self.far.beneath @ self.far.resultants(forces)
+
+    @cached_property
+    def _without_load(self) -> LinearSolver:
+        """The section's own problem, k = 0, factorised on its free unknowns."""
+        section = self.section
+        stiffness = section.stiffness(section.free)
+        solver = analyse(stiffness.pattern)
+        solver.factorise(stiffness.at(0.0))
+        return solver
+
+    def left_by(self, plastic_strain: Array) -> Array:
+        """Return the displacement (section.n,) that plastic strain leaves without load [mm].
+
+        Parameters
+        ----------
+        plastic_strain : (n_points, 6) in the zone, constant along x, Mandel
+        """
+        section, modes = self.section, self.modes
+        at = np.zeros((section.weights.size, 6))
+        at[modes.points] = modes.weights[:, None] * (2 * self.elasticity.shear_modulus)
+        at[modes.points] *= plastic_strain
+        each = np.einsum("eqab,eqa->eb", section.B0, at.reshape(*section.weights.shape, 6))
+        force = np.bincount(section.dofs.ravel(), each.ravel(), section.n)
+        u = np.zeros(section.n)
+        u[section.free] = self._without_load.solve(force[section.free])
+        return u
 
     # -- the surface ---------------------------------------------------------------------------
 

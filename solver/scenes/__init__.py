@@ -16,7 +16,8 @@ from solver.scenes.effort import Effort
 from solver.scenes.punch import PUNCH
 from solver.scenes.rolling import ROLLING
 from solver.scenes.scene import Monitor, Scene
+from solver.scenes.wheel_rail import WHEEL_RAIL
 
-SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING)}
+SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING, WHEEL_RAIL)}
 
 __all__ = ["SCENES", "Effort", "Monitor", "Scene"]

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from solver import Record
-from solver.results.quantities import QUANTITIES
+from solver.results.quantities import IN_SPACE, QUANTITIES
 from studies import Store, Study, open_study, run_study
 from studies.definition.vocabulary import LABEL_ATTRIBUTES
 from studies.scenes.registry import built_in, scene_named
@@ -56,6 +56,7 @@ def records() -> list[Record]:
         "rigid_punch": ({"accuracy": "draft", "largest_element": 0.05}, 50.0),
         "rolling": ({"element_size": 2.0, "advance_step": 2.0, "track": 8.0}, 1),
         "rolling, endless": ({"element_size": 3.0}, 1),
+        "wheel_rail": ({"accuracy": "draft"}, 1),
     }
     names = {label: label.split(",")[0] for label in coarse}
     assert set(names.values()) == {each.name for each in built_in()} - {"fake"}, (
@@ -86,10 +87,13 @@ def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
 
 def undeclared(record: Record) -> set[str]:
     """Return what a record gives and nobody has declared as it is given."""
-    unknown = (record.scalars.keys() | record.fields.keys()) - QUANTITIES.keys() - OWN
-    unknown |= record.coordinates.keys() - QUANTITIES.keys() - LABEL_ATTRIBUTES.keys()
+    declared = QUANTITIES | (IN_SPACE if "z" in record.coordinates else {})
+    unknown = (record.scalars.keys() | record.fields.keys()) - declared.keys() - OWN
+    unknown |= record.coordinates.keys() - declared.keys() - LABEL_ATTRIBUTES.keys()
     for name, (dims, _) in record.fields.items():
-        own = QUANTITIES[name].dims if name in QUANTITIES else dims
+        own = declared[name].dims if name in declared else dims
+        if own[-2:] == ("y", "x") and "z" in record.coordinates:  # the map of a section
+            own = (*own[:-2], "y", "z")
         pairs = ("contact", "stage", "fraction") if own == ("stage", "s") else own
         if dims not in (own, ("pass", *own), pairs):
             unknown.add(name)

@@ -55,6 +55,10 @@ class PlainBody:
         """The declared body."""
         return self.part.body
 
+    def in_plane(self, X: Array) -> Array:
+        """Return the coordinates (2, n) in the plane of the mesh of positions (n_axes, n) [mm]."""
+        return X
+
     @cached_property
     def _nodes(self) -> NDArray[np.int64]:
         return np.asarray(self.part.same[self.part.basis.element_dofs])

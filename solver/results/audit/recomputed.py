@@ -19,11 +19,12 @@ class BodyFields(Protocol):
     Attributes
     ----------
     plain : the body
-    stress : (4, n_nodes) components xx, yy, zz, xy at its nodes [MPa]
+    stress : (n_components, n_nodes) components xx, yy, zz, xy (, yz, zx) at its nodes [MPa]
     mises : (n_nodes,) von Mises stress [MPa]
     accumulated : (n_nodes,) accumulated plastic strain; recovery may make it negative
-    displacement : (2, n_nodes) [mm]
-    at_points : positions (2, n) [mm], von Mises stress (n,) [MPa] and plastic strain (n,) at points
+    displacement : (n_axes, n_nodes) [mm]
+    at_points : positions (n_axes, n) [mm], von Mises stress (n,) [MPa] and plastic strain (n,) at
+        points
     """
 
     @property

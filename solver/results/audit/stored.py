@@ -292,7 +292,8 @@ class _Viewed:
         bodies = self._run.system.names
         if "max_plastic_strain" in numbers:
             each = [self._source.fields(name, self._view.unloaded).at_points for name in bodies]
-            y, flow = (np.concatenate([np.atleast_2d(one[k])[-1] for one in each]) for k in (0, 2))
+            y = np.concatenate([X[1] for X, _, _ in each])
+            flow = np.concatenate([strain for _, _, strain in each])
             scale = self._strain_scale(flow)
             self._number("max_plastic_strain", float(flow.max()), scale)
             depth = numbers.get("depth_of_max_plastic_strain", np.nan)

@@ -210,7 +210,7 @@ class PassFields:
 
 
 class Located:
-    """The elements of an undeformed body that contain places (2, n).
+    """The elements of an undeformed body that contain places (n_axes, n).
 
     Attributes
     ----------
@@ -218,9 +218,9 @@ class Located:
     """
 
     def __init__(self, plain: PlainBody, X: Array) -> None:
-        part = plain.part
+        part, X = plain.part, plain.in_plane(X)
         dofs, mapping, shape = part.basis.element_dofs, part.basis.mapping, part.basis.elem.lbasis
-        corners = part.X[:, dofs]
+        corners = plain.in_plane(part.X)[:, dofs]
         low, high = corners.min(axis=1), corners.max(axis=1)
         slack = _SLACK * (high - low) + 1e-9
         low, high = low - slack, high + slack

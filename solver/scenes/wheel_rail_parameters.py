@@ -1,0 +1,120 @@
+"""Parameters of a wheel that rolls along a rail, in three dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Interval, Unit
+
+from solver.errors import ModelError
+from solver.materials.elasticity import Elasticity
+from solver.parameters import Fraction, Poisson, Stress, described
+from solver.scenes.material_parameters import MaterialParameters
+
+ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
+"""Side of the elements under the contact, across and in depth [mm]."""
+_CLOSEST = 1.0
+"""Least distance of stations along the rail [mm]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelRailParameters(MaterialParameters):
+    """Parameters of a wheel on a rail (N, mm, MPa)."""
+
+    yield_stress: Stress = described(502.0, "uniaxial yield stress Re of the rail")
+    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
+    load: Annotated[float, Interval(gt=0.0, le=1e6), Unit("N")] = described(
+        150e3, "vertical force on the wheel"
+    )
+    friction: Fraction = described(0.17, "Coulomb friction coefficient")
+    traction: Annotated[float, Interval(ge=-0.99, le=0.99), Unit("1")] = described(
+        0.0,
+        "ratio of the longitudinal force to that of full slip, friction times load: positive "
+        "brakes, negative accelerates",
+    )
+    control: Literal["moment", "creepage"] = described(
+        "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
+    )
+    given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
+    )
+    lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.0,
+        "velocity of the wheel along z over that along x, relative to rolling: the yaw angle of a "
+        "wheel whose heading is turned towards the middle of the track",
+    )
+    lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
+        -4.0,
+        "position z of the wheel's running circle from the axis of the upright rail; z points to "
+        "the outside of the track",
+    )
+    cant: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.025, "cant of the rail towards the middle of the track, its tangent"
+    )
+    wheel_radius: Annotated[float, Interval(ge=50.0, le=5000.0), Unit("mm")] = described(
+        460.0, "radius of the wheel at its running circle"
+    )
+    wheel_profile: Literal["s1002", "conical", "crowned"] = described(
+        "s1002", "profile of the wheel: S1002, a cone, or a crown lowest at the running circle"
+    )
+    wheel_slope: Annotated[float, Interval(ge=-0.2, le=0.2), Unit("1")] = described(
+        0.05, "slope dy/dz of the profile of a conical wheel"
+    )
+    crown_radius: Annotated[float, Interval(ge=50.0, le=1e5), Unit("mm")] = described(
+        300.0, "radius across the wheel of a crowned one"
+    )
+    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
+        1.0, "ratio of Young's modulus of the wheel to that of the rail"
+    )
+    wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
+        "same", "Poisson ratio of the wheel; same: that of the rail"
+    )
+    foundation: Annotated[float, Interval(ge=0.1, le=1e4), Unit("MPa")] = described(
+        21.0,
+        "modulus of the foundation: force per length of the rail and displacement, along x, y and "
+        "z",
+    )
+
+    def __post_init__(self) -> None:
+        # zero-argument super() does not see the class that dataclass(slots=True) makes
+        MaterialParameters.__post_init__(self)
+        if self.traction and not self.friction:
+            raise ModelError("traction", self.traction, "must be 0 without friction")
+        prescribed = self.control == "creepage"
+        if prescribed and self.traction:
+            raise ModelError("traction", self.traction, "must be 0 with control = creepage")
+        if self.given_creepage and not prescribed:
+            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
+
+    @property
+    def idle(self) -> Mapping[str, str]:
+        """Parameters without effect, each with the parameter whose word has no use for it."""
+        own = {"conical": "wheel_slope", "crowned": "crown_radius"}
+        unused = {name: "wheel_profile" for word, name in own.items() if word != self.wheel_profile}
+        return {**MaterialParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """Elastic constants of the rail."""
+        return Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
+
+    @property
+    def wheel_elasticity(self) -> Elasticity:
+        """Elastic constants of the wheel."""
+        given = self.wheel_poisson_ratio
+        return Elasticity(
+            youngs_modulus=self.youngs_modulus * self.wheel_stiffness,
+            poisson_ratio=self.poisson_ratio if given == "same" else float(given),
+        )
+
+    @property
+    def element_size(self) -> float:
+        """Side of the elements under the contact [mm]."""
+        return ELEMENT_SIZE[self.accuracy]
+
+    @property
+    def spacing(self) -> float:
+        """Distance of stations along the rail [mm]."""
+        return max(self.element_size, _CLOSEST)

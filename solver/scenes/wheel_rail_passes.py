@@ -1,0 +1,180 @@
+"""Runs of the wheel-rail scene: steady passes of a wheel over an endless rail."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError, NotConverged, WindowTooSmall
+from solver.linear.threads import one_thread
+from solver.loading.outcome import Outcome, Tally
+from solver.materials.doubts import doubts
+from solver.prism.patch_passing import AppliedPatch, PatchPassing
+from solver.results.audit.plain_prism import PlainPrism
+from solver.results.audit.prism import audit_prism
+from solver.results.audit.prism_values import OfPrismPass
+from solver.results.prism import PatchTractions, PrismBody
+from solver.results.run import FinishedRun
+from solver.results.samples import Samples
+from solver.scenes.wheel_rail_track import geometry, track_of, wheel_on
+from solver.steady.passing import passing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.prism.patch_contact import PatchContact
+    from solver.prism.state import PrismState
+    from solver.results.audit.report import Audit
+    from solver.scenes.scene import Monitor, Scene
+    from solver.scenes.wheel_rail_parameters import WheelRailParameters
+    from solver.steady import Pass
+
+    Array = NDArray[np.float64]
+
+_REACHES = (1.0, 1.4, 2.0)
+"""Ratios of the size of zone and window to the usual size, tried in turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class PassTrace:
+    """What a pass leaves.
+
+    Attributes
+    ----------
+    accumulated : (n,) equivalent plastic strain at the points of the zone
+    plastic_strain : (n, 6) signed plastic strain there, Mandel
+    creepage : creepage of the wheel
+    surface : displacement along x of the surface, mean over the zone [mm]
+    """
+
+    accumulated: Array
+    plastic_strain: Array
+    creepage: float
+    surface: float
+
+
+def by_passes(
+    scene: Scene, runs: Sequence[WheelRailParameters], monitor: Monitor
+) -> Iterator[FinishedRun]:
+    """Compute pass after pass; yield the runs, which differ in the number of passes.
+
+    If yielding or contact reaches the edge of zone or window, begin again with larger ones.
+    """
+    remaining = list(runs)
+    path = _Path(scene, runs[-1], _REACHES[0])
+    for reach in _REACHES:
+        if reach > _REACHES[0]:
+            try:
+                path = _Path(scene, runs[-1], reach)
+            except ModelError:
+                break  # a zone of this size leaves the head: keep the error of the smaller one
+        for run in path.runs(remaining, monitor):
+            remaining.pop(0)
+            yield run
+        if not isinstance(path.error, WindowTooSmall):
+            break
+    yield from map(path.finished, remaining)
+
+
+class _Path:
+    """The passes that are computed so far, with zone and window of one size.
+
+    Attributes
+    ----------
+    error : why there are no more, or None
+    """
+
+    def __init__(self, scene: Scene, last: WheelRailParameters, reach: float) -> None:
+        self._started, self._elsewhere = time.process_time(), 0.0
+        self._last, self._law, view = last, last.material(), scene.view(last)
+        self._track = track_of(geometry(last, reach))
+        self._body = PrismBody(self._track, self._law, view.profile_body)
+        self._samples = Samples(self._body, view)
+        self._found: Pass[PrismState] | None = None
+        self._previous: Pass[PrismState] | None = None
+        self._steps: list[int] = []
+        self._traces: list[PassTrace] = []
+        self.error: NotConverged | None = None
+
+    def runs(self, runs: Sequence[WheelRailParameters], monitor: Monitor) -> Iterator[FinishedRun]:
+        """Yield those of the runs whose passes are found; ``error`` says why others are not."""
+        remaining = list(runs)
+        try:
+            for number in range(1, self._last.passes + 1):
+                self._roll()
+                monitor(min(number / self._last.passes, 0.99))
+                if remaining[0].passes == number:
+                    run = self.finished(remaining.pop(0))
+                    paused = time.process_time()
+                    yield run
+                    self._elsewhere += time.process_time() - paused
+        except NotConverged as failure:
+            self.error = failure
+
+    @cached_property
+    def _plain(self) -> PlainPrism:
+        """The second evaluation of the rail, for the audit."""
+        return PlainPrism(self._track)
+
+    def _roll(self) -> None:
+        """Compute the next pass."""
+        found = self._found
+        before = self._track.virgin(self._law) if found is None else found.after
+        with one_thread():
+            wheel = wheel_on(self._track, self._last)
+            load = PatchPassing(wheel, before.displacement)
+            guess = None if found is None else found.strain
+            self._found = passing(self._track, self._law, load, before, guess)
+        self._previous = found
+        self._steps.append(max(self._found.steps, 1))
+        after = self._found.after
+        self._traces.append(
+            PassTrace(
+                accumulated=after.accumulated,
+                plastic_strain=after.plastic_strain,
+                creepage=contact_of(self._found).creepage,
+                surface=float(after.displacement[:, 0].mean()),
+            )
+        )
+
+    def finished(self, run: WheelRailParameters) -> FinishedRun:
+        """Return a run with the results of the last pass found."""
+        found, previous, view = self._found, self._previous, self._samples.view
+        points, source = {}, None
+        if found is not None and self.error is None:
+            left = self._body.left_by(found)
+            points = {view.loaded: self._body.under_load(found), view.unloaded: left}
+            source = OfPrismPass(self._body, found, left, view.unloaded)
+        seconds = time.process_time() - self._started - self._elsewhere
+
+        def check() -> Audit:
+            assert found is not None
+            return audit_prism(self._track, self._law, found, previous, self._plain)
+
+        return FinishedRun(
+            parameters=run,
+            samples=self._samples,
+            tractions=PatchTractions(),
+            outcome=Outcome(
+                tally=Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan),
+                last=points.get(view.unloaded),
+                points=points,
+                traces=tuple(self._traces),
+                error=self.error,
+            ),
+            check=check,
+            notes=doubts({view.profile_body: self._law}),
+            source=source,
+        )
+
+
+def contact_of(found: Pass[PrismState]) -> PatchContact:
+    """Return the contact of a pass."""
+    assert isinstance(found.loading, AppliedPatch)
+    return found.loading.contact

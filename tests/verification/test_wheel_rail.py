@@ -1,0 +1,205 @@
+"""A wheel on a rail: against figures of a finer mesh and of a published test, and by symmetry."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+
+from solver import ModelError, Record
+from solver.results.record import Status
+from solver.results.shakedown import ShakedownState
+from solver.scenes import SCENES
+from solver.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.scenes.wheel_rail_passes import by_passes
+from solver.scenes.wheel_rail_track import expected_contact
+from tests.verification.hertz_ellipse import HertzEllipse
+
+SCENE = SCENES["wheel_rail"]
+PUBLISHED = {"accuracy": "draft", "hardening": "kinematic", "hardening_ratio": 0.0196}
+CROWNED = PUBLISHED | {
+    "wheel_profile": "crowned", "cant": 0.0, "lateral_position": 0.0, "load": 100e3
+}  # fmt: skip
+XX, YY, ZZ = range(3)
+
+
+@cache
+def rolled(*changes: tuple[str, Any], passes: tuple[int, ...] = (1,)) -> tuple[Record, ...]:
+    """The records of a wheel at draft accuracy, by numbers of passes."""
+    parameters = SCENE.parameters(**PUBLISHED | dict(changes))
+    return tuple(SCENE.path(parameters, passes, lambda share: None))
+
+
+def free() -> Record:
+    """The published test of free rolling, one pass."""
+    return rolled(passes=(1, 3))[0]
+
+
+def field(record: Record, name: str) -> np.ndarray:
+    """A field of a record without the dimension of bodies."""
+    dims, values = record.fields[name]
+    return values[0] if dims[0] == "body" else values
+
+
+def test_stress_under_the_wheel_is_that_of_the_published_test() -> None:
+    """The thesis reads -920, -1 000 and -740 from contours of 100 MPa."""
+    lowest = field(free(), "lowest_loaded")
+    np.testing.assert_allclose(lowest[[XX, YY]], [-920, -1000], atol=75)
+    # across it depends on the side of elements: -704 at 1 mm, where this is 7 % less
+    assert lowest[ZZ] == pytest.approx(-740, abs=100)
+
+
+def test_pressure_has_two_maxima_the_larger_one_to_the_outside() -> None:
+    pressure = field(free(), "patch_pressure").max(axis=0)
+    z = free().coordinates["z"]
+    inner, outer = pressure[z < -8].max(), pressure[z > 0].max()
+    between = pressure[(z > -9.6) & (z < -8)].min()
+    assert between < 0.95 * inner < inner < 0.7 * outer
+    assert outer == pytest.approx(1000, rel=0.05)
+
+
+def test_residual_stress_of_free_rolling_is_near_the_published_range() -> None:
+    """Elements of 2 mm overestimate the lowest by 17 % (-57, -64); those of 1 mm give -49, -55.
+
+    The published ranges are -22 to -47 and -27 to -54, over stations that are not all steady.
+    """
+    lowest, depth = field(free(), "residual_min"), -field(free(), "residual_min_y")
+    np.testing.assert_allclose(lowest[[XX, ZZ]], [-49, -55], rtol=0.2)
+    assert (np.abs(depth[[XX, ZZ]] - 3.5) <= 1.0).all()
+    assert field(free(), "surface_residual_max")[ZZ] == pytest.approx(56, rel=0.3)
+
+
+def test_free_rolling_yields_below_the_surface_only() -> None:
+    """Plastic strain is 0.00095 with elements of 1 mm; the published 0.0015 is not reached."""
+    numbers = free().scalars
+    assert numbers["max_plastic_strain"] == pytest.approx(9.5e-4, rel=0.05)
+    assert 1.0 < numbers["least_yielded_depth"] < numbers["most_yielded_depth"] < 7.0
+
+
+def test_accelerating_yields_more_and_nearer_to_the_surface() -> None:
+    (record,) = rolled(("friction", 0.3), ("traction", -0.75))
+    numbers = record.scalars
+    assert numbers["longitudinal_force"] == pytest.approx(-0.75 * 0.3 * 150e3, rel=2e-3)
+    assert numbers["creepage"] < 0
+    assert numbers["max_plastic_strain"] > 1.8 * free().scalars["max_plastic_strain"]
+    assert numbers["depth_of_max_plastic_strain"] < 3.0
+    assert numbers["least_yielded_depth"] < 0.5
+
+
+def test_the_wheel_carries_its_load_and_sinks_with_the_foundation() -> None:
+    """A beam on springs sinks by P (4 k^3 E I)^(-1/4) / 2; contact and head add to it."""
+    deflection = 150e3 / 2 / (4 * 21.0**3 * 2e5 * 3038.3e4) ** 0.25
+    assert -free().scalars["axle_height"] == pytest.approx(deflection, rel=0.15)
+    dims, pressure = free().fields["patch_pressure"]
+    step = [np.diff(free().coordinates[name])[0] for name in dims]
+    # interpolation between stations and vertices keeps the integral, up to the edge of contact
+    assert pressure.sum() * np.prod(step) == pytest.approx(150e3, rel=0.02)
+
+
+def test_passes_share_a_path_and_strain_grows_ever_less() -> None:
+    first, third = rolled(passes=(1, 3))
+    strain = field(third, "pass_max_plastic_strain")
+    assert strain[0] == field(first, "pass_max_plastic_strain")[0]
+    assert np.diff(strain, prepend=0.0)[1:].max() < 0.1 * strain[0]
+    assert third.scalars["shakedown_state"] in (
+        ShakedownState.ELASTIC_SHAKEDOWN, ShakedownState.UNDECIDED,
+    )  # fmt: skip
+
+
+def test_a_symmetric_wheel_leaves_symmetric_stress() -> None:
+    (record,) = rolled(*CROWNED.items(), ("traction", 0.5))
+    assert record.status is Status.OK, record.message
+    residual = field(record, "residual_stress")
+    scale = np.nanmax(np.abs(residual))
+    assert scale > 50.0
+    mirrored = residual[..., ::-1] * np.array([1, 1, 1, 1, -1, -1])[:, None, None]
+    np.testing.assert_allclose(residual, mirrored, atol=0.02 * scale)
+    assert abs(record.scalars["lateral_force"]) < 1e-3 * 100e3
+
+
+def test_braking_and_accelerating_shear_the_rail_in_opposite_directions() -> None:
+    (braked,) = rolled(*CROWNED.items(), ("traction", 0.5))
+    (driven,) = rolled(*CROWNED.items(), ("traction", -0.5))
+    ways = [field(each, "pass_surface_advance")[0] for each in (braked, driven)]
+    assert ways[0] > 1.5 * ways[1]  # pressure alone moves it forwards
+    forces = [each.scalars["longitudinal_force"] for each in (braked, driven)]
+    assert forces[0] == pytest.approx(-forces[1], rel=1e-3)
+
+
+def test_the_creepage_of_a_moment_makes_that_moment() -> None:
+    moment, *_ = rolled(("friction", 0.3), ("traction", -0.75))
+    own = moment.scalars["creepage"]
+    (given,) = rolled(("friction", 0.3), ("control", "creepage"), ("given_creepage", own))
+    for name in ("longitudinal_force", "max_plastic_strain", "creepage"):
+        assert given.scalars[name] == pytest.approx(moment.scalars[name], rel=1e-3), name
+
+
+def test_lateral_creepage_drags_the_rail_along_up_to_friction() -> None:
+    forces = [
+        rolled(*CROWNED.items(), ("lateral_creepage", creepage))[0].scalars["lateral_force"]
+        for creepage in (-0.03, 0.0, 0.03)
+    ]
+    full = 0.17 * 100e3
+    np.testing.assert_allclose(forces, [-full, 0.0, full], atol=0.03 * full)
+
+
+def test_a_crowned_wheel_on_an_elastic_rail_presses_as_hertz() -> None:
+    """Relative radii of 460 mm along and 150 across; the contact is four elements wide."""
+    (record,) = rolled(*CROWNED.items(), ("yield_stress", 3000.0), ("friction", 0.0))
+    assert record.scalars["max_plastic_strain"] == 0.0
+    modulus = 2e5 / (2 * (1 - 0.3**2))
+
+    def hertz(axes: np.ndarray) -> HertzEllipse:
+        peak = 1.5 * 100e3 / (np.pi * axes[0] * axes[1])
+        return HertzEllipse(a=axes[0], b=axes[1], peak_pressure=peak, modulus=modulus)
+
+    found = hertz(fsolve(lambda axes: np.log(hertz(axes).radii) - np.log([460, 150]), [8.0, 4.0]))
+    np.testing.assert_allclose(found.radii, (460, 150), rtol=1e-6)
+    assert record.scalars["peak_patch_pressure"] == pytest.approx(found.peak_pressure, rel=0.05)
+    area = np.pi * found.a * found.b
+    assert record.scalars["patch_area"] == pytest.approx(area, rel=0.1)
+
+
+def test_the_zone_is_at_the_contact() -> None:
+    numbers, contact = free().scalars, expected_contact(free().parameters)  # type: ignore[arg-type]
+    touched = numbers["patch_left"], numbers["patch_right"]
+    assert contact.middle == pytest.approx(sum(touched) / 2, abs=2.0)
+    assert contact.across == pytest.approx(np.ptp(touched) / 2, abs=2.0)
+
+
+def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solver.scenes.wheel_rail_passes._REACHES", (0.6, 1.0))
+    again = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
+    (record,) = again
+    assert record.status is Status.OK
+    assert record.scalars["max_plastic_strain"] == free().scalars["max_plastic_strain"]
+
+
+def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
+    (record,) = rolled(("hardening", "none"), ("hardening_ratio", 0.0), ("load", 400e3))
+    assert record.status is Status.LIMIT_LOAD
+    assert "grows without bound" in record.message
+    assert record.scalars["degrees_of_freedom"] > 0
+
+
+def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
+    parameters = WheelRailParameters(lateral_position=8.0, accuracy="draft")
+    with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must keep the contact"):
+        next(by_passes(SCENE, [parameters], lambda share: None))
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"friction": 0.0, "traction": 0.5}, r"traction = 0\.5: must be 0 without friction"),
+        ({"control": "creepage", "traction": 0.5}, r"traction = 0\.5: must be 0 with control"),
+        ({"given_creepage": 0.01}, r"given_creepage = 0\.01: needs control = creepage"),
+        ({"load": 0.0}, r"load = 0\.0: must be greater than 0"),
+    ],
+)
+def test_parameters_that_do_not_fit_are_refused(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(ModelError, match=told):
+        WheelRailParameters(**given)
