@@ -178,6 +178,14 @@ def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch
     assert record.scalars["max_plastic_strain"] == free().scalars["max_plastic_strain"]
 
 
+def test_the_effort_is_that_of_the_run() -> None:
+    _, third = rolled(passes=(1, 3))
+    assert SCENE.effort is not None
+    effort = SCENE.effort(third.parameters, [1, 3])
+    assert effort.unknowns == third.scalars["degrees_of_freedom"]
+    assert effort.increments == effort.most_increments == third.scalars["increments"] == 3
+
+
 def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
     (record,) = rolled(("hardening", "none"), ("hardening_ratio", 0.0), ("load", 400e3))
     assert record.status is Status.LIMIT_LOAD
