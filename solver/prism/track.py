@@ -140,7 +140,7 @@ class PrismTrack:
         """Return the displacement (m,) of the zone's unknowns by a field, at x = 0 [mm]."""
         forces = np.zeros((len(self._width), self.weights.shape[1]))
         if field.traction is not None:
-            forces = self._on_rows(field.traction)
+            forces = self.on_rows(field.traction)
         eigenstress = field.eigenstress
         if eigenstress is None:
             eigenstress = np.zeros((*self.weights.shape, 6))
