@@ -18,7 +18,6 @@ from solver.prism import Modes, PatchPassing, PrismState, PrismTrack, RollingPat
 from solver.prism import far_field as far_fields
 from solver.prism import flow as flows
 from solver.prism import patch as patches
-from solver.prism.influence import Influence
 from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
 from solver.results.audit.report import Audit
@@ -140,14 +139,14 @@ def no_tail(modes: Modes) -> None:
 
 
 def slip_of_the_next_station(patch: Patch) -> None:
-    own = patches._influence
+    own = patches.RollingPatch._kernel
 
-    def shifted(*args: Any) -> Influence:
-        kernel = own(*args)._blocks.transpose(0, 1, 3, 2, 4).copy()
+    def shifted(apart: Any) -> Any:
+        kernel = own(apart)
         kernel[:, :, [0, 2]] = np.roll(kernel[:, :, [0, 2]], -1, axis=0)
-        return Influence(kernel)
+        return kernel
 
-    patch.setattr(patches, "_influence", shifted)
+    patch.setattr(patches.RollingPatch, "_kernel", staticmethod(shifted))
 
 
 def profile_not_moved(patch: Patch) -> None:
