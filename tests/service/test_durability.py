@@ -104,27 +104,27 @@ def punch_study(frictions: int) -> dict[str, Any]:
 def test_a_study_of_the_punch_outlives_a_service_that_is_killed(mortal: Server) -> None:
     mortal.workers = 2
     mortal.start()
-    study = punch_study(frictions=3)
+    study = punch_study(frictions=6)
     study_id = mortal.post(study)
     wait_until(lambda: len(stored(mortal)) >= 2)
     family = children(mortal)
     mortal.kill()
     wait_until(lambda: not alive(family))
     kept = {path: path.stat() for path in stored(mortal)}
-    assert 2 <= len(kept) < 6
+    assert 2 <= len(kept) < 12
 
     mortal.start()
     assert mortal.post(study) == study_id
     found = mortal.finished(study_id)
 
-    assert (found["status"], found["counts"]) == ("successful", {"ok": 6})
+    assert (found["status"], found["counts"]) == ("successful", {"ok": 12})
     assert {path.stem for path in stored(mortal)} == {run["id"] for run in found["runs"]}
     for path, before in kept.items():
         now = path.stat()
         assert (now.st_ino, now.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
     assert not list(mortal.data.rglob("*.part"))
     with open_netcdf(mortal.data / "studies" / study_id / "dataset.nc") as dataset:
-        assert dataset["residual_stress"].sizes["friction"] == 3
+        assert dataset["residual_stress"].sizes["friction"] == 6
         assert bool(dataset["max_plastic_strain"].notnull().all())
 
 
