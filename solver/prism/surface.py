@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.errors import ModelError
-from solver.fem.surface import edges_of
+from solver.fem.surface import extract
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.prism.hats import SHARES
 from solver.prism.patch_grid import PatchGrid
@@ -42,14 +42,13 @@ class RunningSurface:
 
     def __init__(self, section: Section, boundary: str) -> None:
         plane = section.plane
-        edges = edges_of(plane, boundary)
-        edges = edges[np.argsort(plane.X[0, edges[:, 2]])]
-        turned = plane.X[0, edges[:, 0]] > plane.X[0, edges[:, 1]]
-        edges[turned, :2] = edges[turned, 1::-1]
-        if not np.array_equal(edges[1:, 0], edges[:-1, 1]):
-            raise ModelError("boundary", boundary, "must be one chain along which z increases")
-        vertices = np.append(edges[:, 0], edges[-1, 1])
-        self.z, self.y = plane.X[:, vertices]
+        chain = extract(plane, boundary)
+        edges = chain.nodes[chain.edges]
+        if plane.X[0, edges[0, 0]] > plane.X[0, edges[-1, 1]]:
+            edges = edges[::-1, [1, 0, 2]]
+        self.z, self.y = plane.X[:, np.append(edges[:, 0], edges[-1, 1])]
+        if not (np.diff(self.z) > 0).all():
+            raise ModelError("boundary", boundary, "must be a chain along which z increases")
         self._edges, self._n = edges, plane.X.shape[1]
         ends = np.stack([plane.X[:, edges] @ shape_derivatives(np.array(xi), 3) for xi in (-1, 1)])
         slopes = np.arctan2(ends[:, 1], ends[:, 0])  # (2, m - 1): at both ends of each edge

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.linear.solvers import LinearSolver
+    from solver.materials.elasticity import Elasticity
     from solver.materials.law import Law
     from solver.prism.section import Section
 
@@ -52,7 +53,6 @@ class PrismTrack:
     boundary : chain of edges on which a load may act
     before : number of the station at x = 0, where a load is
     weights : (n_points, window) volume of the points [mm3]
-    rim : numbers of the points at the edge of the zone, which must not yield
     grid : stations and vertices where the load may act
     rim : numbers of the points beside elements outside the zone, which must not yield
 
@@ -97,7 +97,7 @@ class PrismTrack:
         self.rim = _rim(section, zone, self.modes.points)
 
     @property
-    def elasticity(self) -> Any:
+    def elasticity(self) -> Elasticity:
         """Elastic constants."""
         return self.section.elasticity
 

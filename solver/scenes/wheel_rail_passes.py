@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from solver.prism.patch import RollingPatch
     from solver.prism.patch_contact import PatchContact
     from solver.prism.state import PrismState
+    from solver.prism.track import PrismTrack
     from solver.results.audit.report import Audit
     from solver.scenes.scene import Monitor, Scene
     from solver.scenes.wheel_rail_parameters import WheelRailParameters
@@ -118,17 +120,16 @@ class _Path:
             self.error = failure
 
     @cached_property
-    def _plain(self) -> PlainPrism:
-        """The second evaluation of the rail, for the audit."""
-        return PlainPrism(self._track)
+    def _wheel(self) -> RollingPatch:
+        """The wheel on the rail, the same in every pass."""
+        return wheel_on(self._track, self._last)
 
     def _roll(self) -> None:
         """Compute the next pass."""
         found = self._found
         before = self._track.virgin(self._law) if found is None else found.after
         with one_thread():
-            wheel = wheel_on(self._track, self._last)
-            load = PatchPassing(wheel, before.displacement)
+            load = PatchPassing(self._wheel, before.displacement)
             guess = None if found is None else found.strain
             self._found = passing(self._track, self._law, load, before, guess)
         self._previous = found
@@ -155,7 +156,7 @@ class _Path:
 
         def check() -> Audit:
             assert found is not None
-            return audit_prism(self._track, self._law, found, previous, self._plain)
+            return audit_prism(self._track, self._law, found, previous, _plain(self._track))
 
         return FinishedRun(
             parameters=run,
@@ -172,6 +173,12 @@ class _Path:
             notes=doubts({view.profile_body: self._law}),
             source=source,
         )
+
+
+@lru_cache(maxsize=2)
+def _plain(track: PrismTrack) -> PlainPrism:
+    """Return the second evaluation of a rail for the audit; all runs over it share it."""
+    return PlainPrism(track)
 
 
 def contact_of(found: Pass[PrismState]) -> PatchContact:

@@ -162,7 +162,7 @@ def passing(
     here = at(track.strain(load.on(track.at_rest).u) if guess is None else guess)
     start, sizes, shape = here.size, [here.size], here.added.shape
     for step in range(_STEPS):
-        left_over = _deviation(here.residual)
+        left_over = deviation(here.residual)
         if left_over * double_shear < tolerance * material.yield_stress:
             flow = here.flow
             if flow.beyond:
@@ -255,8 +255,8 @@ def _diverged(material: Law, most_added: float) -> NotConverged:
     )
 
 
-def _deviation(strain: Array) -> float:
+def deviation(strain: Array) -> float:
     """Return the largest norm of the deviators of strains (..., 4)."""
     mean = strain[..., :3].mean(axis=-1)
     square = (strain**2).sum(axis=-1) - 3 * mean**2
-    return float(np.sqrt(square.max()))
+    return float(np.sqrt(np.maximum(square.max(), 0.0)))

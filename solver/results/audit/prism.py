@@ -13,7 +13,7 @@ from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.report import Audit, broken, limits_at, warnings
 from solver.results.audit.theory import largest_strain
 from solver.steady.flow import INFLOW, usual_parts
-from solver.steady.passing import TOLERANCE
+from solver.steady.passing import TOLERANCE, deviation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,8 +65,8 @@ def audit_prism(
     left_strain, left_surface = plain.constant(
         stiff * (after.plastic_strain - before.plastic_strain)
     )
-    unsteady = _deviation(plain.strain(waves) - found.strain)
-    unsteady_behind = _deviation(left_strain - (after.strain - before.strain))
+    unsteady = deviation(plain.strain(waves) - found.strain)
+    unsteady_behind = deviation(left_strain - (after.strain - before.strain))
     moved = after.displacement - before.displacement
     residual = law.stiffness(6) @ (after.strain - after.plastic_strain).T
     flow = AuditedFlow(law, found, before.strain)
@@ -100,13 +100,6 @@ def audit_prism(
         warnings=warnings(figures),
         outside=strain.outside,
     )
-
-
-def _deviation(strain: Array) -> float:
-    """Return the largest norm of the deviators of strains (..., 6)."""
-    mean = strain[..., :3].mean(axis=-1)
-    square = (strain**2).sum(axis=-1) - 3 * mean**2
-    return float(np.sqrt(np.maximum(square.max(), 0.0)))
 
 
 def _rows(found: Pass[PrismState]) -> NDArray[np.int64]:
