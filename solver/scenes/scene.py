@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from solver.errors import LimitLoad
 from solver.loading.control import Control
@@ -35,6 +35,12 @@ Method = Callable[["Scene", Sequence[Any], Monitor], Iterator[FinishedRun]]
 """Computes runs of a scene from their parameters, in the order of the branch parameter."""
 
 
+def _no_increments(parameters: Any) -> NoReturn:
+    """Raise: neither model nor program of increments is known."""
+    del parameters
+    raise NotImplementedError("this scene is computed by its own method alone, not by increments")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """A named problem.
@@ -48,7 +54,8 @@ class Scene:
         ``description`` in the field's metadata. Building it checks it (``ModelError``).
     branch : name of the branch parameter: runs that differ only in it share increments. The run of
         a larger value continues that of a smaller one, or leaves it later. Empty if there is none
-    model : (parameters) -> bodies and contact; the same for all values of ``branch``
+    model : (parameters) -> bodies and contact; the same for all values of ``branch``. A scene
+        whose ``method`` needs no increments has neither model nor program
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
     view : (parameters) -> positions of results
     places : (parameters) -> named places and numbers requested at them
@@ -73,8 +80,8 @@ class Scene:
     summary: str
     parameters: type[Any]
     branch: str
-    model: Callable[[Any], Model]
-    program: Callable[[Any], Program]
+    model: Callable[[Any], Model] = _no_increments
+    program: Callable[[Any], Program] = _no_increments
     view: Callable[[Any], View]
     outputs: tuple[Output, ...]
     costs: tuple[Output, ...]

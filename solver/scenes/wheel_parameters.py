@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.materials.elasticity import Elasticity
 from solver.materials.material import Material
 from solver.parameters import Friction, Length, Poisson, described
 from solver.scenes.material_parameters import ContactParameters
@@ -57,20 +58,14 @@ class WheelParameters(ContactParameters):
         if self.friction_law != "coulomb" and self.traction not in (0.0, 1.0):
             allowed = "must be 0 or 1 unless friction_law is coulomb: full slip is friction * force"
             raise ModelError("traction", self.traction, allowed)
-        prescribed = self.control == "creepage"
-        if prescribed and self.traction:
-            raise ModelError("traction", self.traction, "must be 0 with control = creepage")
-        if self.given_creepage and not prescribed:
-            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
+        check_control(self.control, self.traction, self.given_creepage)
 
     @property
     def wheel_material(self) -> Material:
         """The elastic material of the wheel."""
-        given = self.wheel_poisson_ratio
-        return Material(
-            youngs_modulus=self.youngs_modulus * self.wheel_stiffness,
-            poisson_ratio=self.poisson_ratio if given == "same" else float(given),
-        )
+        own = Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
+        wheel = elasticity_of_wheel(own, self.wheel_stiffness, self.wheel_poisson_ratio)
+        return Material(youngs_modulus=wheel.youngs_modulus, poisson_ratio=wheel.poisson_ratio)
 
     @property
     def peak_pressure(self) -> float:
@@ -93,3 +88,28 @@ class WheelParameters(ContactParameters):
     def force(self) -> float:
         """Vertical force pi a p0 / 2 [N per mm of width]."""
         return math.pi * self.half_width * self.peak_pressure / 2
+
+
+def elasticity_of_wheel(
+    own: Elasticity, stiffness: float, poisson_ratio: float | Literal["same"]
+) -> Elasticity:
+    """Return the elastic constants of a wheel on a body with constants ``own``.
+
+    Parameters
+    ----------
+    stiffness : ratio of Young's moduli
+    poisson_ratio : of the wheel, or same
+    """
+    return Elasticity(
+        youngs_modulus=own.youngs_modulus * stiffness,
+        poisson_ratio=own.poisson_ratio if poisson_ratio == "same" else float(poisson_ratio),
+    )
+
+
+def check_control(control: str, traction: float, given_creepage: float) -> None:
+    """Raise `ModelError` if both moment and creepage of a wheel are given, or the wrong one."""
+    prescribed = control == "creepage"
+    if prescribed and traction:
+        raise ModelError("traction", traction, "must be 0 with control = creepage")
+    if given_creepage and not prescribed:
+        raise ModelError("given_creepage", given_creepage, "needs control = creepage")

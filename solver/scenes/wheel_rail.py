@@ -11,7 +11,7 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), chapter 6.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -228,18 +228,11 @@ def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     )
 
 
-def _steady_only(parameters: WheelRailParameters) -> NoReturn:
-    """Raise: the passes have neither a model nor a program of increments."""
-    raise NotImplementedError("wheel_rail is computed by steady passes alone")
-
-
 WHEEL_RAIL = Scene(
     name="wheel_rail",
     summary="railway wheel rolling along an elastic-plastic rail, in three dimensions",
     parameters=WheelRailParameters,
     branch="passes",
-    model=_steady_only,
-    program=_steady_only,
     method=method,
     view=view,
     outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles),

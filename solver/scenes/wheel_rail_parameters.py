@@ -12,6 +12,7 @@ from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.parameters import Fraction, Poisson, Stress, described
 from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
@@ -82,11 +83,7 @@ class WheelRailParameters(MaterialParameters):
         MaterialParameters.__post_init__(self)
         if self.traction and not self.friction:
             raise ModelError("traction", self.traction, "must be 0 without friction")
-        prescribed = self.control == "creepage"
-        if prescribed and self.traction:
-            raise ModelError("traction", self.traction, "must be 0 with control = creepage")
-        if self.given_creepage and not prescribed:
-            raise ModelError("given_creepage", self.given_creepage, "needs control = creepage")
+        check_control(self.control, self.traction, self.given_creepage)
 
     @property
     def idle(self) -> Mapping[str, str]:
@@ -103,11 +100,7 @@ class WheelRailParameters(MaterialParameters):
     @property
     def wheel_elasticity(self) -> Elasticity:
         """Elastic constants of the wheel."""
-        given = self.wheel_poisson_ratio
-        return Elasticity(
-            youngs_modulus=self.youngs_modulus * self.wheel_stiffness,
-            poisson_ratio=self.poisson_ratio if given == "same" else float(given),
-        )
+        return elasticity_of_wheel(self.elasticity, self.wheel_stiffness, self.wheel_poisson_ratio)
 
     @property
     def element_size(self) -> float:
