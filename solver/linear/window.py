@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.linear import solvers as linear
-from solver.linear.schur import SchurComplement
+from solver.linear.schur import SchurComplement, with_block
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,17 +49,13 @@ class Windowed:
         row, column = upper.tocoo().coords
         inside = window[row] & window[column]
         place = np.searchsorted(within, np.arange(len(window)))
-        first, second = np.triu_indices(len(self._outside.boundary))
-        rows = np.concatenate([place[row[inside]], self._outside.boundary[first]])
-        columns = np.concatenate([place[column[inside]], self._outside.boundary[second]])
-        size = len(within)
-        keys, slot = np.unique(rows * size + columns, return_inverse=True)
-        indptr = np.searchsorted(keys, np.arange(size + 1) * size)
         self._entries = np.flatnonzero(inside)
-        self._slot, dense = np.split(slot, [len(self._entries)])
-        self._constant = np.zeros(len(keys))
-        self._constant[dense] = -self._outside.taken[first, second]
-        inner = sparse.csr_array((self._constant, keys % size, indptr), shape=(size, size))
+        boundary, taken = self._outside.boundary, self._outside.taken
+        inner, self._slot, dense = with_block(
+            place[row[inside]], place[column[inside]], boundary, len(within)
+        )
+        self._constant = inner.data
+        self._constant[dense] = -taken[np.triu_indices(len(boundary))]
         self._inner = linear.analyse(inner, linear_solver, place[kept])
 
     def factorise(self, data: Vector) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.prism.state import PrismState
-from solver.steady.flow import INFLOW, LEAST, sweep_of
+from solver.steady.flow import allowed_inflow, sweep_of
 from solver.steady.load import Given
 from solver.steady.passing import passing
 
@@ -93,9 +93,7 @@ class PrismFlow(_Swept):
     @property
     def beyond(self) -> str:
         """Where the window is too small, because points yield at its edge; empty if nowhere."""
-        added, law = self._added, self._law
-        least = LEAST * law.yield_stress / law.elasticity.youngs_modulus
-        most = INFLOW * max(least, self.most_added)
+        added, most = self._added, allowed_inflow(self._law, self.most_added)
         if added[:, 0].max() > most:
             return "ahead"
         return "around" if added[self._rim].max(initial=0.0) > most else ""

@@ -26,7 +26,7 @@ from scipy import sparse
 
 from solver.errors import ModelError
 from solver.linear import solvers as linear
-from solver.linear.schur import Elimination
+from solver.linear.schur import Elimination, with_block
 from solver.prism.section import I_AXIS, I_COMPONENTS
 
 if TYPE_CHECKING:
@@ -206,9 +206,7 @@ class Modes:
 
     def at_station(self, station: int, eigenstress: Array, forces: Array) -> Array:
         """Return the displacement (m,) of the zone's unknowns at a station [mm]; see `solve`."""
-        nodal = self._nodal(eigenstress, forces)
-        u = np.stack([self._factors.solve(right.T, wave) for wave, right in enumerate(nodal)])
-        flat = u.swapaxes(0, 1).reshape(len(self.unknowns), -1)  # each u is (m, 2)
+        flat = self.solved(self._nodal(eigenstress, forces)).reshape(-1, len(self.unknowns)).T
         plain, carrying = (back[:, station] for back in self._back)
         return np.where(self.unknowns % 3 == I_AXIS, flat @ carrying, flat @ plain)
 
@@ -361,17 +359,10 @@ def _factorised(section: Section, zone: Numbers, wavenumbers: Sequence[float]) -
     first, second = np.triu_indices(len(rim))
     place = np.searchsorted(zone, rim)
     row, column = own.pattern.tocoo().coords
-    size = len(zone)
-    keys, slot = np.unique(
-        np.concatenate([row, place[first]]) * size + np.concatenate([column, place[second]]),
-        return_inverse=True,
-    )
-    sparse_slot, dense_slot = np.split(slot, [len(row)])
-    indptr = np.searchsorted(keys, np.arange(size + 1) * size)
-    pattern = sparse.csr_array((np.zeros(len(keys)), keys % size, indptr), shape=(size, size))
+    pattern, sparse_slot, dense_slot = with_block(row, column, place, len(zone))
     factors = linear.analyse_several(pattern, len(wavenumbers))
     for wave, k in enumerate(wavenumbers):
-        data = np.zeros(len(keys))
+        data = np.zeros(pattern.nnz)
         data[sparse_slot] = own.at(k)
         data[dense_slot] -= elimination.taken(outside.at(k))[first, second]
         factors.factorise(data, wave)

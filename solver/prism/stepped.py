@@ -27,7 +27,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
-from solver.steady.flow import INFLOW, LEAST
+from solver.steady.flow import allowed_inflow
 from solver.tensors import deviator
 
 if TYPE_CHECKING:
@@ -227,8 +227,8 @@ class SteppedPrism:
     def _check_rim(self, before: SteppedState, after: SteppedState) -> None:
         """Raise `WindowTooSmall` if points at the rim of the zone have yielded."""
         added = after.accumulated - before.accumulated
-        least = LEAST * self._law.yield_stress / self._law.elasticity.youngs_modulus
-        if added[self._track.rim].max(initial=0.0) > INFLOW * max(least, added.max()):
+        most = allowed_inflow(self._law, float(added.max()))
+        if added[self._track.rim].max(initial=0.0) > most:
             raise WindowTooSmall("the zone is too small: points yield at its rim")
 
 

@@ -70,6 +70,11 @@ class Flow(Sweep, Protocol):
         """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4)."""
 
 
+def allowed_inflow(law: Law, most_added: float) -> float:
+    """Return the plastic strain that points at the edge of a window may add; see `INFLOW`."""
+    return INFLOW * max(LEAST * law.yield_stress / law.elasticity.youngs_modulus, most_added)
+
+
 def usual_parts(law: Law) -> int:
     """Return the usual number of increments between two points of a row."""
     return _COMPILED if isinstance(law, Material) else _STEPPED
@@ -103,7 +108,6 @@ class RowFlow:
     def __init__(self, rows: FlowRows, law: Law, before: Layers, added: Array, parts: int) -> None:
         self._rows, self._law, self._before, self._added = rows, law, before, added
         self._parts = parts
-        self._yield_strain = law.yield_stress / law.elasticity.youngs_modulus
         self._flow = self._of(before, added)
         self.states, self.after = self._flow.states, replace(before, state=self._flow.after)
         plastic = np.moveaxis(self.states.plastic_strain, 0, 2)
@@ -142,10 +146,9 @@ class RowFlow:
         before = self._before.accumulated
         ahead = (self.states.accumulated[:, 0] - before).max()
         below = self.after.accumulated[-1] - before[-1]
-        nothing = LEAST * self._yield_strain
-        if ahead > INFLOW * max(nothing, self.most_added):
+        if ahead > allowed_inflow(self._law, self.most_added):
             return "ahead"
-        return "below" if below > INFLOW * nothing else ""
+        return "below" if below > allowed_inflow(self._law, 0.0) else ""
 
     @property
     def ago(self) -> PlasticState:
