@@ -214,16 +214,26 @@ def track_of(own: RailGeometry) -> PrismTrack:
     )  # fmt: skip
 
 
-def wheel_on(track: PrismTrack, parameters: WheelRailParameters) -> RollingPatch:
-    """Return the wheel on a rail."""
-    p, profile = parameters, wheel_profile(parameters)
-    wheel = ProfiledWheel(
-        profile=lambda z: profile.height(z - p.lateral_position),
-        radius=p.wheel_radius,
-        elasticity=p.wheel_elasticity,
-    )
-    return RollingPatch(
-        track.grid, track.compliance, wheel, friction=p.friction, force=p.load,
-        drive=None if p.control == "creepage" else p.traction,
-        creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
-    )  # fmt: skip
+class RolledRail:
+    """A wheel on a rail, as `solver.scenes.prism_passes.RolledPrism`."""
+
+    def __init__(self, parameters: WheelRailParameters) -> None:
+        self.parameters = parameters
+
+    def track(self, reach: float) -> PrismTrack:
+        """See `RolledPrism`."""
+        return track_of(geometry(self.parameters, reach))
+
+    def load(self, track: PrismTrack) -> RollingPatch:
+        """See `RolledPrism`."""
+        p, profile = self.parameters, wheel_profile(self.parameters)
+        wheel = ProfiledWheel(
+            profile=lambda z: profile.height(z - p.lateral_position),
+            radius=p.wheel_radius,
+            elasticity=p.wheel_elasticity,
+        )
+        return RollingPatch(
+            track.grid, track.compliance, wheel, friction=p.friction, force=p.load,
+            drive=None if p.control == "creepage" else p.traction,
+            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
+        )  # fmt: skip

@@ -14,7 +14,6 @@ from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.scenes import SCENES
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_passes import by_passes
 from solver.scenes.wheel_rail_track import expected_contact
 from tests.verification.hertz_ellipse import HertzEllipse
 
@@ -171,7 +170,7 @@ def test_the_zone_is_at_the_contact() -> None:
 
 
 def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.scenes.wheel_rail_passes._REACHES", (0.6, 1.0))
+    monkeypatch.setattr("solver.scenes.prism_passes._REACHES", (0.6, 1.0))
     again = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
     (record,) = again
     assert record.status is Status.OK
@@ -196,7 +195,7 @@ def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
 def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
     parameters = WheelRailParameters(lateral_position=8.0, accuracy="draft")
     with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must keep the contact"):
-        next(by_passes(SCENE, [parameters], lambda share: None))
+        next(SCENE.method(parameters)(SCENE, [parameters], lambda share: None))
 
 
 @pytest.mark.parametrize(

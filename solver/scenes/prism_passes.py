@@ -1,11 +1,11 @@
-"""Runs of the wheel-rail scene: steady passes of a wheel over an endless rail."""
+"""Runs of scenes in three dimensions: steady passes of a load over an endless prism."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -20,21 +20,19 @@ from solver.results.audit.prism_values import OfPrismPass
 from solver.results.prism import PatchTractions, PrismBody
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
-from solver.scenes.wheel_rail_track import geometry, track_of, wheel_on
 from solver.steady.passing import passing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
+    from typing import Any
 
     from numpy.typing import NDArray
 
-    from solver.prism.patch import RollingPatch
-    from solver.prism.patch_contact import PatchContact
+    from solver.prism.patch_contact import PatchContact, PatchLoad
     from solver.prism.state import PrismState
     from solver.prism.track import PrismTrack
     from solver.results.audit.report import Audit
     from solver.scenes.scene import Monitor, Scene
-    from solver.scenes.wheel_rail_parameters import WheelRailParameters
     from solver.steady import Pass
 
     Array = NDArray[np.float64]
@@ -61,21 +59,45 @@ class PassTrace:
     surface: float
 
 
+class RolledPrism(Protocol):
+    """What a scene says of its prism.
+
+    Attributes
+    ----------
+    parameters : parameters of the scene
+    """
+
+    parameters: Any
+
+    def track(self, reach: float) -> PrismTrack:
+        """Return the prism; ``reach`` is the ratio of zone and window to their usual size.
+
+        Raises `ModelError` if the section has no room for them.
+        """
+
+    def load(self, track: PrismTrack) -> PatchLoad:
+        """Return the load of a pass over the prism."""
+
+
 def by_passes(
-    scene: Scene, runs: Sequence[WheelRailParameters], monitor: Monitor
+    scene: Scene, runs: Sequence[Any], monitor: Monitor, *, rolled: Callable[[Any], RolledPrism]
 ) -> Iterator[FinishedRun]:
     """Compute pass after pass; yield the runs, which differ in the number of passes.
 
     If yielding or contact reaches the edge of zone or window, begin again with larger ones.
+
+    Parameters
+    ----------
+    rolled : (parameters of a scene) -> its prism and loads
     """
-    remaining = list(runs)
-    path = _Path(scene, runs[-1], _REACHES[0])
+    remaining, prism = list(runs), rolled(runs[-1])
+    path = _Path(scene, prism, _REACHES[0])
     for reach in _REACHES:
         if reach > _REACHES[0]:
             try:
-                path = _Path(scene, runs[-1], reach)
+                path = _Path(scene, prism, reach)
             except ModelError:
-                break  # a zone of this size leaves the head: keep the error of the smaller one
+                break  # a zone of this size does not fit: keep the error of the smaller one
         for run in path.runs(remaining, monitor):
             remaining.pop(0)
             yield run
@@ -92,10 +114,12 @@ class _Path:
     error : why there are no more, or None
     """
 
-    def __init__(self, scene: Scene, last: WheelRailParameters, reach: float) -> None:
+    def __init__(self, scene: Scene, prism: RolledPrism, reach: float) -> None:
         self._started, self._elsewhere = time.process_time(), 0.0
-        self._last, self._law, view = last, last.material(), scene.view(last)
-        self._track = track_of(geometry(last, reach))
+        last = prism.parameters
+        self._prism, self._last = prism, last
+        self._law, view = last.material(), scene.view(last)
+        self._track = prism.track(reach)
         self._body = PrismBody(self._track, self._law, view.profile_body)
         self._samples = Samples(self._body, view)
         self._found: Pass[PrismState] | None = None
@@ -104,7 +128,7 @@ class _Path:
         self._traces: list[PassTrace] = []
         self.error: NotConverged | None = None
 
-    def runs(self, runs: Sequence[WheelRailParameters], monitor: Monitor) -> Iterator[FinishedRun]:
+    def runs(self, runs: Sequence[Any], monitor: Monitor) -> Iterator[FinishedRun]:
         """Yield those of the runs whose passes are found; ``error`` says why others are not."""
         remaining = list(runs)
         try:
@@ -120,16 +144,16 @@ class _Path:
             self.error = failure
 
     @cached_property
-    def _wheel(self) -> RollingPatch:
-        """The wheel on the rail, the same in every pass."""
-        return wheel_on(self._track, self._last)
+    def _load(self) -> PatchLoad:
+        """The load, the same in every pass."""
+        return self._prism.load(self._track)
 
     def _roll(self) -> None:
         """Compute the next pass."""
         found = self._found
         before = self._track.virgin(self._law) if found is None else found.after
         with one_thread():
-            load = PatchPassing(self._wheel, before.displacement)
+            load = PatchPassing(self._load, before.displacement)
             guess = None if found is None else found.strain
             self._found = passing(self._track, self._law, load, before, guess)
         self._previous = found
@@ -144,7 +168,7 @@ class _Path:
             )
         )
 
-    def finished(self, run: WheelRailParameters) -> FinishedRun:
+    def finished(self, run: Any) -> FinishedRun:
         """Return a run with the results of the last pass found."""
         found, previous, view = self._found, self._previous, self._samples.view
         points, source = {}, None
@@ -177,7 +201,7 @@ class _Path:
 
 @lru_cache(maxsize=2)
 def _plain(track: PrismTrack) -> PlainPrism:
-    """Return the second evaluation of a rail for the audit; all runs over it share it."""
+    """Return the second evaluation of a prism for the audit; all runs over it share it."""
     return PlainPrism(track)
 
 
