@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -68,6 +68,8 @@ class Scene:
     refinement : (parameters) -> how increments are halved, or None for those of the program
     effort : (parameters, values of ``branch``) -> work of the loading path, counted without a mesh
         in microseconds; without it a study is estimated from its runs alone
+    setup : (parameters) -> what an expensive set-up depends on, which a process keeps for its next
+        run; a study gives runs with an equal one to the same worker. It must take milliseconds
     warnings : (run) -> texts for the user, added to the message of its record
     advice : status -> what the user can do
     quantities : quantities that only this scene declares
@@ -91,6 +93,7 @@ class Scene:
     watch: Callable[[Any, Samples, Any], Any] | None = None
     refinement: Callable[[Any], StepRefinement | None] | None = None
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
+    setup: Callable[[Any], Hashable] | None = None
     warnings: Callable[[FinishedRun], tuple[str, ...]] | None = None
     advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
     quantities: tuple[Quantity, ...] = ()

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.results.run import FinishedRun, Values
+    from solver.scenes.wheel_rail_track import RailGeometry
 
     Array = NDArray[np.float64]
 
@@ -80,6 +81,13 @@ def axle(run: FinishedRun) -> Values:
     return {AXLE_HEIGHT: contact.height + expected_contact(run.parameters).gap}
 
 
+def setup(parameters: WheelRailParameters) -> RailGeometry:
+    """Return the geometry of the rail, which decides its set-up."""
+    from solver.scenes.wheel_rail_track import geometry
+
+    return geometry(parameters)
+
+
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     from solver.scenes.wheel_rail_track import geometry, section_of
@@ -103,6 +111,7 @@ WHEEL_RAIL = Scene(
     outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, axle),
     costs=(cost,),
     effort=effort,
+    setup=setup,
     advice={
         Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
         Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy or position",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,11 +13,13 @@ from studies.definition.cases import LoadingPath
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
+from studies.execution.bundles import setup_of
 from studies.execution.pace import pace_of
 from studies.storage.store import Store
 
-_PER_RUN, _PER_PATH = 0.5, 1.0
-"""Seconds for the results, audit and file of a run; for the mesh and the operators of a path."""
+_PER_RUN, _PER_SETUP = 0.5, 1.0
+"""Seconds for the results, audit and file of a run; for the mesh and the operators, which a path
+has alone or shares with others of equal `Scene.setup`."""
 _BYTES, _COMBINED = 1.1e6, 1.8
 """Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
@@ -124,10 +126,12 @@ def estimate(study: Study, store: Store) -> Estimate:
     scene = study.problem
     pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
-    seconds = [0.0, 0.0, 0.0]
+    seconds, shared = [0.0, 0.0, 0.0], set[Hashable]()
     for path, missing in _missing(study, store):
         to_compute += len(missing)
         paths += 1
+        if scene.setup is not None:
+            shared.add(setup_of(scene, path))
         if scene.effort is not None:
             effort = scene.effort(path.parameters, missing)
             unknowns = max(unknowns, effort.unknowns)
@@ -135,7 +139,8 @@ def estimate(study: Study, store: Store) -> Estimate:
             longest = max(longest, effort.most_increments)
             more = pace.seconds(effort.unknowns, effort.increments, effort.most_increments)
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
-    fixed = _PER_RUN * to_compute + _PER_PATH * paths
+    setups = paths if scene.setup is None else len(shared)
+    fixed = _PER_RUN * to_compute + _PER_SETUP * setups
     low, likely, high = (fixed + each for each in seconds)
     known = scene.effort is not None
     return Estimate(

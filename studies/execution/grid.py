@@ -85,6 +85,13 @@ class Grid:
     def __exit__(self, *reason: object) -> None:
         self._client.close()
 
+    @property
+    def workers(self) -> int:
+        """Number of tasks that the workers compute at a time; 0 if the scheduler is silent."""
+        with contextlib.suppress(OSError, TimeoutError):
+            return sum(_asked(self._client, "ncores", workers=None).values())
+        return 0
+
     def run(
         self,
         function: Function,
@@ -96,8 +103,11 @@ class Grid:
         """Run ``function(task, report, should_stop)`` for every task; yield what happens.
 
         Only so many tasks as there are workers, and a few more, are at the scheduler at a time:
-        others who use it get their turn, and `tasks` may be a long generator. A `function` that
-        raises `Unfit` is called again later, on whichever worker is free.
+        others who use it get their turn, and `tasks` may be a long generator. If it yields None
+        there is no task for now, and it is asked again when another one ends. A report with a
+        ``path`` and its ``fraction`` says which loading path of the task is computed; limits hold
+        for each path. A `function` that raises `Unfit` is called again later, on whichever worker
+        is free.
 
         When `should_stop` turns true, waiting tasks are dropped and running ones stopped;
         the iteration ends when these have, or soon.
@@ -180,6 +190,8 @@ class _HandedOut:
                 ticket.starts += 1
             elif content and ticket.worker:
                 ticket.computing = True
+                if "fraction" in content:
+                    ticket.walks(content["path"])
                 yield from self._watch.goes_on()
         if content:
             yield Message(content)
@@ -229,15 +241,9 @@ class _HandedOut:
     def _processing(self) -> dict[str, Any] | None:
         """Return the task keys at each worker; None if the scheduler does not answer."""
         with contextlib.suppress(OSError, TimeoutError):
-            self._room = _SPARE + sum(self._ask("ncores", workers=None).values())
-            return dict(self._ask("processing", workers=None))
+            self._room = _SPARE + sum(_asked(self._client, "ncores", workers=None).values())
+            return dict(_asked(self._client, "processing", workers=None))
         return None
-
-    def _ask(self, what: str, seconds: float = _ANSWER, **content: Any) -> Any:
-        """Call the scheduler, which must answer in time."""
-        return self._client.sync(
-            getattr(self._client.scheduler, what), callback_timeout=seconds, **content
-        )
 
     def _replace(self, worker: str) -> None:
         """Restart a worker, without waiting for it."""
@@ -248,9 +254,10 @@ class _HandedOut:
 
         def restart() -> None:
             with contextlib.suppress(Exception):  # it is removed if its nanny is gone too
-                self._ask(
-                    "restart_workers", 2 * _RESTART, workers=[worker], timeout=_RESTART,
-                    wait_for_workers=False, on_error="return", stimulus_id=self._topic,
+                _asked(
+                    self._client, "restart_workers", 2 * _RESTART, workers=[worker],
+                    timeout=_RESTART, wait_for_workers=False, on_error="return",
+                    stimulus_id=self._topic,
                 )  # fmt: skip
 
         self._replacing.append(threading.Thread(target=restart, daemon=True))
@@ -269,6 +276,11 @@ class _HandedOut:
                     yield Message(item["content"])
                 elif isinstance(item, dict) and item["kind"] == "ended":
                     running.discard(item["key"])
+
+
+def _asked(client: Client, what: str, seconds: float = _ANSWER, **content: Any) -> Any:
+    """Call the scheduler, which must answer in time, and return its answer."""
+    return client.sync(getattr(client.scheduler, what), callback_timeout=seconds, **content)
 
 
 def _drop(ticket: Ticket) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
@@ -18,6 +19,7 @@ from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
+from studies.execution.bundles import bundles
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
@@ -25,6 +27,9 @@ from studies.execution.result import result
 from studies.execution.task import PathTask, walk
 from studies.execution.watch import Waiting
 from studies.storage.store import Store
+
+if TYPE_CHECKING:
+    from studies.execution.grid import Grid
 
 DEFAULT = Limits()
 """The limits of a study that sets none."""
@@ -200,16 +205,19 @@ class _Work:
     priority: int
     emit: Callable[[StudyEvent], None]
     computed: set[str] = field(default_factory=set)
+    _left: deque[PathTask] = field(default_factory=deque)
     _walked: int = 0
     _walking: dict[str, tuple[int, float]] = field(default_factory=dict)
 
     def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
-        """Run one task for each path that lacks runs."""
+        """Run a task for each bundle of paths that lack runs."""
         from studies.execution.grid import Finished, Grid, Message  # dask takes a second to import
 
+        grid: Grid | None = None
         unwritable: list[StoreFull | StudyError] = []
         with ExitStack() as opening:
-            tasks = self._tasks(opening.enter_context(proof_of(self.store, self.study.id)))
+            proof = opening.enter_context(proof_of(self.store, self.study.id))
+            tasks = self._tasks(proof, lambda: grid.workers if grid else workers)
             if access is None:
                 first = list(islice(tasks, workers))
                 access = opening.enter_context(own_workers(len(first), self.limits.memory))
@@ -219,7 +227,7 @@ class _Work:
             def leave() -> bool:
                 return bool(unwritable) or stop()
 
-            items = grid.run(walk, tasks, leave, self.limits, self.priority)
+            items = grid.run(walk, self._with_left(tasks), leave, self.limits, self.priority)
             for item in opening.enter_context(closing(items)):
                 match item:
                     case Waiting(reason):
@@ -236,13 +244,18 @@ class _Work:
                 raise StoreFull(directory)
             raise Unusable("directory", directory, error.allowed)
 
-    def _tasks(self, proof: Proof) -> Iterator[PathTask]:
+    def _tasks(self, proof: Proof, workers: Callable[[], int]) -> Iterator[PathTask]:
         scene, directory = self.study.problem, self.store.directory.resolve()
-        for path in map(self._rest, self.study.paths()):
-            if path.cases:
-                self._walking[path.id] = (len(path.cases), 0.0)
-                stale = self.store.modified(case.id for case in path.cases)
-                yield PathTask(scene, path, directory, solver_hash(), self.study.keep, proof, stale)
+        lacking = (path for path in map(self._rest, self.study.paths()) if path.cases)
+        for paths in bundles(scene, lacking, workers):
+            self._walking.update({path.id: (len(path.cases), 0.0) for path in paths})
+            task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof)
+            yield replace(task, stale=self.store.modified(case.id for case in task.cases))
+
+    def _with_left(self, tasks: Iterator[PathTask]) -> Iterator[PathTask | None]:
+        """Yield tasks, first those that failed ones left; None if there is none for now."""
+        while True:
+            yield self._left.popleft() if self._left else next(tasks, None)
 
     def _rest(self, path: LoadingPath) -> LoadingPath:
         cases = tuple(case for case in path.cases if case.id in self.wanted)
@@ -274,16 +287,22 @@ class _Work:
         self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
 
     def _close(self, task: PathTask, error: Exception | None) -> None:
-        """Record the runs of a path without a report; as ``error`` if the path failed."""
-        self._walked += self._walking.pop(task.path.id)[0]
+        """Record the runs of a task without a report.
+
+        If it failed, this is the fault of its first path that is not complete: its other runs are
+        recorded as ``error``, and the paths behind it make a new task.
+        """
         stored = task.stored(self.store)
-        for case in task.path.cases:
-            if case.id in self.computed:
-                continue
-            if case.id in stored:
-                self._keep(task.path.id, [stored[case.id]])
-            elif error is not None:
-                self._keep(task.path.id, [self.store.write_run(case, str(error))])
+        for number, path in enumerate(task.paths, 1):
+            self._walked += self._walking.pop(path.id)[0]
+            lacking = [case for case in path.cases if case.id not in self.computed]
+            self._keep(path.id, [stored[case.id] for case in lacking if case.id in stored])
+            failed = [case for case in lacking if case.id not in stored]
+            if failed and error is not None:
+                self._keep(path.id, [self.store.write_run(case, str(error)) for case in failed])
+                if rest := task.paths[number:]:
+                    self._left.append(replace(task, paths=rest))
+                return
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""

@@ -1,4 +1,4 @@
-"""The task of a worker: compute one loading path, and write each run as soon as it is done."""
+"""The task of a worker: compute loading paths, and write each run as soon as it is done."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ REFUSAL_SECONDS = 1.0
 
 @dataclass(frozen=True, slots=True)
 class PathTask:
-    """A loading path to compute, or the rest of one, and the directory of its runs.
+    """Loading paths to compute one after the other, and the directory of their runs.
 
     Attributes
     ----------
-    scene, path : the scene and its loading path
+    scene, paths : the scene and its loading paths, or the rest of them
     directory : directory of the store
     source : `solver_hash` of the process that started the study; a worker with another one refuses
         the task, and the study waits for another worker
@@ -45,7 +45,7 @@ class PathTask:
     """
 
     scene: Scene
-    path: LoadingPath
+    paths: tuple[LoadingPath, ...]
     directory: Path
     source: str
     keep: str = ""
@@ -54,11 +54,16 @@ class PathTask:
 
     def __dask_tokenize__(self) -> tuple[Any, ...]:
         """Return an identity of this task, so that dask need not hash its content."""
-        return type(self).__name__, self.source, [case.id for case in self.path.cases]
+        return type(self).__name__, self.source, [case.id for case in self.cases]
+
+    @property
+    def cases(self) -> list[Case]:
+        """The cases of all paths."""
+        return [case for path in self.paths for case in path.cases]
 
     def stored(self, store: Store) -> dict[str, dict[str, Any]]:
         """Return, by id, the rows of the runs that this task has stored."""
-        times = store.modified(case.id for case in self.path.cases)
+        times = store.modified(case.id for case in self.cases)
         fresh = [run_id for run_id, at in times.items() if at != self.stale.get(run_id)]
         return {run_id: row for run_id in fresh if (row := store.found(run_id))}
 
@@ -70,12 +75,13 @@ class StopAsked(Exception):
 def walk(
     task: PathTask, report: Callable[[dict[str, Any]], None], should_stop: Callable[[], bool]
 ) -> None:
-    """Compute the runs of a loading path, and report their catalogue rows.
+    """Compute the runs of loading paths, and report their catalogue rows.
 
     A run whose file exists is not computed again, so that the next worker continues after one that
     died. If the scene raises an error, the runs without a record are written with the status
     ``error`` and the error as their message. A record that cannot be written, or whose file would
-    differ, gives only its own run this status.
+    differ, gives only its own run this status. The next path follows when all runs of a path are
+    stored: of a task that ends early, the first path that lacks one was being computed.
 
     Raises
     ------
@@ -93,10 +99,25 @@ def walk(
             "the same one for both and restart the worker"
         )
     store = Store(task.directory)
+    stored = task.stored(store)
+    with contextlib.suppress(StopAsked):
+        for path in task.paths:
+            _walk(task, path, store, stored, report, should_stop)
+
+
+def _walk(
+    task: PathTask,
+    path: LoadingPath,
+    store: Store,
+    stored: Mapping[str, dict[str, Any]],
+    report: Callable[[dict[str, Any]], None],
+    should_stop: Callable[[], bool],
+) -> None:
+    """Compute those runs of a loading path that are not stored; see `walk`."""
 
     def keep(row: dict[str, Any]) -> None:
         with contextlib.suppress(Exception):  # the file has the row too
-            report({"path": task.path.id, "row": row})
+            report({"path": path.id, "row": row})
 
     reported, since = -1.0, 0.0
 
@@ -105,7 +126,7 @@ def walk(
         now = time.monotonic()
         try:
             if fraction >= min(reported + _WORTH, 1.0) or now >= since + _SILENCE:
-                report({"path": task.path.id, "fraction": float(fraction)})
+                report({"path": path.id, "fraction": float(fraction)})
                 reported, since = fraction, now
             stop = should_stop()
         except Exception as error:  # the worker is closing, which is not the fault of a run
@@ -113,24 +134,22 @@ def walk(
         if stop:
             raise StopAsked
 
-    stored = task.stored(store)
-    for row in stored.values():
-        keep(row)
+    for case in path.cases:
+        if case.id in stored:
+            keep(stored[case.id])
     branch = task.scene.branch  # of a scene without one there is a single run
-    cases = (case for case in task.path.cases if case.id not in stored)
+    cases = (case for case in path.cases if case.id not in stored)
     owed: dict[Any, Case] = {case.values.get(branch): case for case in cases}
     reason = NO_RECORD
     try:
         if owed:
             monitor(0.0)
-            for record in task.scene.path(task.path.parameters, list(owed), monitor):
+            for record in task.scene.path(path.parameters, list(owed), monitor):
                 value = getattr(record.parameters, branch, None)
                 row = _written(store, task, owed[value], record)
                 del owed[value]
                 keep(row)
-    except StopAsked:
-        return
-    except (StoreFull, StudyError):
+    except (StopAsked, StoreFull, StudyError):
         raise
     except Exception as error:
         reason = _reason(error)

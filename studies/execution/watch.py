@@ -35,19 +35,27 @@ class Ticket:
     ----------
     task, future : the task, and its dask future
     worker : the worker that runs it; empty while it waits for a worker
-    begun, heard : time of its start there, and of its last report [s]
+    path : the loading path of the task that is computed; empty until the first is reported
+    begun, heard : time of the start of this path there, and of its last report [s]
     computing : whether it has reported anything there
-    starts, rounds : how often a worker began it, and how often dask gave it up
+    starts, rounds : how often a worker began this path, and how often dask gave it up
     """
 
     task: Any
     future: Any = None
     worker: str = ""
+    path: str = ""
     begun: float = 0.0
     heard: float = 0.0
     computing: bool = False
     starts: int = 0
     rounds: int = 0
+
+    def walks(self, path: str) -> None:
+        """Note that a path of the task is computed; time and starts count from its begin."""
+        if self.path and path != self.path:
+            self.begun, self.starts, self.rounds = self.heard, 1, 0
+        self.path = path
 
     def overdue(self, limits: Limits) -> str:
         """Return the limit that the task has exceeded, as text; empty if none."""

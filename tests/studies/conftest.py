@@ -29,7 +29,7 @@ def compute_here(study: Study, store: Store, scene: Scene = FAKE) -> list[dict[s
     """Compute a study in this process, without a grid; return what the tasks reported."""
     reports: list[dict[str, Any]] = []
     for path in study.paths():
-        task = PathTask(scene, path, store.directory, solver_hash(), study.keep)
+        task = PathTask(scene, (path,), store.directory, solver_hash(), study.keep)
         walk(task, reports.append, lambda: False)
     store.reconcile()
     store.save_study(study)

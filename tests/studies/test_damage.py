@@ -49,7 +49,7 @@ def repeat(study: Study, store: Store, monkeypatch: pytest.MonkeyPatch) -> list[
     """Run a study again with the tasks done in this process; return what was computed."""
 
     def compute(work: object, workers: int, scheduler: object, stop: object) -> None:
-        for task in work._tasks(None):
+        for task in work._tasks(None, lambda: workers):
             walk(task, work._hear, lambda: False)
             work._close(task, None)
 
@@ -324,7 +324,7 @@ def test_a_worker_that_is_cut_off_in_mid_path_stores_no_run_as_failed(store: Sto
         if len(told) > 3:
             raise RuntimeError("ConnectionPool is closed")
 
-    walk(PathTask(FAKE, path, store.directory, solver_hash()), report, lambda: False)
+    walk(PathTask(FAKE, (path,), store.directory, solver_hash()), report, lambda: False)
     assert not [content for content in told if "row" in content]
     assert not (store.directory / "runs").exists()
 
@@ -335,7 +335,7 @@ def test_a_repeat_replaces_old_files_once_though_a_worker_dies_in_between(store:
     (path,) = study.paths()
     ids = [case.id for case in study.cases()]
     before = store.modified(ids)
-    task = PathTask(FAKE, path, store.directory, solver_hash(), stale=before)
+    task = PathTask(FAKE, (path,), store.directory, solver_hash(), stale=before)
     walk(task, lambda _: None, lambda: False)
     after = store.modified(ids)
     assert all(after[run_id] != before[run_id] for run_id in ids)

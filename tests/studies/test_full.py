@@ -94,7 +94,7 @@ def test_a_worker_without_room_stores_no_run_as_failed(store: Store, limited: Li
     reports: list[dict[str, object]] = []
     limited(100_000)
     with pytest.raises(StoreFull, match=str(store.directory)):
-        walk(PathTask(FAKE, path, store.directory, solver_hash()), reports.append, lambda: False)
+        walk(PathTask(FAKE, (path,), store.directory, solver_hash()), reports.append, lambda: False)
     assert list((store.directory / "runs").iterdir()) == []
     assert not any("row" in each for each in reports)
 

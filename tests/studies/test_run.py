@@ -211,7 +211,7 @@ def test_the_command_builds_a_parameter_object_once_for_each_case_and_each_path(
 
 def test_a_worker_with_another_solver_refuses(store: Store) -> None:
     (path, *_) = fake_study().paths()
-    task = PathTask(FAKE, path, store.directory, "0" * 32)
+    task = PathTask(FAKE, (path,), store.directory, "0" * 32)
     assert task.source != solver_hash()
     with pytest.raises(Unfit, match="another version of the solver"):
         walk(task, lambda content: None, lambda: False)

@@ -140,5 +140,5 @@ def walked(
     (path,) = COARSE.paths()
     monkeypatch.setattr(Scene, "path", lambda *_: iter([record]))
     heard: list[dict[str, Any]] = []
-    walk(PathTask(case.scene, path, directory, solver_hash()), heard.append, lambda: False)
+    walk(PathTask(case.scene, (path,), directory, solver_hash()), heard.append, lambda: False)
     return next(each["row"] for each in heard if "row" in each)
