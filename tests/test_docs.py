@@ -61,6 +61,7 @@ RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 FEWER = {
     "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
     "elastic-punch.toml": {"friction": [0.0, 0.4]},
+    "wheel-rail-lateral.toml": {"lateral_position": [-7.5, -3.0], "traction": [-0.75, 0.75]},
     "shaft-hub.toml": {"friction": [0.0, 0.2], "loading": ["interference"]},
 }
 """Axes of studies, and those of their values that the pages look at, with one more."""
