@@ -38,11 +38,13 @@ class PatchPassing:
     ----------
     load : the load
     moved : (m, 3) displacement of the surface before the pass [mm]
+    start : a contact to begin from, for instance that of a similar pass
     """
 
-    def __init__(self, load: PatchLoad, moved: Array | None = None) -> None:
-        self._load, self._moved = load, moved
-        self._last: PatchContact | None = None
+    def __init__(
+        self, load: PatchLoad, moved: Array | None = None, start: PatchContact | None = None
+    ) -> None:
+        self._load, self._moved, self._last = load, moved, start
 
     def on(self, u: PrismField) -> AppliedPatch:
         """See `PassingLoad`."""

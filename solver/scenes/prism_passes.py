@@ -153,9 +153,9 @@ class _Path:
         found = self._found
         before = self._track.virgin(self._law) if found is None else found.after
         with one_thread():
-            load = PatchPassing(self._load, before.displacement)
-            guess = None if found is None else found.strain
-            self._found = passing(self._track, self._law, load, before, guess)
+            strain, contact = (None, None) if found is None else (found.strain, contact_of(found))
+            load = PatchPassing(self._load, before.displacement, contact)
+            self._found = passing(self._track, self._law, load, before, strain)
         self._previous = found
         self._steps.append(max(self._found.steps, 1))
         after = self._found.after

@@ -47,7 +47,9 @@ class CompiledSweep:
         )
         self._each = (0,) * strain.shape[2]
         before = np.ascontiguousarray(start.plastic_strain.T), start.accumulated
-        plastic, total, self._path = flow(strain, *before, self._law, parts, self._each)
+        # numpy asks for zeros, and gets memory that costs nothing where nothing is written
+        self._path = np.zeros((strain.shape[0], strain.shape[1] - 1, parts, strain.shape[2] + 2))
+        plastic, total = flow(strain, *before, self._law, self._path, self._each)
         self.states = PlasticState(np.moveaxis(plastic, 2, 0), total)
 
     @property
@@ -88,13 +90,13 @@ class CompiledFlow(CompiledSweep):
 
 
 @njit(cache=True, inline="always")
-def _return(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
-    """Update `plastic` (n,) by an increment to `strain`; return the accumulated strain.
+def _trial(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+    """Return the norm of the trial stress, and by how much it is beyond the yield surface.
 
-    `step` (n + 2,) receives the flow direction, the multiplier and the norm of the trial stress.
+    `step` receives the trial stress.
     """
     n = len(each)
-    double_shear, kappa, Hi, modulus, Re = law
+    double_shear, kappa, Hi, _, Re = law
     mean = (strain[0] + strain[1] + strain[2]) / 3.0
     size = 0.0
     for k in range(n):
@@ -102,12 +104,22 @@ def _return(strain, plastic, accumulated, law, step, each):  # type: ignore[no-u
         step[k] = trial
         size += trial * trial
     size = math.sqrt(size)
-    beyond = size - SQRT23 * (Re + Hi * accumulated)
+    return size, size - SQRT23 * (Re + Hi * accumulated)
+
+
+@njit(cache=True, inline="always")
+def _return(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+    """Update `plastic` (n,) by an increment to `strain`; return the accumulated strain.
+
+    `step` (n + 2,) receives the flow direction, the multiplier and the norm of the trial stress.
+    """
+    n = len(each)
+    size, beyond = _trial(strain, plastic, accumulated, law, step, each)
     step[n + 1] = size
     if beyond <= 0.0:
         step[n] = 0.0
         return accumulated
-    gamma = beyond / modulus
+    gamma = beyond / law[3]
     step[n] = gamma
     for k in range(n):
         step[k] /= size
@@ -137,41 +149,47 @@ def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignor
 
 
 @njit(cache=True)
-def flow(strain, plastic, accumulated, law, parts, each):  # type: ignore[no-untyped-def]
+def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-untyped-def]
     """Let material flow along rows.
+
+    From one column to the next strain grows in equal increments. If the state at both ends is
+    within the yield surface, which is convex, all increments are elastic.
 
     Parameters
     ----------
     strain : (n_rows, n_columns + 1, n) Mandel, downstream; the first column is before the pass
     plastic, accumulated : (n_rows, n) and (n_rows,), before the pass
     law : 2 G, 2 G + 2/3 Hk, Hi, 2 G + 2/3 H, Re [MPa]
-    parts : number of equal increments of strain from one column to the next
+    steps : (n_rows, n_columns, parts, n + 2) zeros, for the increments from one column to the next;
+        receives what `flow_along` needs
     each : a tuple with n entries, see above
 
     Returns
     -------
     plastic strain (n_rows, n_columns, n) and accumulated strain (n_rows, n_columns) at the columns
-    steps (n_rows, n_columns, parts, n + 2) : for `flow_along`
     """
     n = len(each)
-    n_rows, n_columns = strain.shape[0], strain.shape[1] - 1
+    n_rows, n_columns, parts = steps.shape[:3]
     flowed = np.empty((n_rows, n_columns, n))
     total = np.empty((n_rows, n_columns))
-    steps = np.empty((n_rows, n_columns, parts, n + 2))
-    now, e = np.empty(n), np.empty(n)
+    now, e, trial = np.empty(n), np.empty(n), np.empty(n)
     for row in range(n_rows):
         now[:] = plastic[row]
         a = accumulated[row]
+        inside = _trial(strain[row, 0], now, a, law, trial, each)[1] <= 0.0
         for column in range(n_columns):
-            for part in range(parts):
-                share = (part + 1.0) / parts
-                for k in range(n):
-                    before = strain[row, column, k]
-                    e[k] = before + share * (strain[row, column + 1, k] - before)
-                a = _return(e, now, a, law, steps[row, column, part], each)
+            elastic = _trial(strain[row, column + 1], now, a, law, trial, each)[1] <= 0.0
+            if not (inside and elastic):
+                for part in range(parts):
+                    share = (part + 1.0) / parts
+                    for k in range(n):
+                        before = strain[row, column, k]
+                        e[k] = before + share * (strain[row, column + 1, k] - before)
+                    a = _return(e, now, a, law, steps[row, column, part], each)
+            inside = True
             flowed[row, column] = now
             total[row, column] = a
-    return flowed, total, steps
+    return flowed, total
 
 
 @njit(cache=True)
