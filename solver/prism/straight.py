@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InitialStress:
+class SettledStress:
     """Stress at all n points of a section before any load, in equilibrium.
 
     Attributes
@@ -70,7 +70,7 @@ class StraightPrism:
         section = self._section
         return np.einsum("eqab,eb->eqa", section.B0, u[section.dofs]).reshape(-1, 6)
 
-    def settled(self, given: Array, held: Array) -> InitialStress:
+    def settled(self, given: Array, held: Array) -> SettledStress:
         """Return the initial stress that is left when given stresses come to equilibrium.
 
         Parameters
@@ -88,7 +88,7 @@ class StraightPrism:
         shares = np.linalg.solve(resultants, -np.tensordot(free, weighted, 2))
         free = free + np.tensordot(np.stack(each, axis=-1), shares, 1)
         stress = free + self._relaxed(held)
-        return InitialStress(
+        return SettledStress(
             given=given,
             held=held,
             stress=stress,

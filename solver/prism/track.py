@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from solver.materials.elasticity import Elasticity
     from solver.materials.law import Law
     from solver.prism.section import Section
-    from solver.prism.straight import InitialStress
+    from solver.prism.straight import SettledStress
 
     Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class PrismTrack:
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
         self.rim = _rim(section, zone, self.modes.points)
-        self.initial: InitialStress | None = None
+        self.initial: SettledStress | None = None
 
     @property
     def elasticity(self) -> Elasticity:
