@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
+from scipy.spatial import cKDTree
 
 from solver import ModelError, Record
+from solver.results.export import to_meshio
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.scenes import SCENES
@@ -191,6 +193,34 @@ def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
     assert record.status is Status.LIMIT_LOAD
     assert "grows without bound" in record.message
     assert record.scalars["degrees_of_freedom"] > 0
+
+
+def test_fields_around_the_load_are_those_of_the_section_where_it_is() -> None:
+    """Hexahedra of 20 nodes, which VTK orders: corners, then mid-sides of edges."""
+    fields = free().mesh()
+    _, (element, cells) = fields.bodies.values()
+    assert (element, cells.shape[1]) == ("hexahedron20", 20)
+    section, around = fields.X[:, : cells.min()].T, fields.X[:, cells.min() :].T
+    apart, same = cKDTree(section).query(around)
+    same = np.where(apart < 1e-9, same, -1)
+    loaded, left = fields.stages["loaded"], fields.stages["unloaded"]
+    for stage in (loaded, left):
+        for name in ("stress", "mises", "plastic_strain"):
+            whole, own = stage[name][..., : len(section)], stage[name][..., len(section) :]
+            assert np.isfinite(own).all(), name
+            known = (same >= 0) & np.isfinite(loaded["mises"])[same]
+            assert known.sum() > 50
+            scale = np.abs(own).max()
+            # both are recovered from the points of the same elements
+            np.testing.assert_allclose(own[..., known], whole[..., same[known]], atol=1e-9 * scale)
+    corners = fields.X.T[cells[:, :8]]
+    one, two, three = (corners[:, k] - corners[:, 0] for k in (1, 3, 4))
+    assert (np.einsum("ij,ij->i", np.cross(one, two), three) > 0).all()
+    ends = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)]
+    ends += [(0, 4), (1, 5), (2, 6), (3, 7)]
+    middle = corners[:, np.array(ends)].mean(axis=2)
+    assert np.abs(fields.X.T[cells[:, 8:]] - middle).max() < 0.05  # the surface is curved
+    assert [each.type for each in to_meshio(fields, "loaded").cells] == ["quad8", element]
 
 
 def test_stress_of_straightening_and_cold_stays_where_nothing_yields() -> None:
