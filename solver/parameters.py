@@ -6,7 +6,7 @@ import math
 import operator
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import field, fields
 from functools import lru_cache
 from typing import Annotated, Any, Literal
@@ -38,6 +38,7 @@ Stress = Annotated[float, Interval(gt=0.0, le=1e7), Unit("MPa")]
 Length = Annotated[float, Interval(gt=0.0, le=1e6), Unit("mm")]
 Accuracy = Literal["draft", "standard", "fine"]
 Poisson = Annotated[float, Interval(ge=0.0, le=0.4999), Unit("1")]
+Pairs = tuple[tuple[float, float], ...]
 
 
 def check(parameters: Any) -> None:
@@ -62,6 +63,20 @@ def check(parameters: Any) -> None:
             if not test(value, limit):
                 allowed = " and ".join(f"{words} {limit:g}" for _, limit, words in bounds)
                 raise ModelError(name, value, "must be " + " or ".join([allowed, *choices]))
+
+
+def pairs(name: str, value: Pairs) -> Pairs:
+    """Return the value if it is pairs of finite numbers, as the parameter must be."""
+    known = isinstance(value, tuple) and all(
+        isinstance(pair, Sequence) and len(pair) == 2 and all(map(_finite, pair)) for pair in value
+    )
+    if not known:
+        raise ModelError(name, value, "must be pairs of finite numbers")
+    return value
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 _Bound = tuple[Callable[[float, float], bool], float, str]

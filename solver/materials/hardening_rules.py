@@ -6,9 +6,7 @@ by which the yield surface grows and does not move gives a curve and goes with a
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
@@ -21,7 +19,7 @@ from solver.materials.chaboche import Chaboche
 from solver.materials.curves import Table, Voce
 from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
-from solver.parameters import Fraction, HardeningRatio, described
+from solver.parameters import Fraction, HardeningRatio, Pairs, described, pairs
 from solver.parts import Parts
 
 if TYPE_CHECKING:
@@ -30,8 +28,6 @@ if TYPE_CHECKING:
     from solver.materials.curves import Curve
     from solver.materials.elasticity import Elasticity
     from solver.materials.law import Law
-
-Pairs = tuple[tuple[float, float], ...]
 
 
 class HardeningRule(ABC):
@@ -199,7 +195,7 @@ class _Measured:
 
         Raises `ModelError` unless they begin at [0, yield_stress] and rise.
         """
-        strain, stress = np.reshape(_pairs("curve", self.curve), (-1, 2)).T
+        strain, stress = np.reshape(pairs("curve", self.curve), (-1, 2)).T
         begins = bool(self.curve) and (strain[0], stress[0]) == (0.0, yield_stress)
         rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
         if not (begins and rises):
@@ -239,7 +235,7 @@ class ChabocheHardening(_Saturating, MovingRule):
             )
             raise ModelError("back_stresses", self.back_stresses, allowed)
         found = []
-        for k, pair in enumerate(_pairs("back_stresses", self.back_stresses), start=1):
+        for k, pair in enumerate(pairs("back_stresses", self.back_stresses), start=1):
             try:
                 found.append(ArmstrongFrederick(*pair))
             except ModelError as error:
@@ -265,18 +261,3 @@ class LayeredHardening(_Measured, HardeningRule):
             return Layered.of_curve(elasticity, total.tolist(), stress.tolist())
         except ModelError as error:
             raise ModelError("curve", self.curve, error.allowed) from None
-
-
-def _pairs(name: str, value: Pairs) -> Pairs:
-    """Return the value if it is pairs of finite numbers, as the parameter must be."""
-    known = isinstance(value, tuple) and all(
-        isinstance(pair, Sequence) and len(pair) == 2 and all(map(_finite, pair)) for pair in value
-    )
-    if not known:
-        raise ModelError(name, value, "must be pairs of finite numbers")
-    return value
-
-
-def _finite(value: object) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(cast("float", value))

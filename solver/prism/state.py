@@ -22,7 +22,7 @@ class PrismState:
     Attributes
     ----------
     state : internal variables of the law at the points
-    strain : (n, 6) strain without load, Mandel
+    strain : (n, 6) strain without load, with the elastic strain of the initial stress, Mandel
     displacement : (m, 3) displacement of the surface without load, means under the hats [mm]
     """
 

@@ -55,7 +55,7 @@ class SteppedState:
     Attributes
     ----------
     state : internal variables (..., n * stations) of the law, station after station of each point
-    strain : (n, stations, 6) strain, Mandel
+    strain : (n, stations, 6) strain with the elastic strain of the initial stress, Mandel
     """
 
     state: PlasticState
@@ -119,12 +119,14 @@ class SteppedPrism:
         self._double_shear = 2 * law.elasticity.shear_modulus
         self._stiffness = law.stiffness(6)
         self._shape = len(self._modes.points), self._modes.stations, 6
+        self._initial = track.initial_strain[self._modes.points, None]
 
     @property
     def virgin(self) -> SteppedState:
         """The state before any load."""
         points, stations, _ = self._shape
-        return SteppedState(self._law.initial(points * stations, 6), np.zeros(self._shape))
+        strain = np.broadcast_to(self._initial, self._shape)
+        return SteppedState(self._law.initial(points * stations, 6), strain)
 
     def rolled(self, before: SteppedState, load: SteppedLoad, advance: int) -> SteppedIncrement:
         """Return the state, without load, after a load has rolled over some stations to x = 0.
@@ -175,7 +177,7 @@ class SteppedPrism:
             eigenstress = self._double_shear * plastic
             u = self._surface(eigenstress, left)
             contact = load.solve(u, start)
-            made = self._strain(eigenstress, contact.traction, left)
+            made = self._initial + self._strain(eigenstress, contact.traction, left)
             return _AtStrain(strain, response, u, contact, made - strain)
 
         here = at(before.strain if guess is None else guess, start)

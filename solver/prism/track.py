@@ -8,6 +8,7 @@ is constant along x, the state before the pass, is no wave but the section's own
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,20 +16,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.linear.solvers import analyse
 from solver.prism.far_field import FarField
 from solver.prism.flow import PrismFlow
 from solver.prism.modes import Modes
 from solver.prism.state import PrismState
+from solver.prism.straight import StraightPrism
 from solver.prism.surface import RunningSurface
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.linear.solvers import LinearSolver
     from solver.materials.elasticity import Elasticity
     from solver.materials.law import Law
     from solver.prism.section import Section
+    from solver.prism.straight import SettledStress
 
     Array = NDArray[np.float64]
 
@@ -55,6 +56,7 @@ class PrismTrack:
     weights : (n_points, window) volume of the points [mm3]
     grid : stations and vertices where the load may act
     rim : numbers of the points beside elements outside the zone, which must not yield
+    initial : initial stress, None without
 
     Raises
     ------
@@ -95,6 +97,7 @@ class PrismTrack:
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
         self.rim = _rim(section, zone, self.modes.points)
+        self.initial: SettledStress | None = None
 
     @property
     def elasticity(self) -> Elasticity:
@@ -106,10 +109,38 @@ class PrismTrack:
         """Positions (2, n_points) of the rows of points in the section: z, y [mm]."""
         return self.section.points.reshape(2, -1)[:, self.modes.points]
 
+    def stressed(self, given: Array, held: Array) -> PrismTrack:
+        """Return the same prism, its set-up shared, with an initial stress.
+
+        The section is that with its initial stress: it has no displacement from it. For arguments
+        see `StraightPrism.settled`.
+        """
+        _ = self.compliance  # computed once for both
+        other = copy(self)
+        other.initial = self.straight.settled(given, held)
+        return other
+
+    @property
+    def initial_strain(self) -> Array:
+        """Elastic strain (n, 6) of the initial stress at all points of the section, Mandel."""
+        none = np.zeros((self.section.weights.size, 6))
+        return none if self.initial is None else self.initial.strain
+
     def virgin(self, law: Law) -> PrismState:
-        """Return the state before any load."""
-        n = len(self.weights)
-        return PrismState(law.initial(n, 6), np.zeros((n, 6)), np.zeros((len(self.grid.z), 3)))
+        """Return the state before any load.
+
+        Raises
+        ------
+        ModelError
+            for an initial stress that is beyond the yield stress in the zone
+        """
+        n, strain = len(self.weights), self.initial_strain[self.modes.points]
+        state = law.initial(n, 6)
+        beyond = float(law.yield_value(law.stiffness(6) @ strain.T, state).max())
+        if beyond > 0:
+            allowed = f"must not yield: in equilibrium it is {beyond:.4g} MPa beyond yield"
+            raise ModelError("initial_stress", "this field", allowed)
+        return PrismState(state, strain, np.zeros((len(self.grid.z), 3)))
 
     # -- what a pass asks for ------------------------------------------------------------------
 
@@ -148,13 +179,9 @@ class PrismTrack:
         return moved if self.far is None else moved + self.far.beneath @ self.far.resultants(forces)
 
     @cached_property
-    def _without_load(self) -> LinearSolver:
-        """The section's own problem, k = 0, factorised on its free unknowns."""
-        section = self.section
-        stiffness = section.stiffness(section.free)
-        solver = analyse(stiffness.pattern)
-        solver.factorise(stiffness.at(0.0))
-        return solver
+    def straight(self) -> StraightPrism:
+        """The prism without load, constant along x."""
+        return StraightPrism(self.section)
 
     def left_by(self, plastic_strain: Array) -> Array:
         """Return the displacement (section.n,) that plastic strain leaves without load [mm].
@@ -163,15 +190,9 @@ class PrismTrack:
         ----------
         plastic_strain : (n_points, 6) in the zone, constant along x, Mandel
         """
-        section, modes = self.section, self.modes
-        at = np.zeros((section.weights.size, 6))
-        at[modes.points] = modes.weights[:, None] * (2 * self.elasticity.shear_modulus)
-        at[modes.points] *= plastic_strain
-        each = np.einsum("eqab,eqa->eb", section.B0, at.reshape(*section.weights.shape, 6))
-        force = np.bincount(section.dofs.ravel(), each.ravel(), section.n)
-        u = np.zeros(section.n)
-        u[section.free] = self._without_load.solve(force[section.free])
-        return u
+        at = np.zeros((self.section.weights.size, 6))
+        at[self.modes.points] = (2 * self.elasticity.shear_modulus) * plastic_strain
+        return self.straight.displacement(at)
 
     # -- the surface ---------------------------------------------------------------------------
 

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_CELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+_CELLS = {
+    3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 20: "hexahedron20",
+}  # fmt: skip
 """Cell type of meshio by the number of nodes of an element. The nodes have the same order: corners,
 mid-sides, middle."""
 _PVD = "stages.pvd"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -20,13 +20,19 @@ if TYPE_CHECKING:
 NO_NODE = -1
 """Fills the rows of faces and cells with fewer nodes than others."""
 
-_FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {
+_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
     3: ((0, 1, 2),),
     4: ((0, 1, 2, 3),),
     6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
     8: ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
     9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
 }
+_ENDS = (0, 1, 2, 3, 8, 9, 10, 11), (4, 5, 6, 7, 12, 13, 14, 15)
+"""Nodes of two opposite faces of a hexahedron, as of a quadrilateral; four are between them."""
+_FACES[20] = (
+    *(tuple(end[node] for node in face) for end in _ENDS for face in _FACES[8]),
+    (16, 17, 18, 19),
+)
 """Triangles and quadrilaterals that together use all nodes, by number of nodes of an element."""
 
 
@@ -38,7 +44,7 @@ class MeshFields:
     ----------
     X : (n_axes, n_nodes) positions of the nodes before loading
     bodies : for each body its element and the nodes (n_cells, k) of its cells: corners, mid-sides,
-        middle; in two dimensions counterclockwise
+        middle; in two dimensions counterclockwise; of a hexahedron as VTK orders them
     stages : for each stage ``displacement`` (n_axes, n_nodes), ``stress`` (n_components, n_nodes)
         with components xx, yy, zz, xy (, yz, zx), ``mises`` and ``plastic_strain`` (n_nodes,)
     """
@@ -66,20 +72,40 @@ class MeshFields:
                 numbers.append(np.full(len(nodes), number))
         return np.vstack(faces), np.concatenate(numbers)
 
+    def joined(self, other: MeshFields) -> MeshFields:
+        """Return the bodies of both, which have the same axes and stages."""
+        first = self.X.shape[1]
+        moved = {name: (element, first + cells) for name, (element, cells) in other.bodies.items()}
+        stages = {
+            stage: {
+                name: np.concatenate([values, other.stages[stage][name]], axis=-1)
+                for name, values in own.items()
+            }
+            for stage, own in self.stages.items()
+        }
+        return MeshFields(
+            X=np.hstack([self.X, other.X]), bodies={**self.bodies, **moved}, stages=stages
+        )
 
-def mesh_fields(fields: SystemFields, states: Mapping[str, Solved]) -> MeshFields:
+
+def mesh_fields(
+    fields: SystemFields,
+    states: Mapping[str, Solved],
+    beside: Callable[[], MeshFields] | None = None,
+) -> MeshFields:
     """Return the fields of all bodies in the given states.
 
     Parameters
     ----------
     states : the state at each stage
+    beside : returns fields of other bodies at the same stages
     """
     wholes = {name: fields.system.full(name) for name in fields.system.names}
     bodies, first = {}, 0
     for name, whole in wholes.items():
         cells = whole.basis.element_dofs.T
         if len(whole.X) == 2:  # cells in three dimensions have no orientation to correct
-            cells = _counterclockwise(cells, whole.X)
+            cells = counterclockwise(cells, whole.X)
         bodies[name] = (whole.body.element, first + cells)
         first += whole.X.shape[1]
     stages = {}
@@ -87,10 +113,11 @@ def mesh_fields(fields: SystemFields, states: Mapping[str, Solved]) -> MeshField
         each = [fields.at_nodes(at, name)._asdict() for name in wholes]
         stages[stage] = {name: np.concatenate([f[name] for f in each], axis=-1) for name in each[0]}
     X = np.hstack([whole.X for whole in wholes.values()])
-    return MeshFields(X=X, bodies=bodies, stages=stages)
+    found = MeshFields(X=X, bodies=bodies, stages=stages)
+    return found if beside is None else found.joined(beside())
 
 
-def _counterclockwise(cells: Nodes, X: Array) -> Nodes:
+def counterclockwise(cells: Nodes, X: Array) -> Nodes:
     """Return the nodes of cells (n, k) in counterclockwise order, as other programs expect."""
     corners = 4 if cells.shape[1] in (4, 8, 9) else 3
     (x, y), ahead = X[:, cells[:, :corners]], np.roll(X[:, cells[:, :corners]], -1, axis=2)

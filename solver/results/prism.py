@@ -132,9 +132,9 @@ class PrismBody:
 
     def left_by(self, found: Pass[PrismState]) -> PrismStage:
         """Return the state after a pass, in the whole section."""
-        section, after = self.track.section, found.after
-        u = self.track.left_by(after.plastic_strain)
-        strain = np.einsum("eqab,eb->eqa", section.B0, u[section.dofs]).reshape(-1, 6)
+        track, after = self.track, found.after
+        u = track.left_by(after.plastic_strain)
+        strain = track.initial_strain + track.straight.strain(u)
         return self._stage(_RELEASED, u, strain, after.state)
 
     def _stage(self, time: float, u: Array, strain: Array, inside: PlasticState) -> PrismStage:

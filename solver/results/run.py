@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from solver.results.audit.recomputed import Recomputed
     from solver.results.audit.report import Audit
     from solver.results.fields import Bodies, Solved
+    from solver.results.mesh_fields import MeshFields
     from solver.results.samples import Samples
     from solver.results.tractions import SurfaceTractions
     from solver.results.view import View
@@ -33,6 +34,7 @@ class FinishedRun:
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
     source : source of the values with which the record is compared; None for states of a system
+    beside : returns fields at the nodes of more than the bodies of the system, at the same stages
     """
 
     parameters: Any
@@ -43,6 +45,7 @@ class FinishedRun:
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
     source: Recomputed | None = None
+    beside: Callable[[], MeshFields] | None = None
 
     @property
     def system(self) -> Bodies:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +32,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+
+class PatchStatus(IntEnum):
+    """The state of a place in the contact, as `solver.prism.friction_cone` numbers it."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
+
 _PATCH = ("x", "z")
 PATCH_PRESSURE = declare(
     "patch_pressure", "contact pressure on the running surface", "MPa", dims=_PATCH
@@ -43,6 +53,19 @@ PATCH_SHEAR = {
         "patch_shear_z", "contact shear on the running surface across it", "MPa", dims=_PATCH
     ),
 }
+PATCH_SLIP = {
+    "x": declare(
+        "patch_slip_x", "slip of the running surface over the wheel along x, per advance",
+        dims=_PATCH,
+    ),
+    "z": declare(
+        "patch_slip_z", "slip of the running surface over the wheel across it, per advance",
+        dims=_PATCH,
+    ),
+}  # fmt: skip
+PATCH_STATUS = declare(
+    "patch_status", "whether the surfaces are open, stick or slip", dims=_PATCH, flags=PatchStatus
+)
 PEAK_PATCH_PRESSURE = declare(
     "peak_patch_pressure", "largest contact pressure on the running surface", "MPa"
 )
@@ -77,19 +100,23 @@ _YIELDED = 1e-6
 
 
 def patch(run: FinishedRun) -> Values:
-    """Return pressure and shear on the contact, its forces, its size, and the creepage."""
+    """Return pressure, shear and slip on the contact, its forces, its size, and the creepage.
+
+    Slip and status are those of the nearest station and vertex; slip is NaN where it is open.
+    """
     from scipy.interpolate import RegularGridInterpolator
 
     contact: Any = run.outcome.points[run.view.loaded].touching
     grid, pressure = contact.grid, contact.pressure
     X, Z = np.meshgrid(run.view.x, run.view.z, indexing="ij")
 
-    def sampled(values: Array) -> Array:
+    def sampled(values: Array, method: str = "linear", outside: float = 0.0) -> Array:
         at = RegularGridInterpolator(
-            (grid.x[::-1], grid.z), values[::-1], bounds_error=False, fill_value=0.0
+            (grid.x[::-1], grid.z), values[::-1], method, bounds_error=False, fill_value=outside
         )
         return np.asarray(at((X, Z)))
 
+    slip = np.where((contact.status != 0)[..., None], contact.slip / grid.spacing, np.nan)
     closed = contact.status != 0
     touched = grid.z[closed.any(axis=0)]
     force = contact.force
@@ -97,6 +124,9 @@ def patch(run: FinishedRun) -> Values:
         PATCH_PRESSURE: sampled(pressure),
         PATCH_SHEAR["x"]: sampled(contact.shear[..., 0]),
         PATCH_SHEAR["z"]: sampled(contact.shear[..., 1]),
+        PATCH_SLIP["x"]: sampled(slip[..., 0], "nearest", np.nan),
+        PATCH_SLIP["z"]: sampled(slip[..., 1], "nearest", np.nan),
+        PATCH_STATUS: sampled(contact.status.astype(float), "nearest").astype(np.int32),
         PEAK_PATCH_PRESSURE: float(pressure.max()),
         PEAK_PATCH_PRESSURE_Z: float(grid.z[pressure.max(axis=0).argmax()]),
         PATCH_AREA: float((closed * grid.area).sum()),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -18,6 +18,7 @@ from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
 from solver.results.audit.prism_values import OfPrismPass
 from solver.results.prism import PatchTractions, PrismBody
+from solver.results.prism_fields import zone_fields
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.steady.passing import passing
@@ -171,11 +172,12 @@ class _Path:
     def finished(self, run: Any) -> FinishedRun:
         """Return a run with the results of the last pass found."""
         found, previous, view = self._found, self._previous, self._samples.view
-        points, source = {}, None
+        points, source, beside = {}, None, None
         if found is not None and self.error is None:
             left = self._body.left_by(found)
             points = {view.loaded: self._body.under_load(found), view.unloaded: left}
             source = OfPrismPass(self._body, found, left, view.unloaded)
+            beside = partial(zone_fields, self._body, found, view.loaded, view.unloaded)
         seconds = time.process_time() - self._started - self._elsewhere
 
         def check() -> Audit:
@@ -196,6 +198,7 @@ class _Path:
             check=check,
             notes=doubts({view.profile_body: self._law}),
             source=source,
+            beside=beside,
         )
 
 

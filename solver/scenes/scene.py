@@ -143,7 +143,7 @@ class Scene:
             status=status,
             message=self._message(status, messages),
             scalars={**written.scalars, "audit_stored": comparison.figure},
-            mesh=partial(mesh_fields, run.samples.fields, states),
+            mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
         )
 
     def _message(self, status: Status, messages: tuple[str, ...]) -> str:

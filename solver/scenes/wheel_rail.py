@@ -19,6 +19,7 @@ import numpy as np
 from solver.results.extremes import residual_extremes
 from solver.results.figures import cost, extremes
 from solver.results.maps import maps, profiles
+from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
 from solver.scenes.effort import Effort
@@ -41,6 +42,12 @@ _HALF_HEAD, _MAPPED, _ALONG = 36.0, 16.0, 20.0
 """Half the width of maps, their depth, and half their length along the rail [mm]."""
 _PIXEL = 0.5
 """Distance of positions of maps across and along [mm]; in depth it is half of that."""
+
+
+WHEEL_SURFACE = declare(
+    "wheel_surface", "height of the wheel's surface where it first touches the rail", "mm",
+    dims=("z",),
+)  # fmt: skip
 
 
 def method(parameters: WheelRailParameters) -> Method:
@@ -88,6 +95,15 @@ def setup(parameters: WheelRailParameters) -> RailGeometry:
     return geometry(parameters)
 
 
+def wheel(run: FinishedRun) -> Values:
+    """Return the profile of the undeformed wheel that touches the rail."""
+    from solver.scenes.wheel_rail_track import expected_contact, wheel_profile
+
+    p = run.parameters
+    height = wheel_profile(p).height(run.view.z - p.lateral_position)
+    return {WHEEL_SURFACE: height - expected_contact(p).gap}
+
+
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     from solver.scenes.wheel_rail_track import geometry, section_of
@@ -108,7 +124,7 @@ WHEEL_RAIL = Scene(
     branch="passes",
     method=method,
     view=view,
-    outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, axle),
+    outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, axle, wheel),
     costs=(cost,),
     effort=effort,
     setup=setup,

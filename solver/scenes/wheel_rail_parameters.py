@@ -11,6 +11,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.parameters import Fraction, Poisson, Stress, described
+from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
 from solver.scenes.material_parameters import MaterialParameters
 from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
 
@@ -21,6 +22,7 @@ _CLOSEST = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@INITIAL_STRESS.fields
 class WheelRailParameters(MaterialParameters):
     """Parameters of a wheel on a rail (N, mm, MPa)."""
 
@@ -77,6 +79,16 @@ class WheelRailParameters(MaterialParameters):
         "modulus of the foundation: force per length of the rail and displacement, along x, y and "
         "z",
     )
+    initial_stress: str = described(
+        "none", "stress of the rail before the first pass; it is brought to equilibrium"
+    )
+    temperature_change: Annotated[float, Interval(ge=-300.0, le=300.0), Unit("K")] = described(
+        0.0,
+        "temperature of the rail above its neutral temperature; the welded rail keeps its length",
+    )
+    expansion: Annotated[float, Interval(ge=0.0, le=1e-3), Unit("1/K")] = described(
+        1.15e-5, "coefficient of linear thermal expansion of the rail"
+    )
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
@@ -84,6 +96,17 @@ class WheelRailParameters(MaterialParameters):
         if self.traction and not self.friction:
             raise ModelError("traction", self.traction, "must be 0 without friction")
         check_control(self.control, self.traction, self.given_creepage)
+        _ = self.rail_stress  # raises an error for parameters that do not fit together
+
+    @property
+    def rail_stress(self) -> SectionStress:
+        """The stress before the first pass, without that of temperature."""
+        return INITIAL_STRESS.made(self.initial_stress, self)
+
+    @property
+    def thermal_strain(self) -> float:
+        """Strain by which the rail would expand if nothing held it."""
+        return self.expansion * self.temperature_change
 
     @property
     def idle(self) -> Mapping[str, str]:

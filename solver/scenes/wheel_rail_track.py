@@ -22,12 +22,14 @@ from solver.prism.patch import RollingPatch
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.track import PrismTrack
+from solver.scenes.initial_stress import stressed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.mesh.rail import RailSection
     from solver.mesh.wheel_profile import WheelProfile
+    from solver.scenes.initial_stress import SectionStress
     from solver.scenes.wheel_rail_parameters import WheelRailParameters
 
     Array = NDArray[np.float64]
@@ -214,6 +216,12 @@ def track_of(own: RailGeometry) -> PrismTrack:
     )  # fmt: skip
 
 
+@lru_cache(maxsize=2)
+def stressed_track(own: RailGeometry, rail: SectionStress, thermal_strain: float) -> PrismTrack:
+    """Return the rail with its stress before the first pass."""
+    return stressed(track_of(own), rail, thermal_strain)
+
+
 class RolledRail:
     """A wheel on a rail, as `solver.scenes.prism_passes.RolledPrism`."""
 
@@ -222,7 +230,8 @@ class RolledRail:
 
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
-        return track_of(geometry(self.parameters, reach))
+        p, own = self.parameters, geometry(self.parameters, reach)
+        return stressed_track(own, p.rail_stress, p.thermal_strain)
 
     def load(self, track: PrismTrack) -> RollingPatch:
         """See `RolledPrism`."""

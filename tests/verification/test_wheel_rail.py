@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
+from scipy.spatial import cKDTree
 
 from solver import ModelError, Record
+from solver.results.export import to_meshio
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.scenes import SCENES
+from solver.scenes.initial_stress import RollerStraightened
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import expected_contact
+from solver.scenes.wheel_rail_track import expected_contact, geometry, section_of
 from tests.verification.hertz_ellipse import HertzEllipse
 
 SCENE = SCENES["wheel_rail"]
@@ -192,6 +195,51 @@ def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
     assert record.scalars["degrees_of_freedom"] > 0
 
 
+def test_fields_around_the_load_are_those_of_the_section_where_it_is() -> None:
+    """Hexahedra of 20 nodes, which VTK orders: corners, then mid-sides of edges."""
+    fields = free().mesh()
+    _, (element, cells) = fields.bodies.values()
+    assert (element, cells.shape[1]) == ("hexahedron20", 20)
+    section, around = fields.X[:, : cells.min()].T, fields.X[:, cells.min() :].T
+    apart, same = cKDTree(section).query(around)
+    same = np.where(apart < 1e-9, same, -1)
+    loaded, left = fields.stages["loaded"], fields.stages["unloaded"]
+    for stage in (loaded, left):
+        for name in ("stress", "mises", "plastic_strain"):
+            whole, own = stage[name][..., : len(section)], stage[name][..., len(section) :]
+            assert np.isfinite(own).all(), name
+            known = (same >= 0) & np.isfinite(loaded["mises"])[same]
+            assert known.sum() > 50
+            scale = np.abs(own).max()
+            # both are recovered from the points of the same elements
+            np.testing.assert_allclose(own[..., known], whole[..., same[known]], atol=1e-9 * scale)
+    corners = fields.X.T[cells[:, :8]]
+    one, two, three = (corners[:, k] - corners[:, 0] for k in (1, 3, 4))
+    assert (np.einsum("ij,ij->i", np.cross(one, two), three) > 0).all()
+    ends = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)]
+    ends += [(0, 4), (1, 5), (2, 6), (3, 7)]
+    middle = corners[:, np.array(ends)].mean(axis=2)
+    assert np.abs(fields.X.T[cells[:, 8:]] - middle).max() < 0.05  # the surface is curved
+    assert [each.type for each in to_meshio(fields, "loaded").cells] == ["quad8", element]
+
+
+def test_stress_of_straightening_and_cold_stays_where_nothing_yields() -> None:
+    """In cold a welded rail has E alpha dT along x; 16 mm deep the rail is elastic."""
+    given = ("initial_stress", "roller_straightened"), ("temperature_change", -30.0)
+    (record,) = rolled(*given)
+    assert record.status is Status.OK, record.message
+    assert record.scalars["audit_initial_stress"] < 1e-9
+    assert record.scalars["max_plastic_strain"] > 1.5 * free().scalars["max_plastic_strain"]
+    added = [field(each, "residual_profile")[1, XX, -1] for each in (record, free())]
+    section = section_of(geometry(record.parameters))  # type: ignore[arg-type]
+    points, area = section.points.reshape(2, -1), section.weights.ravel()
+    straightened = RollerStraightened().stress(points, area)[XX]
+    station = record.coordinates["station"][1], -16.0
+    near = np.hypot(*(points.T - station).T).argmin()
+    wanted = straightened[near] + 2e5 * 1.15e-5 * 30.0
+    assert added[0] - added[1] == pytest.approx(wanted, abs=12.0)  # the nearest point is 2 mm away
+
+
 def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
     parameters = WheelRailParameters(lateral_position=8.0, accuracy="draft")
     with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must keep the contact"):
@@ -204,6 +252,7 @@ def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
         ({"friction": 0.0, "traction": 0.5}, r"traction = 0\.5: must be 0 without friction"),
         ({"control": "creepage", "traction": 0.5}, r"traction = 0\.5: must be 0 with control"),
         ({"given_creepage": 0.01}, r"given_creepage = 0\.01: needs control = creepage"),
+        ({"initial_stress": "over_height"}, r"stress_over_height = \(\): must be given"),
         ({"load": 0.0}, r"load = 0\.0: must be greater than 0"),
     ],
 )

@@ -84,6 +84,11 @@ _DECLARED = [
         "stress",
     ),
     declare(
+        "audit_initial_stress",
+        "ratio of the largest change of the given initial stress of a prism, on its way to "
+        "equilibrium, to the yield stress",
+    ),
+    declare(
         "audit_plastic_strain", "largest equivalent plastic strain away from singular points"
     ),
     declare(

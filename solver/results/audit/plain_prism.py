@@ -254,6 +254,28 @@ class PlainPrism:
         u = self._solved(0, force.astype(complex)).real
         return (self._still @ u).reshape(-1, 6), self._mean(u)
 
+    def initial_stress(self, given: Array, held: Array) -> Array:
+        """Return the stress (n, 6) of the whole section when given stresses come to equilibrium.
+
+        See `solver.prism.straight.StraightPrism.settled`: what of ``given`` lengthens, bends and
+        turns the prism is gone.
+        """
+        still = self._rows(self._gradients[0], np.arange(len(self._nodes)))
+        C, area = self.track.elasticity.stiffness(6), self.area.reshape(-1, 1)
+
+        def relaxed(stress: Array) -> Array:
+            force = still.T @ (-stress * area).ravel()
+            u = self._solved(0, force.astype(complex)).real
+            return np.asarray(stress + (still @ u).reshape(-1, 6) @ C)
+
+        z, y = np.asarray(self.track.section.plane.basis.global_coordinates()).reshape(2, -1)
+        x_x, turned = np.eye(6)[0], np.stack([-z, y], axis=1) @ np.eye(6)[[3, 5]]
+        motions = [x_x * np.ones_like(area), np.outer(y, x_x), np.outer(z, x_x), turned / SQRT2]
+        each, free = [relaxed(strain @ C) for strain in motions], relaxed(given)
+        left = np.array([[(s * strain * area).sum() for s in (free, *each)] for strain in motions])
+        shares = np.linalg.solve(left[:, 1:], -left[:, 0])
+        return free + relaxed(held) + np.tensordot(shares, np.stack(each), 1)
+
     def _solved(self, wave: int, force: Complex) -> Complex:
         """Return the displacement (n,) of the whole section for forces (n,) in a sampled wave."""
         free = self.track.section.free

@@ -82,11 +82,16 @@ def audit_prism(
         "audit_yield": max(flow.beyond(), largest(law.yield_value(residual, after.state)))
         / law.yield_stress,
         "audit_dissipation": flow.dissipation(),
-        "audit_history": max(_lost(law, found, previous), _apart(moved, left_surface)),
+        "audit_history": max(
+            _lost(track, law, found, previous),
+            _unsettled(track, plain) / law.yield_stress,
+            _apart(moved, left_surface),
+        ),
         "audit_inflow": max(flow.inflow(), flow.over_most(rim) if rim.size else 0.0),
         "audit_outflow": flow.outflow(),
         "audit_steadiness": stiff * max(unsteady, unsteady_behind) / law.yield_stress,
         "audit_length": _far(track, law, plain.resultants(waves.pulled)) / law.yield_stress,
+        "audit_initial_stress": track.initial.change / law.yield_stress if track.initial else 0.0,
         "audit_plastic_strain": strain.value,
         **patch.figures,
     }  # fmt: skip
@@ -123,22 +128,33 @@ def _released(law: Law, found: Pass[PrismState]) -> float:
     return difference(law, after.state, state)
 
 
-def _lost(law: Law, found: Pass[PrismState], previous: Pass[PrismState] | None) -> float:
+def _unsettled(track: PrismTrack, plain: PlainPrism) -> float:
+    """Return the difference of the initial stress from that of the second evaluation [MPa]."""
+    if track.initial is None:
+        return 0.0
+    stress = plain.initial_stress(track.initial.given, track.initial.held)
+    own = track.initial_strain @ track.elasticity.stiffness(6)
+    return float(np.abs(own - stress).max())
+
+
+def _lost(
+    track: PrismTrack, law: Law, found: Pass[PrismState], previous: Pass[PrismState] | None
+) -> float:
     """Return the difference between the state before the pass and that behind the last one.
 
     It is the largest difference of internal variables and strain, as stress over the yield stress,
     or of displacement, over the largest. A pass in the opposite direction begins with the mirrored
-    state.
+    state. The first one begins with the initial stress.
     """
-    before = found.before
+    before, displacement = found.before, np.zeros_like(found.before.displacement)
     if previous is None:
         state = law.initial(len(before.strain), 6)
-        strain, displacement = np.zeros_like(before.strain), np.zeros_like(before.displacement)
+        strain = track.initial_strain[track.modes.points]
     else:
         left = previous.left if found.direction == 1 else previous.left.mirrored
         state, strain, displacement = left.state, left.strain, left.displacement
-    stress = 2 * law.elasticity.shear_modulus * float(np.abs(before.strain - strain).max())
-    off = max(difference(law, before.state, state), stress) / law.yield_stress
+    off = 2 * law.elasticity.shear_modulus * float(np.abs(before.strain - strain).max())
+    off = max(difference(law, before.state, state), off) / law.yield_stress
     return max(off, _apart(before.displacement, displacement))
 
 

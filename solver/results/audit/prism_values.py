@@ -78,7 +78,7 @@ class ZoneFields:
                 found.accumulated[:, at], found.plastic_strain[:, at].T,
             )  # fmt: skip
         else:
-            strain = self.plain.strain(self._u).reshape(6, n)
+            strain = self.plain.strain(self._u).reshape(6, n) + self._track.initial_strain.T
             accumulated[zone] = found.after.accumulated
             plastic[:, zone] = found.after.plastic_strain.T
         elasticity, elastic = self._track.elasticity, strain - plastic

@@ -23,6 +23,7 @@ from studies.views.plots.fields import (
     too_close,
     usual_field,
 )
+from studies.views.plots.over import draw_patch, draw_wheel, is_patch, within_patch
 
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
@@ -31,6 +32,8 @@ _PERCENT, _WORTHWHILE = 99.8, 1.5
 """Colours end at this percentile of the map if the largest value is this many times larger: near a
 sharp corner stress is unbounded."""
 
+_SIGNED = 0.1
+"""Ratio of the lowest value of a number to the highest; below minus this it has both signs."""
 _NOTHING = 1e-3
 """Stress up to which it is rounding [MPa]."""
 
@@ -77,9 +80,12 @@ def map_figure(
         values = _inside(values, (middle - zoom, middle + zoom, -zoom, zoom), too_close(zoom))
     elif is_half(run):
         values = whole(values)
+    patch = is_patch(values, run)
+    if patch and zoom is None and window is None:
+        values = within_patch(values, run)
     if window is not None:
         values = _inside(values, window, empty_window(window, across, up))
-    signed = "component" in values.coords
+    signed = "component" in values.coords or bool(values.min() < -_SIGNED * values.max())
     high, note = _limit(values, signed)
     width, height = _size(values)
     sheet = Figure(figsize=(width, height), dpi=150)
@@ -99,6 +105,10 @@ def map_figure(
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
     axes.set(xlim=(left, right), ylim=(bottom, top))
+    if patch:
+        draw_patch(axes, run, field, (left, right, bottom, top))
+    draw_wheel(axes, values, run)
+    axes.set_xlim(left, right)
     axes.set(xlabel=_symbol(run[across]), ylabel=_symbol(run[up]))
     axes.set_aspect("equal")
     beside = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.16 / width, 1.0))
@@ -106,6 +116,8 @@ def map_figure(
     beyond = {(1, 1): "both", (1, 0): "max", (0, 1): "min"}.get((over, under), "neither")
     bar = sheet.colorbar(mesh, cax=beside, extend=beyond, extendfrac=0.03)
     bar.set_label(wrapped(label(values), max(height, _TEXT / 2.0), 10))
+    if "flag_meanings" in values.attrs:
+        bar.set_ticks(values.attrs["flag_values"], labels=values.attrs["flag_meanings"].split())
     bar.outline.set_visible(False)
     axes.annotate(
         wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords="axes fraction",

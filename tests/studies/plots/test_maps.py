@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
 from solver.scenes import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
@@ -302,3 +303,73 @@ def test_a_field_that_is_zero_everywhere_is_drawn(store: Store) -> None:
 def test_a_swept_truth_value_is_told_by_its_name(held: str, told: str) -> None:
     run = xr.Dataset(coords={"periodic": held}, attrs={"scene": "rolling", "parameters": "{}"})
     assert setting(run).replace("\u00a0", " ").endswith(f"· {told}")
+
+
+def rolled() -> xr.Dataset:
+    """A run with a contact of 8 mm along and 4 across, which sticks where x > 0, and a wheel."""
+    x, z, y = np.arange(-10.0, 11.0), np.arange(-12.0, 13.0), np.arange(-4.0, 1.0)
+    X, Z = np.meshgrid(x, z, indexing="ij")
+    closed = (abs(X) <= 4.0) & (abs(Z) <= 2.0)
+    fields = {
+        "patch_status": closed * np.where(X > 0, 1, 2),
+        "patch_pressure": 900.0 * closed,
+        "patch_shear_x": -200.0 * closed,
+        "patch_shear_z": 50.0 * closed * Z,
+        "patch_slip_x": np.where(closed, 1e-3 * (X < 0), np.nan),
+        "patch_slip_z": np.where(closed, 0.0, np.nan),
+    }
+    run = xr.Dataset(
+        {"status": "ok", "message": ""}
+        | {name: (("x", "z"), each) for name, each in fields.items()},
+        coords={"x": x, "y": y, "z": z},
+        attrs={"scene": "fake", "parameters": '{"state": "plane_strain"}'},
+    ).assign(status="ok", message="")
+    run["patch_pressure"].attrs["units"] = run["patch_shear_x"].attrs["units"] = "MPa"
+    run["patch_shear_z"].attrs["units"] = "MPa"
+    flags = {"flag_values": [0, 1, 2], "flag_meanings": "open stick slip"}
+    run["patch_status"].attrs |= flags
+    run["map_mises"] = (("y", "z"), np.ones((y.size, z.size)), {"units": "MPa"})
+    run["wheel_surface"] = ("z", 0.05 * z**2)
+    return run
+
+
+def names_of(axes: Axes) -> list[str]:
+    legend = axes.get_legend()
+    assert legend is not None
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def test_a_contact_is_drawn_with_its_edges_and_its_shear() -> None:
+    axes, mesh = mesh_of(map_figure(rolled(), "patch_pressure"))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("z [1]", "x [1]")
+    assert axes.get_xlim() == (-5.5, 5.5)
+    assert axes.get_ylim() == (-7.5, 7.5)
+    assert np.ma.count(np.ma.masked_invalid(mesh.get_array())) == 9 * 5
+    assert names_of(axes) == [
+        "edge of contact", "edge of stick", "shear on the surface, at most 224 MPa",
+    ]  # fmt: skip
+    (arrows,) = (each for each in axes.collections if isinstance(each, Quiver))
+    assert np.ma.array(arrows.V, mask=arrows.Umask).max() < 0.0
+    assert mesh.get_clim() == (0.0, 900.0)
+
+
+def test_slip_is_drawn_with_arrows_of_slip_and_shear_has_two_signs() -> None:
+    axes, _ = mesh_of(map_figure(rolled(), "patch_slip_x"))
+    assert names_of(axes)[-1] == "slip on the surface, at most 0.001"
+    _, mesh = mesh_of(map_figure(rolled(), "patch_shear_x"))
+    assert mesh.get_clim() == (-200.0, 200.0)
+
+
+def test_flags_are_named_beside_their_colours() -> None:
+    sheet = map_figure(rolled(), "patch_status")
+    beside = [*sheet.axes[1:], *sheet.axes[0].child_axes]
+    labels = [each.get_text() for axes in beside for each in axes.get_yticklabels()]
+    assert {"open", "stick", "slip"} <= set(labels)
+
+
+def test_a_section_is_drawn_with_the_wheel_above_it() -> None:
+    axes, _ = mesh_of(map_figure(rolled(), "map_mises"))
+    assert names_of(axes) == ["wheel before contact"]
+    assert axes.get_ylim() == (-4.5, 3.0)
+    below, _ = mesh_of(map_figure(rolled(), "map_mises", window=(-5.0, 5.0, -4.0, -1.0)))
+    assert below.get_legend() is None

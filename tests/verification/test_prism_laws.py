@@ -1,0 +1,128 @@
+"""Passes over a prism of every law: against increments, by their audit, and what they tend to."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.linear.threads import one_thread
+from solver.materials import SmoothMaterial, Voce
+from solver.materials.hardening_rules import HARDENING
+from solver.materials.law import Law
+from solver.prism import EllipticPatch, PatchPassing, PrismTrack, SteppedPrism
+from solver.results.audit.plain_prism import PlainPrism
+from solver.results.audit.prism import audit_prism
+from solver.results.shakedown import ShakedownState, classify
+from solver.scenes.initial_stress import OverHeight, stressed
+from solver.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.steady.passing import Pass, passing
+from tests.solver.yield_surfaces import Hosford
+from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual
+
+CURVE = ((0.0, RE), (0.002, 560.0), (0.02, 640.0))
+WORDS: dict[str, dict[str, Any]] = {
+    "none": {},
+    "isotropic": {"hardening_ratio": 0.02},
+    "kinematic": {"hardening_ratio": 0.02},
+    "mixed": {"hardening_ratio": 0.02},
+    "voce": {"saturation": 100.0, "saturation_rate": 50.0},
+    "table": {"curve": CURVE},
+    "chaboche": {"back_stresses": ((60_000.0, 600.0), (4000.0, 20.0))},
+    "layered": {"curve": CURVE},
+}
+SPACING, LENGTH, ADVANCE, FROM_START = 2.0, 96.0, 48.0, 28.0
+
+
+def law(word: str, condition: str = "mises") -> Law:
+    """The law of a rail with this hardening."""
+    return WheelRailParameters(hardening=word, yield_condition=condition, **WORDS[word]).material()
+
+
+LAWS: dict[str, Law] = {
+    **{word: law(word) for word in WORDS},
+    "tresca": law("voce", "tresca"),
+    "hosford": SmoothMaterial(
+        elasticity=PERFECT.elasticity,
+        curve=Voce(yield_stress=RE, saturation=100.0, rate=50.0),
+        surface=Hosford(8.0),
+    ),
+}
+
+
+@cache
+def track() -> PrismTrack:
+    """A block of 16 elements of 5 by 3.5 mm in its zone."""
+    return block(4.0, LENGTH, spacing=SPACING, far=40.0, growth=2.0)
+
+
+@cache
+def plain(of: PrismTrack) -> PlainPrism:
+    """The second evaluation of a block."""
+    return PlainPrism(of)
+
+
+def pressure(peak: float, a: float = A) -> EllipticPatch:
+    """The pressure of an ellipse, as wide as the coarse block allows."""
+    b = 4.9
+    return EllipticPatch(grid=track().grid, force=2 * np.pi * a * b * peak / 3, a=a, b=b)
+
+
+def compared(own: PrismTrack, material: Law) -> None:
+    """Assert that increments leave the state of a steady pass, and that the next one is sound."""
+    load = PatchPassing(pressure(1360.0))
+    body = SteppedPrism(own, material)
+    with one_thread():
+        found = passing(own, material, load, own.virgin(material), parts=1)
+        end = body.rolled(body.virgin, pressure(1360.0), round(ADVANCE / SPACING))
+    station = round((AHEAD + ADVANCE - FROM_START) / SPACING)
+    plastic, steady = end.state.plastic_strain[:, station], found.after.plastic_strain
+    largest = np.linalg.norm(steady, axis=1).max()
+    assert largest > 1e-3
+    assert np.linalg.norm(plastic - steady, axis=1).max() < 0.02 * largest
+    stress = material.stiffness(6) @ (end.state.strain[:, station] - plastic).T
+    assert np.abs(stress - residual(material, found.after)).max() < 0.02 * RE
+    with one_thread():
+        again = passing(own, material, load, found.after, found.strain)
+    audit = audit_prism(own, material, again, found, plain(own))
+    assert audit.passed, audit.violations
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_increments_of_any_law_leave_the_state_of_its_pass(name: str) -> None:
+    compared(track(), LAWS[name])
+
+
+def test_so_do_increments_over_initial_stress() -> None:
+    own = stressed(track(), OverHeight(stress_over_height=((-30.0, -150.0), (0.0, 200.0))), 0.0)
+    compared(own, LAWS["chaboche"])
+
+
+def test_every_word_is_here() -> None:
+    assert {*HARDENING} == {*WORDS}
+
+
+@pytest.mark.parametrize(
+    ("word", "state"),
+    [
+        ("kinematic", ShakedownState.PLASTIC_SHAKEDOWN),
+        ("chaboche", ShakedownState.PLASTIC_SHAKEDOWN),
+        ("mixed", ShakedownState.ELASTIC_SHAKEDOWN),
+    ],
+)
+def test_a_surface_that_grows_without_bound_ends_the_flow(word: str, state: int) -> None:
+    """Where it only moves, every pass of a high load shears the material to and fro."""
+    own, material, load = track(), LAWS[word], PatchPassing(pressure(2000.0, a=5.0))
+    found: Pass[Any] | None = None
+    accumulated, plastic = [], []
+    with one_thread():
+        for _ in range(10):
+            before = own.virgin(material) if found is None else found.after
+            found = passing(own, material, load, before, None if found is None else found.strain)
+            accumulated.append(found.after.accumulated - before.accumulated)
+            plastic.append(found.after.plastic_strain - before.plastic_strain)
+    net = np.sqrt(2 / 3 * (np.array(plastic) ** 2).sum(axis=2))
+    found_state = classify(np.array(accumulated), net, RE / 2e5, hardens=material.hardens).state
+    assert found_state is state
