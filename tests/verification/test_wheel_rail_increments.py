@@ -20,7 +20,7 @@ from solver.prism.stepped_patch import SteppedPatch
 from solver.prism.track import PrismTrack
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.scenes.wheel_rail_passes import contact_of
-from solver.scenes.wheel_rail_track import geometry, section_of, wheel_on
+from solver.scenes.wheel_rail_track import geometry, track_of, wheel_on
 from solver.steady.passing import Pass, passing
 
 STEPS = 37
@@ -29,16 +29,9 @@ ACCELERATING = WheelRailParameters(
 )
 
 
-@cache
 def rail() -> PrismTrack:
     """The rail of the scene, 104 mm long: it is rolled over 74."""
-    own = geometry(ACCELERATING)
-    section, h = section_of(own), own.spacing
-    zone = round(2 * own.half_width / own.size) * round(own.depth / own.size)
-    return PrismTrack(
-        section, np.arange(len(section.weights)) < zone, "running", length=52 * h, spacing=h,
-        ahead=9 * h, behind=11 * h, reach=own.reach, levels=4,
-    )  # fmt: skip
+    return track_of(geometry(ACCELERATING), 104.0)
 
 
 @cache
