@@ -15,13 +15,14 @@ from solver.prism.patch_passing import PatchPassing
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
-from solver.prism.stepped import SteppedPrism, SteppedState
+from solver.prism.stepped import LoadAt, SteppedIncrement, SteppedPrism, SteppedState
 from solver.prism.stepped_patch import SteppedPatch
 from solver.prism.track import PrismTrack
 
 __all__ = [
     "EllipticPatch",
     "FarField",
+    "LoadAt",
     "Modes",
     "PatchContact",
     "PatchPassing",
@@ -30,6 +31,7 @@ __all__ = [
     "ProfiledWheel",
     "RollingPatch",
     "Section",
+    "SteppedIncrement",
     "SteppedPatch",
     "SteppedPrism",
     "SteppedState",

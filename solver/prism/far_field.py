@@ -8,10 +8,17 @@ eighth of these waves, is subtracted. Then 64 L less 8 L with the width L, and s
 
 The spread has the transform ``exp(-t) (1 + t + t^2 / 2)``, t = (k width)^2 / 2: what is missing is
 of the sixth order in k.
+
+A prism *clamped* at both ends of a span has more: forces and moments on its section beyond the
+ends, with which the section does not move at the ends, in the mean. What loads beyond an end do
+within the span is what the end itself does: both are the same waves that fade away from it. Theory
+of beams is not needed; bending in both planes, torsion, shear and foundation are those of the
+section.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,11 +29,15 @@ from solver.prism.modes import superposed
 from solver.prism.section import I_AXIS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from solver.prism.modes import Modes
+    from solver.prism.section import Section
 
     Array = NDArray[np.float64]
+    Points = NDArray[np.bool_]
 
 _RATIO = 8
 """Ratio of the lengths of two levels, and of a length to the width of the spread load on it."""
@@ -35,10 +46,17 @@ _CUT = 6.0
 _LOOSE = 1e-9
 """Singular value of the motions of the surface rows, of 1 at the farthest node; below it the rows
 do not carry a resultant."""
+_ALONG = np.array([True, False, False, False, True, True])
+"""Whether motions of a section, as `Section.mean_motions`, are along x; resultants are the first
+four of them."""
+_ROOM = 1.5
+"""Least ratio of the length of the first level with loads beyond the ends to the span."""
+_BEYOND = 4.0
+"""Distance of these loads from the ends over the width over which they are spread."""
 
 
 class FarField:
-    """The difference of an endless prism to one loaded every L, for loads near one station.
+    """What an endless or clamped prism adds to one loaded every L, for loads near one station.
 
     Resultants (4,) are the forces along x, y and z [N] and the moment about x, at the middle of the
     nodes of the section [N mm].
@@ -49,6 +67,8 @@ class FarField:
     x : position at which the resultants act [mm]
     levels : number of lengths 8 L, 64 L, ...; the last one stands for endless. It must be long
         against the reach of a load: a rail on soft springs rolls, and moves along x, over 10 m
+    span : length of a prism clamped at both ends, the resultants in the middle [mm]; None if it
+        is endless
 
     Attributes
     ----------
@@ -60,79 +80,169 @@ class FarField:
     Raises
     ------
     ModelError
-        if the surface rows cannot carry all four resultants
+        if the surface rows cannot carry all four resultants, or the levels are shorter than a span
     """
 
-    def __init__(self, modes: Modes, x: float, levels: int = 4) -> None:
-        self._spacing = modes.length / modes.stations
+    def __init__(self, modes: Modes, x: float, levels: int = 4, span: float | None = None) -> None:
+        self._modes, self._spacing = modes, modes.length / modes.stations
         self._motions = modes.rows @ modes.section.rigid[modes.unknowns]
         size = np.abs(modes.section.rigid).max(axis=0)
         if np.linalg.matrix_rank(self._motions / size, tol=_LOOSE) < len(size):
             allowed = "must carry forces along x, y and z and a moment about x"
             raise ModelError("surface", f"{len(self._motions)} rows", allowed)
-        k, share = _waves(modes.length, levels)
-        u = _responses(modes, self._motions, k)
-        flat = u.reshape(len(u), -1)
-        strain = modes.B0 @ flat + modes.B1 @ (flat * np.repeat(k, u.shape[2]))
-        phase = np.outer(k, modes.x - x)
-        along = np.any(self._motions[modes.along] != 0, axis=0)
+        section = modes.section
+        forces = np.zeros((section.n, len(size)))
+        # the least forces on the rows with these resultants
+        forces[modes.unknowns] = modes.rows.T @ np.linalg.pinv(self._motions).T
+        shares = _shares(modes.length, levels)
+        waves = sorted(shares)
+        self._k = 2 * np.pi / (modes.length * _RATIO**levels) * np.array(waves)
+        every = forces if span is None else np.hstack([forces, section.mean_motions.T])
+        u, moved = _responses(section, every, self._k, modes.unknowns)
 
-        def summed(
-            amplitudes: Array,
-            carrying: NDArray[np.bool_],
-            phase: Array = phase,
-            share: Array = share,
-        ) -> Array:
-            each = amplitudes.reshape(len(carrying), *u.shape[1:])
-            return superposed(each, phase, share, carrying, along).swapaxes(1, 2)
+        n = len(size)
 
-        self.displacement = summed(modes.rows @ flat, modes.along)
-        self.strain = modes.by_point(summed(strain, modes.carrying))
+        def own(shares: dict[int, float]) -> _SectionLoad:
+            return _SectionLoad(u[..., :n], moved[..., :n], _listed(shares, waves), _ALONG[:n])
+
+        self._sources = [_FarLoad(own(shares), 0.0, np.eye(n))]
+        if span is not None:
+            first, beyond = _level_of(modes.length, levels, span)
+            shares = _shares(modes.length, levels, first)
+            ends = _SectionLoad(u[..., n:], moved[..., n:], _listed(shares, waves), _ALONG)
+            self._sources += _clamped(own(shares), ends, self._k, span / 2, beyond)
+        apart = np.asarray(modes.x - x, dtype=float)
+        self.displacement, self.strain = self._rows_at(apart), self.strain_at(apart)
         axis = modes.unknowns % 3 == I_AXIS
-        at_load = superposed(u, np.zeros((len(k), 1)), share, axis, along)
-        self.beneath = at_load[..., 0]
-        only = _waves(modes.length * _RATIO ** (levels - 1), 1)
-        last = np.zeros_like(share)
-        last[np.abs(only[0][:, None] - k).argmin(axis=1)] = only[1]
-        here = np.zeros((len(k), 1))
-        self.last = modes.by_point(summed(strain, modes.carrying, here, last))
+        self.beneath = self._summed(lambda u: u, axis, np.zeros(1))[:, 0]
+        only = _shares(modes.length * _RATIO ** (levels - 1), 1)
+        self.last = self.strain_at(np.zeros(1), [_FarLoad(own(only), 0.0, np.eye(n))])
 
     def resultants(self, forces: Array) -> Array:
         """Return the resultants (4,) of forces (n_rows, window) on the surface rows [N/mm]."""
         return self._spacing * (self._motions.T @ forces.sum(axis=1))
 
+    def strain_at(self, apart: Array, sources: list[_FarLoad] | None = None) -> Array:
+        """Return ``strain`` (n_points, n, 6, 4) at distances (n,) from the resultants along x."""
+        modes = self._modes
 
-def _waves(length: float, levels: int) -> tuple[Array, Array]:
-    """Return the wavenumbers (n,) of all levels, and the shares (n,) of their amplitudes."""
-    shares: dict[int, float] = {}
-    longest = length * _RATIO**levels
+        def strain(u: Array) -> Array:
+            flat = u.reshape(len(u), -1)
+            return modes.B0 @ flat + modes.B1 @ (flat * np.repeat(self._k, u.shape[2]))
+
+        return modes.by_point(self._summed(strain, modes.carrying, apart, sources))
+
+    def _rows_at(self, apart: Array) -> Array:
+        """Return the displacement (n_rows, n, 4) at distances (n,) from the resultants along x."""
+        modes = self._modes
+        return self._summed(lambda u: modes.rows @ u.reshape(len(u), -1), modes.along, apart)
+
+    def _summed(
+        self, results: Callable[[Array], Array], carrying: Points, apart: Array,
+        sources: list[_FarLoad] | None = None,
+    ) -> Array:  # fmt: skip
+        """Return results (n_results, n, 4) at distances (n,), for amplitudes of the zone's u."""
+        out = np.zeros((len(carrying), len(apart), self._motions.shape[1]))
+        for source in self._sources if sources is None else sources:
+            load = source.load
+            each = results(load.u).reshape(len(carrying), *load.u.shape[1:])
+            phase = np.outer(self._k, apart - source.x)
+            made = superposed(each, phase, load.share, carrying, load.along)
+            out += made.swapaxes(1, 2) @ source.factors
+        return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SectionLoad:
+    """Unit loads (q,) at one place, and what they make.
+
+    ``u`` (m, waves, q) amplitudes of the zone, ``moved`` (6, waves, q) of the section in the mean,
+    ``share`` (waves,) of them, ``along`` (q,) whether a load carries i.
+    """
+
+    u: Array
+    moved: Array
+    share: Array
+    along: Points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _FarLoad:
+    """Loads at a distance ``x`` from the resultants, and their ``factors`` (q, 4) by these."""
+
+    load: _SectionLoad
+    x: float
+    factors: Array
+
+
+def _clamped(
+    own: _SectionLoad, ends: _SectionLoad, k: Array, half: float, beyond: float
+) -> list[_FarLoad]:
+    """Return the loads beyond both ends +-half with which the section does not move there."""
+    places, at = half * np.array([-1.0, 1.0]), (half + beyond) * np.array([-1.0, 1.0])
+
+    def moved(load: _SectionLoad, apart: Array) -> Array:
+        """Return mean motions (n, 6, q) at distances (n,) from the load."""
+        found = superposed(load.moved, np.outer(k, apart), load.share, ends.along, load.along)
+        return np.moveaxis(found, 2, 0)
+
+    by_load = moved(own, places).reshape(-1, len(own.along))
+    apart = (places[:, None] - at).ravel()
+    n = len(ends.along)
+    by_ends = moved(ends, apart).reshape(2, 2, n, n).swapaxes(1, 2).reshape(2 * n, -1)
+    factors = np.asarray(np.linalg.solve(by_ends, -by_load), dtype=float).reshape(2, n, -1)
+    return [_FarLoad(ends, x, each) for x, each in zip(at, factors, strict=True)]
+
+
+def _level_of(length: float, levels: int, span: float) -> tuple[int, float]:
+    """Return the first level that is long against a span, and how far beyond its ends loads are."""
+    if not span > 0:
+        raise ModelError("span", span, "must be positive [mm]")
     for level in range(1, levels + 1):
+        period = length * _RATIO**level
+        if period >= _ROOM * span:
+            return level, _BEYOND * period / _RATIO**2
+    most = length * _RATIO**levels / _ROOM
+    raise ModelError("span", span, f"must be at most {most:g} mm with {levels} levels of far field")
+
+
+def _shares(length: float, levels: int, first: int | None = None) -> dict[int, float]:
+    """Return the shares of waves in what all levels add, by their numbers on the longest length.
+
+    They add to the load repeated every ``length``; with ``first`` they are all that a load makes
+    far from it, in terms of the levels from the first one on.
+    """
+    shares: dict[int, float] = {}
+    for level in range(first or 1, levels + 1):
         period = length * _RATIO**level
         width = period / _RATIO**2
         for j in range(int(_CUT * period / (2 * np.pi * width)) + 1):
             t = (2 * np.pi * j / period * width) ** 2 / 2
             spread = np.exp(-t) * (1 + t + t**2 / 2)
             both_signs = 2.0 if j else 1.0
-            less = 1.0 if j % _RATIO else 1.0 - _RATIO
+            less = 1.0 if j % _RATIO or level == first else 1.0 - _RATIO
             at = j * _RATIO ** (levels - level)
             shares[at] = shares.get(at, 0.0) + spread * both_signs * less / period
-    waves = np.array(sorted(shares))
-    return 2 * np.pi / longest * waves, np.array([shares[j] for j in waves.tolist()])
+    return shares
 
 
-def _responses(modes: Modes, motions: Array, wavenumbers: Array) -> Array:
-    """Return amplitudes (m, waves, 4) in the zone for unit resultants on the surface rows.
+def _listed(shares: dict[int, float], waves: list[int]) -> Array:
+    """Return the shares (n,) of waves by number, 0 where there is none."""
+    return np.array([shares.get(j, 0.0) for j in waves])
 
-    Forces on the rows are the least ones with these resultants.
-    """
-    section = modes.section
-    forces = np.zeros((section.n, motions.shape[1]))
-    forces[modes.unknowns] = modes.rows.T @ np.linalg.pinv(motions).T
+
+def _responses(
+    section: Section, forces: Array, wavenumbers: Array, unknowns: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return amplitudes (m, waves, q) of some unknowns, and (6, waves, q) of the mean motions."""
     whole = section.stiffness(section.free)
     solver = linear.analyse(whole.pattern)
-    at = np.searchsorted(section.free, modes.unknowns)
-    u = np.empty((len(at), len(wavenumbers), motions.shape[1]))
+    at = np.searchsorted(section.free, unknowns)
+    mean = section.mean_motions[:, section.free]
+    u = np.empty((len(at), len(wavenumbers), forces.shape[1]))
+    moved = np.empty((len(mean), *u.shape[1:]))
     for wave, k in enumerate(wavenumbers):
         solver.factorise(whole.at(k))
-        u[:, wave] = solver.solve(forces[section.free])[at]
-    return u
+        found = solver.solve(forces[section.free])
+        u[:, wave], moved[:, wave] = found[at], mean @ found
+    return u, moved

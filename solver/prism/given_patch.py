@@ -74,7 +74,7 @@ class EllipticPatch:
             along=np.zeros_like,
         )
 
-    def advanced(self, u: Array, contact: PatchContact) -> EllipticPatch:
+    def following(self, u: Array, contact: PatchContact, stations: int) -> EllipticPatch:
         """See `SteppedLoad`; the tractions do not change."""
         return self
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -92,20 +92,39 @@ class RollingPatch:
             raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
             raise ModelError("force", force, "must be positive")
-        self.grid, self.wheel, self.force = grid, wheel, force
+        self.grid, self.force = grid, force
         self.friction = friction if friction > LEAST_FRICTION else 0.0
         self.drive = drive if self.friction else None
         self.lateral_force = lateral_force if self.friction else None
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
-        self._rest, self._motions = wheel.rolling(grid)
         self._axes, self._area = grid.axes, grid.area
+        self._set(wheel)
         with one_thread():
             self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
+
+    def _set(self, wheel: ProfiledWheel) -> None:
+        """Set what depends on the shape of the wheel."""
+        self.wheel = wheel
+        self._rest, self._motions = wheel.rolling(self.grid)
         self._sums = self._resultants()
 
-    def scaled(self, share: float) -> RollingPatch:
+    def with_wheel(self, wheel: ProfiledWheel) -> Self:
+        """Return the same load with a wheel of another shape, or beside the place of this one.
+
+        Raises
+        ------
+        ModelError
+            if its elastic constants are others
+        """
+        if wheel.elasticity != self.wheel.elasticity:
+            raise ModelError("elasticity", wheel.elasticity, f"must be {self.wheel.elasticity}")
+        other = copy(self)
+        other._set(wheel)
+        return other
+
+    def scaled(self, share: float) -> Self:
         """See `PatchLoad`."""
         other = copy(self)
         other.force *= share
@@ -113,7 +132,7 @@ class RollingPatch:
             other.lateral_force *= share
         return other
 
-    def driven(self, share: float) -> RollingPatch:
+    def driven(self, share: float) -> Self:
         """See `PatchLoad`."""
         other = copy(self)
         if other.drive is not None:
@@ -126,7 +145,7 @@ class RollingPatch:
         return (self.drive or 0.0) * self.friction * self.force
 
     @property
-    def slipping(self) -> RollingPatch:
+    def slipping(self) -> Self:
         """See `PatchLoad`."""
         other = copy(self)
         if self.moment:

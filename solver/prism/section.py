@@ -159,6 +159,23 @@ class Section:
         return motions.reshape(self.n, 4)
 
     @cached_property
+    def mean_motions(self) -> Array:
+        """Mean motions (6, n) of the section by its displacements, weighted with the area.
+
+        They are those of `rigid`, and the turns about z and y, by which x-displacement is linear in
+        y and z. Their transpose are forces over the section with these resultants.
+        """
+        z, y = self.plane.X - self.plane.X.mean(axis=1, keepdims=True)
+        motions = np.zeros((len(z), 3, 6))
+        motions[..., :4] = self.rigid.reshape(-1, 3, 4)
+        motions[:, I_AXIS, 4], motions[:, I_AXIS, 5] = y, z
+        basis = self.plane.basis
+        each = [(np.asarray(b[0]) * self.weights).sum(axis=1) for b in basis.basis]
+        area = np.bincount(basis.element_dofs.ravel(), np.concatenate(each), len(z))
+        weighted = (motions * area[:, None, None]).reshape(self.n, -1).T
+        return np.asarray(np.linalg.solve(weighted @ motions.reshape(self.n, -1), weighted))
+
+    @cached_property
     def _elements(self) -> tuple[Array, Array, Array]:
         """The matrices (n_elements, 24, 24) of the elements that make K0, K1 and K2 [N/mm ...]."""
         C = self.elasticity.stiffness(6)

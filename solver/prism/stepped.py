@@ -1,41 +1,47 @@
-"""A load that rolls over a prism by increments, over material that stands still.
+"""Loads that roll over a prism by increments, over material that stands still.
 
 This is the second method behind steady passes: the same waves, but the state is that of fixed
-points of the whole length, which repeats itself. In each increment the load advances by one
-station. Equilibrium is the fixed point
+points of the whole length, which repeats itself, and nothing is assumed to be steady. A *path*
+tells load and place in each increment: rolling, a stop, a load or position that changes.
+Equilibrium is the fixed point
 
     e = Phi(e) = S s + E t(U s),    s = 2G ep(e)
 
 S and U give strain and displacement of the surface by an eigenstress, E the strain by tractions
-where the load is now, t the tractions on a surface with such displacements. ep(e) is the plastic
-strain by the response of the law from its state after the last increment. Plastic strain changes no
-volume, so that 2 G dep/de is C - tangent. Newton's equation
+where the load is now, t the tractions on a surface with such displacements. What an endless or
+clamped prism adds moves with the load. ep(e) is the plastic strain at the end of the straight way
+from the strain after the last increment to e, in as many parts as a steady pass takes from station
+to station. One part errs by the curvature of the way of stress: it leaves less plastic strain.
+Newton's equation
 
-    d = Phi(e) - e + (S + E t' U) (C - tangent) d
+    d = Phi(e) - e + (S + E t' U) 2G ep' d
 
 is solved by GMRES on the points that yield, on which alone the right side depends.
-
-J.C. Simo, T.J.R. Hughes, Computational Inelasticity (1998), box 3.2, p. 124: the tangent.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, Self
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
-from solver.steady.flow import allowed_inflow
-from solver.tensors import deviator
+from solver.prism.friction_cone import OPEN
+from solver.prism.patch_contact import PatchContact
+from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
+from solver.steady.passing import deviation, searched
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from numpy.typing import NDArray
 
     from solver.materials.law import Law
-    from solver.materials.state import PlasticState, Response
-    from solver.prism.patch_contact import PatchContact
+    from solver.materials.state import PlasticState
+    from solver.prism.patch_grid import PatchGrid
     from solver.prism.track import PrismTrack
 
     Array = NDArray[np.float64]
@@ -44,8 +50,8 @@ _TOLERANCE = 1e-4
 """Largest deviatoric strain of the residual, times 2 G / yield stress, after an increment."""
 _FORCING, _KRYLOV = 0.1, 60
 """Relative residual to which GMRES solves Newton's equation, and its most iterations."""
-_STEPS, _SHORTEST = 30, 1 / 16
-"""Most steps of Newton's method, and the smallest share of one in the line search."""
+_STEPS = 30
+"""Most steps of Newton's method."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,13 +79,31 @@ class SteppedState:
 
 
 class SteppedLoad(Protocol):
-    """A load that rolls by increments, as `EllipticPatch` and `SteppedPatch`."""
+    """A load of an increment, as `EllipticPatch` and `SteppedPatch`."""
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """Return the contact on a surface with displacements (n, m, 3); see `PatchLoad`."""
 
-    def advanced(self, u: Array, contact: PatchContact) -> Self:
-        """Return the load one station on, after a contact and its displacements (n, m, 3)."""
+    def following(self, u: Array, contact: PatchContact, stations: int) -> Self:
+        """Return this load, in an increment in which it advances by so many stations.
+
+        Parameters
+        ----------
+        u, contact : (n, m, 3) displacements without tractions, and contact, of the last increment
+        """
+
+
+class LoadAt(NamedTuple):
+    """A load and its place.
+
+    Attributes
+    ----------
+    load : the load; None for none
+    behind : number of stations by which it is behind x = 0
+    """
+
+    load: SteppedLoad | None
+    behind: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,23 +123,19 @@ class SteppedIncrement:
 
 
 class SteppedPrism:
-    """A prism that repeats itself, and the law of its zone.
+    """A prism whose plastic strain repeats itself after the length, and the law of its zone.
 
     Parameters
     ----------
-    track : the prism, without far field; stations are numbered as its own are, round the length
+    track : the prism; stations are numbered as its own are, round the length. The load of a clamped
+        one is in the middle of the span wherever it is
     law : law of the material
-
-    Raises
-    ------
-    ModelError
-        if the prism has a far field
+    parts : number of parts of the way of strain in an increment, `usual_parts` if None
     """
 
-    def __init__(self, track: PrismTrack, law: Law) -> None:
-        if track.far is not None:
-            raise ModelError("levels", "some", "must be 0: the length repeats itself")
+    def __init__(self, track: PrismTrack, law: Law, parts: int | None = None) -> None:
         self._track, self._law, self._modes = track, law, track.modes.everywhere
+        self._parts = parts or usual_parts(law)
         self._double_shear = 2 * law.elasticity.shear_modulus
         self._stiffness = law.stiffness(6)
         self._shape = len(self._modes.points), self._modes.stations, 6
@@ -128,11 +148,16 @@ class SteppedPrism:
         strain = np.broadcast_to(self._initial, self._shape)
         return SteppedState(self._law.initial(points * stations, 6), strain)
 
+    @property
+    def most_behind(self) -> int:
+        """Largest number of stations over which a load rolls before it meets its start."""
+        return self._modes.stations - self._track.grid.stations
+
     def rolled(self, before: SteppedState, load: SteppedLoad, advance: int) -> SteppedIncrement:
         """Return the state, without load, after a load has rolled over some stations to x = 0.
 
         The load is set down where it begins, rolls by one station in each increment, and is taken
-        off in the last one. Of that the contact is the last one.
+        off in the last one. Contact and displacement are those under the load, at x = 0.
 
         Parameters
         ----------
@@ -140,83 +165,112 @@ class SteppedPrism:
 
         Raises
         ------
+        ModelError, WindowTooSmall, NotConverged
+            as `along`
+        """
+        if not 0 <= advance <= self.most_behind:
+            raise ModelError("advance", advance, f"must be in 0 to {self.most_behind} stations")
+        path = [LoadAt(load, behind) for behind in range(advance, -1, -1)]
+        *_, last, off = self.along(before, [*path, LoadAt(None, 0)])
+        return replace(last, state=off.state)
+
+    def along(self, before: SteppedState, path: Iterable[LoadAt]) -> Iterator[SteppedIncrement]:
+        """Yield the increments of a path.
+
+        Raises
+        ------
         ModelError
-            if the load reaches where it began, round the length
+            if a place is not on the length
         WindowTooSmall
             if points yield at the rim of the zone
         NotConverged
             if an increment has no equilibrium
         """
-        most = self._modes.stations - self._track.grid.stations
-        if not 0 <= advance <= most:
-            raise ModelError("advance", advance, f"must be in 0 to {most} stations")
-        state = before
-        contact: PatchContact | None = None
-        advanced: Array | None = None
-        for left in range(advance, -1, -1):
-            # under a load that rolls, the last increment's change comes again one station on
-            guess = None if advanced is None else state.strain + np.roll(advanced, -1, axis=1)
-            after = self._increment(state, load, left, contact, guess)
-            advanced = after.state.strain - state.strain if left < advance else None
-            state, contact = after.state, after.contact
-            load = load.advanced(after.displacement, after.contact)
-        state = self._increment(state, _NoLoad(after.contact), 0, None, None).state
-        self._check_rim(before, state)
-        return SteppedIncrement(state, after.contact, after.displacement)
+        off = _NoLoad(self._track.grid)
+        last: SteppedIncrement | None = None
+        state, place, moved, change = before, 0, 0, np.zeros(self._shape)
+        for load, behind in path:
+            if not 0 <= behind <= self.most_behind:
+                raise ModelError("behind", behind, f"must be in 0 to {self.most_behind} stations")
+            step = place - behind if last else 0
+            now, guess, start = load or off, state.strain, None
+            if last:
+                now, start = now.following(last.displacement, last.contact, step), last.contact
+            if load and step and step == moved:
+                # under a load that rolls, the last increment's change comes again
+                guess = guess + np.roll(change, -step, axis=1)
+            last = self._increment(state, now, behind, start, guess)
+            self._check_rim(before, last.state)
+            change, place, moved, state = last.state.strain - state.strain, behind, step, last.state
+            yield last
 
     def _increment(
-        self, before: SteppedState, load: SteppedLoad, left: int, start: PatchContact | None,
-        guess: Array | None,
+        self, before: SteppedState, load: SteppedLoad, behind: int, start: PatchContact | None,
+        guess: Array,
     ) -> SteppedIncrement:  # fmt: skip
-        """Return an increment by Newton's method; the load is ``left`` stations behind x = 0."""
+        """Return an increment by Newton's method."""
 
         def at(strain: Array, start: PatchContact | None) -> _AtStrain:
-            flat = np.ascontiguousarray(strain.reshape(-1, 6).T)
-            response = self._law.respond(flat, before.state)
-            plastic = response.state.plastic_strain.T.reshape(self._shape)
-            eigenstress = self._double_shear * plastic
-            u = self._surface(eigenstress, left)
+            flow = _StandingFlow(self._law, before, strain, self._stiffness, self._parts)
+            eigenstress = self._double_shear * flow.plastic_strain
+            u = self._surface(eigenstress, behind)
             contact = load.solve(u, start)
-            made = self._initial + self._strain(eigenstress, contact.traction, left)
-            return _AtStrain(strain, response, u, contact, made - strain)
+            made = self._initial + self._strain(eigenstress, contact.traction, behind)
+            return _AtStrain(strain, flow, u, contact, made - strain)
 
-        here = at(before.strain if guess is None else guess, start)
+        here = at(guess, start)
         for _ in range(_STEPS):
-            size = np.linalg.norm(deviator(here.residual.reshape(-1, 6).T), axis=0).max()
-            if size * self._double_shear < _TOLERANCE * self._law.yield_stress:
-                state = SteppedState(here.response.state, here.strain)
+            if deviation(here.residual) * self._double_shear < _TOLERANCE * self._law.yield_stress:
+                state = SteppedState(here.flow.state, here.strain)
                 return SteppedIncrement(state, here.contact, here.displacement)
-            change, length = self._newton(here, left), 1.0
-            there = at(here.strain + change, here.contact)
-            while there.size >= here.size and length > _SHORTEST:
-                length /= 2
-                there = at(here.strain + length * change, here.contact)
-            here = there
+            change = self._newton(here, behind)
+
+            def after(share: float, here: _AtStrain = here, change: Array = change) -> _AtStrain:
+                return at(here.strain + share * change, here.contact)
+
+            here = searched(after, here.size)
         raise NotConverged("no equilibrium was found in an increment of a rolling load")
 
-    def _surface(self, eigenstress: Array, left: int) -> Array:
+    def _surface(self, eigenstress: Array, behind: int) -> Array:
         """Return the displacement (n, m, 3) of the grid under the load by an eigenstress [mm]."""
-        return self._track.on_grid(np.roll(self._modes.displacement(eigenstress), -left, axis=1))
+        return self._track.on_grid(np.roll(self._modes.displacement(eigenstress), -behind, axis=1))
 
-    def _strain(self, eigenstress: Array, traction: Array, left: int) -> Array:
+    def _strain(self, eigenstress: Array, traction: Array, behind: int) -> Array:
         """Return the strain (n, stations, 6) of an eigenstress, and of tractions of the load."""
-        forces = np.zeros((len(self._modes.along), self._modes.stations))
-        forces[:, : len(self._track.modes.x)] = self._track.on_rows(traction)
-        return self._modes.solve(eigenstress, np.roll(forces, left, axis=1)).strain
+        _, stations, _ = self._shape
+        forces = np.zeros((len(self._modes.along), stations))
+        own = self._track.on_rows(traction)
+        forces[:, : own.shape[1]] = own
+        strain = self._modes.solve(eigenstress, np.roll(forces, behind, axis=1)).strain
+        if self._track.far is not None:
+            first = self.most_behind - behind
+            far = self._far[:, first : first + stations]
+            strain += far @ self._track.far.resultants(own)
+        return strain
 
-    def _newton(self, here: _AtStrain, left: int) -> Array:
+    @cached_property
+    def _far(self) -> Array:
+        """Strain (n, most_behind + stations, 6, 4) by unit resultants; see `FarField`.
+
+        The first station is that by which the load at the start is farthest behind.
+        """
+        assert self._track.far is not None
+        downstream = np.arange(-self.most_behind, self._modes.stations) - self._track.before
+        apart = np.asarray(-self._track.grid.spacing * downstream, dtype=float)
+        return self._track.far.strain_at(apart)
+
+    def _newton(self, here: _AtStrain, behind: int) -> Array:
         """Return the change d of strain by Newton's equation."""
-        residual, soft = here.residual.reshape(-1, 6), np.flatnonzero(here.response.yielding)
+        residual, soft = here.residual.reshape(-1, 6), here.flow.soft
         if not len(soft):
             return here.residual
-        loss = np.moveaxis(self._stiffness[..., None] - here.response.tangent[..., soft], 2, 0)
 
         def made(change: Array) -> Array:
             eigenstress = np.zeros_like(residual)
-            eigenstress[soft] = np.matmul(loss, change.reshape(-1, 6, 1))[..., 0]
+            eigenstress[soft] = self._double_shear * here.flow.along(change.reshape(-1, 6))
             eigenstress = eigenstress.reshape(self._shape)
-            traction = here.contact.along(self._surface(eigenstress, left))
-            return self._strain(eigenstress, traction, left)
+            traction = here.contact.along(self._surface(eigenstress, behind))
+            return self._strain(eigenstress, traction, behind)
 
         def equation(change: Array) -> Array:
             return np.asarray(change - made(change).reshape(-1, 6)[soft].ravel())
@@ -234,6 +288,38 @@ class SteppedPrism:
             raise WindowTooSmall("the zone is too small: points yield at its rim")
 
 
+class _StandingFlow:
+    """The flow of all points from a state to a strain (n, stations, 6).
+
+    A point that is inside the yield surface at the end of its straight way is so all along it.
+
+    Attributes
+    ----------
+    state : internal variables (..., n * stations) at the end
+    plastic_strain : (n, stations, 6) Mandel
+    soft : numbers of the points that yield
+    """
+
+    def __init__(
+        self, law: Law, before: SteppedState, strain: Array, stiffness: Array, parts: int
+    ) -> None:
+        begin, end = before.strain.reshape(-1, 6), strain.reshape(-1, 6)
+        stress = stiffness @ (end.T - before.state.plastic_strain)
+        self.state = before.state
+        self.soft = np.flatnonzero(law.yield_value(stress, before.state) > 0)
+        if len(self.soft):
+            way = np.stack([begin[self.soft], end[self.soft]], axis=1)
+            self._sweep = sweep_of(law, way, before.state.at(self.soft), parts)
+            packed = before.state.packed
+            packed[:, self.soft] = self._sweep.states.packed[..., 0]
+            self.state = before.state.unpacked(packed)
+        self.plastic_strain = SteppedState(self.state, strain).plastic_strain
+
+    def along(self, change: Array) -> Array:
+        """Return the change of plastic strain (n_soft, 6) for one of strain at the soft points."""
+        return self._sweep.changes(change[:, None])[:, 0]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _AtStrain:
     """An iterate of Newton's method.
@@ -242,7 +328,7 @@ class _AtStrain:
     """
 
     strain: Array
-    response: Response
+    flow: _StandingFlow
     displacement: Array
     contact: PatchContact
     residual: Array
@@ -255,15 +341,22 @@ class _AtStrain:
 
 @dataclass(frozen=True, slots=True)
 class _NoLoad:
-    """No tractions, on the grid of a contact; see `SteppedLoad`."""
+    """No tractions; see `SteppedLoad`."""
 
-    contact: PatchContact
+    grid: PatchGrid
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """See `SteppedLoad`."""
-        nothing = np.zeros_like(self.contact.traction)
-        return replace(self.contact, traction=nothing, along=np.zeros_like)
+        nothing = np.zeros_like(u)
+        return PatchContact(
+            grid=self.grid,
+            traction=nothing,
+            gap=np.full(u.shape[:2], np.nan),
+            slip=np.full_like(u[..., :2], np.nan),
+            status=np.full(u.shape[:2], OPEN),
+            along=np.zeros_like,
+        )
 
-    def advanced(self, u: Array, contact: PatchContact) -> _NoLoad:
+    def following(self, u: Array, contact: PatchContact, stations: int) -> _NoLoad:
         """See `SteppedLoad`."""
         return self

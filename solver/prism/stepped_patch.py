@@ -1,17 +1,17 @@
 """An elastic wheel that rolls over a prism by increments, over material that stands still.
 
 The slip of a point of the surface is the change of its motion over the wheel since the last
-increment, in which it was one station further upstream under the wheel:
+increment, in which it was s stations further upstream under the wheel that advances by s:
 
-    slip[c] = r[c] - r_before[c - 1] + rigid slip,    r = u_t of surface minus wheel
+    slip[c] = r[c] - r_before[c - s] + s rigid slip,    r = u_t of surface minus wheel
 
-In a steady state r_before is r, which is the slip of `RollingPatch`.
+In a steady state r_before is r, which with s = 1 is the slip of `RollingPatch`. Where moment or
+lateral force is given, the motion of the wheel in the increment is unknown, as its height is.
 """
 
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,31 +22,39 @@ from solver.prism.patch import RollingPatch
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.prism.friction_cone import ConeProblem
     from solver.prism.patch_contact import PatchContact
+    from solver.prism.profiled_wheel import ProfiledWheel
 
     Array = NDArray[np.float64]
 
 
 class SteppedPatch(RollingPatch):
-    """A wheel that rolls by increments of one station, for `SteppedPrism.rolled`.
+    """A wheel that rolls by increments, for `SteppedPrism`; parameters are those of `RollingPatch`.
 
-    Parameters are those of `RollingPatch`. Before the first increment nothing has moved. A wheel
-    that is driven or braked needs a given ``creepage``: with a ``drive`` other than 0 the first
-    increment may find no contact.
+    In its first increment it is set down: it does not advance, and nothing has moved before. The
+    creepages of its contact are motions in the increment over the distance of two stations, which
+    is creepage if it advances by one.
     """
 
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
-        self._before = np.zeros_like(self._rest)
+        self._creepages, self._given = self._given, np.zeros_like(self._given)
 
-    def advanced(self, u: Array, contact: PatchContact) -> SteppedPatch:
-        """Return the wheel one station on, after a contact and its displacements (n, m, 3)."""
+    def _set(self, wheel: ProfiledWheel) -> None:
+        super()._set(wheel)
+        self._rest[..., TANGENTS] = 0.0
+
+    def following(self, u: Array, contact: PatchContact, stations: int) -> SteppedPatch:
+        """See `SteppedLoad`."""
         values, _ = self._known(contact)
         motion = (self._offset(u) + self._influence.of(values))[..., TANGENTS]
-        other = copy(self)
-        other._before = np.zeros_like(self._rest)
-        other._before[1:, :, TANGENTS] = motion[:-1]
+        other, n = copy(self), len(motion)
+        other._given = stations * self._creepages
+        other._rest, _ = self.wheel.rolling(self.grid)
+        other._rest[..., TANGENTS] *= stations
+        first, last = max(0, stations), min(n, n + stations)
+        if first < last:
+            other._rest[first:last, :, TANGENTS] -= motion[first - stations : last - stations]
         return other
 
     @staticmethod
@@ -59,8 +67,3 @@ class SteppedPatch(RollingPatch):
         local = np.einsum("jab,cjb->cja", self._axes, u)
         local[..., NORMAL] *= -1.0
         return np.asarray(local)
-
-    def _problem(self, u: Array) -> ConeProblem:
-        """Return the frictional problem of a surface with these displacements (n, m, 3)."""
-        problem = super()._problem(u)
-        return replace(problem, offset=problem.offset - self._before)

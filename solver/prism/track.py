@@ -47,6 +47,8 @@ class PrismTrack:
     ahead, behind : the window extends from x = ahead to x = -behind [mm]
     reach : half the length of the surface where the load may act [mm]
     levels : levels of the far field; without any the prism repeats itself
+    span : length of a prism that is clamped at both ends, the load in its middle [mm]; None if it
+        is endless
 
     Attributes
     ----------
@@ -76,6 +78,7 @@ class PrismTrack:
         behind: float,
         reach: float,
         levels: int = 3,
+        span: float | None = None,
     ) -> None:
         stations, before = round(length / spacing), round(ahead / spacing)
         window = before + round(behind / spacing) + 1
@@ -93,7 +96,9 @@ class PrismTrack:
             section, zone, length, stations, window=window,
             behind=_fading(stations - window), surface=surface.rows(self.grid),
         )  # fmt: skip
-        self.far = FarField(self.modes, -before * spacing, levels) if levels else None
+        if span is not None and not levels:
+            raise ModelError("span", span, "needs levels of far field")
+        self.far = FarField(self.modes, -before * spacing, levels, span) if levels else None
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
         self.rim = _rim(section, zone, self.modes.points)

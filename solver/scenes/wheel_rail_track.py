@@ -203,16 +203,25 @@ def section_of(own: RailGeometry) -> Section:
 
 
 @lru_cache(maxsize=2)
-def track_of(own: RailGeometry) -> PrismTrack:
-    """Return the rail, set up once in a process for each geometry."""
+def track_of(
+    own: RailGeometry, length: float | None = None, span: float | None = None
+) -> PrismTrack:
+    """Return the rail, set up once in a process for each geometry.
+
+    Parameters
+    ----------
+    length : after which waves repeat [mm]; by default long enough for a pass
+    span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
+        endless
+    """
     section, h = section_of(own), own.spacing
     # `rail_mesh` numbers the elements of the zone first
     elements = round(2 * own.half_width / own.size) * round(own.depth / own.size)
     return PrismTrack(
         section, np.arange(len(section.weights)) < elements, "running",
-        length=2 * h * math.ceil(_LENGTH * own.reach / h / 2), spacing=h,
+        length=length or 2 * h * math.ceil(_LENGTH * own.reach / h / 2), spacing=h,
         ahead=h * math.ceil(_AHEAD * own.reach / h), behind=h * math.ceil(_BEHIND * own.reach / h),
-        reach=own.reach, levels=_LEVELS,
+        reach=own.reach, levels=_LEVELS, span=span,
     )  # fmt: skip
 
 

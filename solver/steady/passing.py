@@ -17,7 +17,7 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -195,7 +195,12 @@ def passing(
             LinearOperator((n, n), matvec=newton, dtype=float),
             (scale * here.residual).ravel(), rtol=_FORCING, restart=krylov, maxiter=1,
         )  # fmt: skip
-        there = _along(at, here, found.reshape(shape) / scale)
+        change = found.reshape(shape) / scale
+
+        def moved(share: float, here: _At[S] = here, change: Array = change) -> _At[S]:
+            return at(here.added + share * change)
+
+        there = searched(moved, here.size)
         most_added = there.flow.most_added
         stalled = krylov == _MOST_KRYLOV and missed and there.size > _STALLED * here.size
         unsolved = here.size > _FAR_FROM * start
@@ -211,6 +216,15 @@ def passing(
     raise NotConverged(f"no steady pass was found in {len(sizes) - 1} steps of Newton's method")
 
 
+class _Sized(Protocol):
+    @property
+    def size(self) -> float:
+        """Norm of the residual."""
+
+
+Sized = TypeVar("Sized", bound=_Sized)
+
+
 @dataclass(frozen=True, slots=True)
 class _At(Generic[S]):
     """An iterate of Newton's method: strains, flow and load with them, residual and its norm."""
@@ -222,27 +236,33 @@ class _At(Generic[S]):
     size: float
 
 
-def _along(at: Callable[[Array], _At[S]], here: _At[S], change: Array) -> _At[S]:
+def searched(at: Callable[[float], Sized], size: float) -> Sized:
     """Return the iterate after a step, or after the largest share of it that lowers the residual.
 
     The residual has kinks where points begin to yield. If no share lowers it, the whole step is
     taken to leave the kink, unless the residual grows by more than `_AWAY`.
+
+    Parameters
+    ----------
+    at : (share of the step) -> iterate with ``size``, the norm of its residual; it may raise
+        `NotConverged`
+    size : norm of the residual before the step
     """
     tried = []
-    length = 1.0
-    while length >= _SHORTEST:
+    share = 1.0
+    while share >= _SHORTEST:
         try:
-            there = at(here.added + length * change)
+            there = at(share)
         except NotConverged as error:  # no contact was found for this shape of the surface
             failure = error
         else:
-            if there.size < (1 - 1e-4 * length) * here.size:
+            if there.size < (1 - 1e-4 * share) * size:
                 return there
             tried.append(there)
-        length /= 2
+        share /= 2
     if not tried:
         raise failure
-    return tried[0] if tried[0].size < _AWAY * here.size else min(tried, key=lambda a: a.size)
+    return tried[0] if tried[0].size < _AWAY * size else min(tried, key=lambda a: a.size)
 
 
 def _diverged(material: Law, most_added: float) -> NotConverged:
