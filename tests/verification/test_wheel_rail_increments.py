@@ -20,7 +20,7 @@ from solver.prism.stepped_patch import SteppedPatch
 from solver.prism.track import PrismTrack
 from solver.scenes.prism_passes import contact_of
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import geometry, track_of
+from solver.scenes.wheel_rail_track import RolledRail, geometry, track_of
 from solver.steady.passing import Pass, passing
 
 STEPS = 37
