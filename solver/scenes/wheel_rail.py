@@ -53,7 +53,7 @@ def method(parameters: WheelRailParameters) -> Method:
 
 def view(parameters: WheelRailParameters) -> View:
     """Return the positions of results: the head of the rail, and profiles under the contact."""
-    from solver.scenes.wheel_rail_track import expected_contact  # loads scikit-fem
+    from solver.scenes.wheel_rail_contact import expected_contact  # loads scikit-fem
 
     contact = expected_contact(parameters)
     beside = round(contact.across) / 2
@@ -74,7 +74,7 @@ def view(parameters: WheelRailParameters) -> View:
 
 def axle(run: FinishedRun) -> Values:
     """Return the height of the axle over that at which the undeformed bodies touch."""
-    from solver.scenes.wheel_rail_track import expected_contact
+    from solver.scenes.wheel_rail_contact import expected_contact
 
     contact: Any = run.outcome.points[run.view.loaded].touching
     return {AXLE_HEIGHT: contact.height + expected_contact(run.parameters).gap}
@@ -82,9 +82,9 @@ def axle(run: FinishedRun) -> Values:
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
-    from solver.scenes.wheel_rail_track import geometry, section_of
+    from solver.scenes.wheel_rail_track import geometry, meshed
 
-    section, count = section_of(geometry(parameters)), int(max(passes))
+    section, count = meshed(parameters, geometry(parameters)), int(max(passes))
     return Effort(
         elements=len(section.weights),
         unknowns=len(section.free),

@@ -13,8 +13,8 @@ from solver import ModelError, Record
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.scenes import SCENES
+from solver.scenes.wheel_rail_contact import expected_contact
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import expected_contact
 from tests.verification.hertz_ellipse import HertzEllipse
 
 SCENE = SCENES["wheel_rail"]
@@ -194,7 +194,7 @@ def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
 
 def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
     parameters = WheelRailParameters(lateral_position=8.0, accuracy="draft")
-    with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must keep the contact"):
+    with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must leave the flange beside"):
         next(SCENE.method(parameters)(SCENE, [parameters], lambda share: None))
 
 
