@@ -12,13 +12,14 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), chapter 6.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from solver.results.extremes import residual_extremes
 from solver.results.figures import cost, extremes
 from solver.results.maps import maps, profiles
+from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
 from solver.scenes.effort import Effort
@@ -32,10 +33,19 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from solver.prism.patch_contact import PatchContact
     from solver.results.run import FinishedRun, Values
 
     Array = NDArray[np.float64]
 
+AXLE_LATERAL_CREEPAGE = declare(
+    "axle_lateral_creepage", "velocity of the axle along z over that along x", "1"
+)
+SPIN_MOMENT = declare(
+    "spin_moment",
+    "moment of the contact on the rail about the downward vertical through the running circle",
+    "N mm",
+)
 _HALF_HEAD, _MAPPED, _ALONG = 36.0, 16.0, 20.0
 """Half the width of maps, their depth, and half their length along the rail [mm]."""
 _PIXEL = 0.5
@@ -73,11 +83,18 @@ def view(parameters: WheelRailParameters) -> View:
 
 
 def axle(run: FinishedRun) -> Values:
-    """Return the height of the axle over that at which the undeformed bodies touch."""
+    """Return the height of the axle over that at which the undeformed bodies touch, and its slip.
+
+    The moment is that about the vertical through the running circle.
+    """
     from solver.scenes.wheel_rail_contact import expected_contact
 
-    contact: Any = run.outcome.points[run.view.loaded].touching
-    return {AXLE_HEIGHT: contact.height + expected_contact(run.parameters).gap}
+    p, contact = run.parameters, cast("PatchContact", run.outcome.points[run.view.loaded].touching)
+    return {
+        AXLE_HEIGHT: contact.height + expected_contact(p).gap,
+        AXLE_LATERAL_CREEPAGE: contact.lateral_creepage,
+        SPIN_MOMENT: contact.spin_moment + p.lateral_position * float(contact.force[0]),
+    }
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:

@@ -202,6 +202,7 @@ def wheel_of(parameters: WheelRailParameters, aside: float = 0.0) -> ProfiledWhe
         radius=p.wheel_radius,
         elasticity=p.wheel_elasticity,
         middle=at,
+        yaw=p.yaw,
     )
 
 

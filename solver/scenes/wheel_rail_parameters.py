@@ -41,10 +41,25 @@ class WheelRailParameters(MaterialParameters):
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
     )
+    lateral_control: Literal["creepage", "force"] = described(
+        "creepage", "whether `lateral_creepage` is prescribed, or `given_lateral_force`"
+    )
     lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
-        "velocity of the wheel along z over that along x, relative to rolling: the yaw angle of a "
-        "wheel whose heading is turned towards the middle of the track",
+        "velocity of the axle along z over that along x; yaw makes the wheel creep too",
+    )
+    given_lateral_force: Annotated[float, Interval(ge=-1e6, le=1e6), Unit("N")] = described(
+        0.0, "prescribed force of the wheel on the rail along z"
+    )
+    yaw: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("rad")] = described(
+        0.0,
+        "angle by which the wheel is turned about the vertical; a positive one turns its heading "
+        "towards the middle of the track",
+    )
+    spin: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1/mm")] = described(
+        0.0,
+        "rotation of the wheel about the downward vertical over its velocity, beside the spin that "
+        "the slope of the contact makes",
     )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
         -4.0,
@@ -84,6 +99,19 @@ class WheelRailParameters(MaterialParameters):
         if self.traction and not self.friction:
             raise ModelError("traction", self.traction, "must be 0 without friction")
         check_control(self.control, self.traction, self.given_creepage)
+        self._check_lateral()
+
+    def _check_lateral(self) -> None:
+        """Raise `ModelError` for a lateral force or creepage that has no effect."""
+        force, creepage = self.given_lateral_force, self.lateral_creepage
+        if self.lateral_control == "creepage" and force:
+            raise ModelError("given_lateral_force", force, "needs lateral_control = force")
+        if self.lateral_control == "force" and creepage:
+            allowed = "must be 0 with lateral_control = force"
+            raise ModelError("lateral_creepage", creepage, allowed)
+        if self.lateral_control == "force" and not self.friction:
+            allowed = "must be creepage without friction"
+            raise ModelError("lateral_control", self.lateral_control, allowed)
 
     @property
     def idle(self) -> Mapping[str, str]:

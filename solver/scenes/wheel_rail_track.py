@@ -174,5 +174,6 @@ class RolledRail:
         return RollingPatch(
             track.grid, track.compliance, wheel_of(p), friction=p.friction, force=p.load,
             drive=None if p.control == "creepage" else p.traction,
-            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
+            lateral_force=None if p.lateral_control == "creepage" else p.given_lateral_force,
+            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage, spin=p.spin,
         )  # fmt: skip
