@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.mesh.rail import rail_60e1
-from solver.mesh.wheel_profile import conical, crowned, s1002
+from solver.mesh.wheel_profile import conical, crowned, measured, s1002
 from solver.prism.profiled_wheel import ProfiledWheel
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from solver.mesh.rail import RailSection
     from solver.mesh.wheel_profile import WheelProfile
-    from solver.scenes.wheel_rail_parameters import WheelRailParameters
+    from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
 
     Array = NDArray[np.float64]
 
@@ -209,6 +209,8 @@ def wheel_of(parameters: WheelRailParameters, aside: float = 0.0) -> ProfiledWhe
 def wheel_profile(parameters: WheelRailParameters) -> WheelProfile:
     """Return the profile of the wheel, its running circle at z = 0."""
     p = parameters
+    if not isinstance(p.wheel_profile, str):
+        return measured(np.array(p.wheel_profile).T)
     if p.wheel_profile == "s1002":
         return s1002()
     return conical(p.wheel_slope) if p.wheel_profile == "conical" else crowned(p.crown_radius)
@@ -216,13 +218,16 @@ def wheel_profile(parameters: WheelRailParameters) -> WheelProfile:
 
 def rail_of(parameters: WheelRailParameters) -> RailSection:
     """Return the section of the rail."""
-    return canted(parameters.cant)
+    return canted(parameters.rail_profile, parameters.cant)
 
 
 @lru_cache(maxsize=16)
-def canted(cant: float) -> RailSection:
+def canted(profile: str | Points, cant: float) -> RailSection:
     """Return the section of a canted rail."""
-    return rail_60e1().canted(cant)
+    section = rail_60e1()
+    if not isinstance(profile, str):
+        section = section.worn(np.array(profile).T)
+    return section.canted(cant)
 
 
 def upper(section: RailSection) -> tuple[float, float]:

@@ -18,10 +18,21 @@ from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
 from solver.prism.track import PrismTrack
-from solver.scenes.wheel_rail_contact import canted, expected_contact, rail_of, upper, wheel_of
+from solver.scenes.wheel_rail_contact import (
+    canted,
+    expected_contact,
+    rail_of,
+    upper,
+    wheel_of,
+    wheel_profile,
+)
 
 if TYPE_CHECKING:
-    from solver.scenes.wheel_rail_parameters import WheelRailParameters
+    from numpy.typing import NDArray
+
+    from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
+
+    Array = NDArray[np.float64]
 
 _FOOT = 150.0
 """Width of the foot of the rail, over which the foundation acts [mm]."""
@@ -34,6 +45,10 @@ _REACH, _AHEAD, _BEHIND, _LENGTH = 1.15, 2.2, 2.6, 7.0
 and behind, and the length after which waves repeat."""
 _STEP = 0.05
 """Step with which the radius of the surface is searched [mm]."""
+_SMOOTH = 4.0
+"""Least radius of a curve through points in the zone, over the side of elements."""
+_APART = 6.0
+"""Largest distance of points of a profile in the zone [mm]."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _LEVELS = 4
@@ -46,12 +61,13 @@ class RailGeometry:
 
     Attributes
     ----------
-    cant, foundation : of the rail
+    profile, cant, foundation : of the rail
     elasticity : Young's modulus and Poisson ratio of the rail
     at, half_width, depth, size : of the zone [mm]
     spacing, reach : distance of stations; half the length where the load may act [mm]
     """
 
+    profile: str | Points
     cant: float
     foundation: float
     elasticity: tuple[float, float]
@@ -103,11 +119,16 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
             f"must keep the contact, expected about z = {contact.middle:g} mm, farther than "
             f"{half_width:g} mm from the ends of the wheel's profile",
         )  # fmt: skip
-    mean = math.sqrt(contact.widest * contact.along)
-    bend = float(section.outline.curvature(np.arange(ends[0], ends[1], _STEP)).max())
+    s = np.arange(ends[0], ends[1], _STEP)
+    z, curvature = section.outline.at(s)[0], section.outline.curvature(s)
+    _check_points("rail_profile", p.rail_profile, z, curvature, h)
+    z = z - p.lateral_position
+    _check_points("wheel_profile", p.wheel_profile, z, wheel_profile(p).curvature(z), h)
+    mean, bend = math.sqrt(contact.widest * contact.along), float(curvature.max())
     # columns of the zone that turn with the surface must not meet
     deepest = h * math.floor(_DEEPEST / bend / h) if bend > 0 else math.inf
     return RailGeometry(
+        profile=p.rail_profile,
         cant=p.cant,
         foundation=p.foundation,
         elasticity=(p.youngs_modulus, p.poisson_ratio),
@@ -120,6 +141,35 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     )
 
 
+def _check_points(name: str, points: str | Points, z: Array, curvature: Array, size: float) -> None:
+    """Raise `ModelError` for points that do not tell the profile to elements of a size [mm].
+
+    Parameters
+    ----------
+    z, curvature : (n,) positions in the zone, and the curvature of the profile there [mm, 1/mm]
+    """
+    if isinstance(points, str):
+        return
+    at = int(abs(curvature).argmax())
+    radius = 1 / max(float(abs(curvature[at])), 1e-9)
+    told = f"{len(points)} points"
+    if radius < _SMOOTH * size:
+        allowed = (
+            f"must be smooth: at z = {z[at]:.4g} mm the radius of the curve through them is "
+            f"{radius:.2g} mm, below {_SMOOTH:g} sides of elements; smooth the points"
+        )
+        raise ModelError(name, told, allowed)
+    given = np.array(points)[:, 0]
+    inside = np.flatnonzero((given[1:] > z.min()) & (given[:-1] < z.max()))
+    widest = inside[np.diff(given)[inside].argmax()] if len(inside) else 0
+    if np.diff(given)[widest] > _APART:
+        allowed = (
+            f"must have points at most {_APART:g} mm apart where the bodies touch, not "
+            f"{given[widest]:g} and {given[widest + 1]:g}"
+        )
+        raise ModelError(name, told, allowed)
+
+
 @lru_cache(maxsize=4)
 def section_of(own: RailGeometry) -> Section:
     """Return the meshed section of a rail on its foundation."""
@@ -127,7 +177,7 @@ def section_of(own: RailGeometry) -> Section:
     E, nu = own.elasticity
     spring = own.foundation / _FOOT
     return Section(
-        rail_mesh(canted(own.cant), zone),
+        rail_mesh(canted(own.profile, own.cant), zone),
         Elasticity(youngs_modulus=E, poisson_ratio=nu),
         springs={"foot": (spring, spring, spring)},
     )
