@@ -11,7 +11,7 @@ import httpx
 
 from studies.errors import StudyError
 from studies.storage.appearing import appearing
-from studies.toml import read_toml
+from studies.toml import read_study
 
 _WAIT = 60.0
 """Seconds to wait for an answer."""
@@ -40,7 +40,7 @@ class Service:
 
     def submit(self, path: Path) -> dict[str, Any]:
         """Send a study file, and before it the scene file it names; the service checks both."""
-        content = read_toml(path, "file")
+        content = read_study(path)
         scene = content.get("scene")
         if isinstance(scene, str) and scene.endswith(".toml"):
             content["scene"] = self.post_scene(path.parent / scene)["id"]

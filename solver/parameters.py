@@ -47,6 +47,8 @@ def check(parameters: Any) -> None:
         value = getattr(parameters, name)
         if isinstance(value, str) and value in choices:
             continue
+        if kinds is tuple and choices and isinstance(value, str):
+            raise ModelError(name, value, f"must be {wanted}")
         if kinds is tuple or (value is None and name in _left_out(parameters.__class__)):
             continue
         if kinds is str and not choices and isinstance(value, str):  # a name
@@ -92,7 +94,7 @@ def _rules(kind: Any) -> tuple[_Rule, ...]:
         of, choices, limits = _taken_apart(hints[item.name])
         bounds = tuple(bound for limit in limits for bound in _bounds(limit))
         kinds, wanted = {
-            str: (str, ""), bool: (bool, ""), tuple: (tuple, ""), int: (int, "an integer")
+            str: (str, ""), bool: (bool, ""), tuple: (tuple, "a list"), int: (int, "an integer")
         }.get(of, ((int, float), "a number"))  # fmt: skip
         wanted = " or ".join([wanted, *choices])
         rules.append((item.name, kinds, wanted, choices, bounds))

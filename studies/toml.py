@@ -1,4 +1,4 @@
-"""Read TOML files of studies and scenes."""
+"""Read TOML files of studies and scenes, and the files of points that a study names."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from solver.errors import ModelError
 from studies.errors import StudyError
 
 
@@ -23,6 +24,44 @@ def read_toml(path: Path | str, field: str) -> dict[str, Any]:
     except OSError as error:
         raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
     return toml_of(data, field, str(path))
+
+
+def read_study(path: Path | str) -> dict[str, Any]:
+    """Return the tables of a study file.
+
+    Among parameters and in the sweep, a text that ends in ``.csv`` or ``.txt`` names a file beside
+    the study. Its points take its place, so that the content of a study needs no other file.
+
+    Raises
+    ------
+    StudyError
+        for ``file``, when the study cannot be read or is no TOML; for the place that names a file
+        of points which cannot be read
+    """
+    tables = read_toml(path, "file")
+    for table in _MAY_NAME_FILES:
+        if table in tables:
+            tables[table] = _with_points(tables[table], table, Path(path).parent)
+    return tables
+
+
+_MAY_NAME_FILES, _OF_POINTS = ("parameters", "sweep"), (".csv", ".txt")
+
+
+def _with_points(value: Any, field: str, folder: Path) -> Any:
+    """Return a value with points in place of names of files."""
+    if isinstance(value, dict):
+        return {key: _with_points(each, f"{field}.{key}", folder) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_with_points(each, f"{field}[{k}]", folder) for k, each in enumerate(value)]
+    if not isinstance(value, str) or not value.endswith(_OF_POINTS):
+        return value
+    from solver.mesh.points import read_points  # loads numpy
+
+    try:
+        return read_points(folder / value).T.tolist()
+    except ModelError as error:
+        raise StudyError(field, value, f"{error.field} {error.allowed}") from None
 
 
 def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:

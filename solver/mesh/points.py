@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +14,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_FEWEST = 4
+"""Smallest number of points of a curve."""
+
 
 def read_points(path: str | Path) -> Array:
-    """Return the points (2, n) of a file of comma-separated values: z, y in each line [mm].
+    """Return the points (2, n) of a text file: z, y in each line, with comma or space between [mm].
 
     A first line without numbers is a heading. `checked_points` says what is allowed.
 
@@ -27,7 +29,7 @@ def read_points(path: str | Path) -> Array:
         for ``file``, if it cannot be read or a line does not have two numbers; for ``points``
     """
     try:
-        lines = list(csv.reader(Path(path).read_text().splitlines()))
+        lines = [line.replace(",", " ").split() for line in Path(path).read_text().splitlines()]
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError("file", str(path), f"must be a readable text file: {error}") from None
     points = []
@@ -37,10 +39,32 @@ def read_points(path: str | Path) -> Array:
         except ValueError:
             if number == 1 or not line:
                 continue
-            allowed = f"must have two numbers in each line; line {number} is {','.join(line)!r}"
+            allowed = f"must have two numbers in each line; line {number} is {' '.join(line)!r}"
             raise ModelError("file", str(path), allowed) from None
         points.append((z, y))
     return checked_points(np.array(points).reshape(-1, 2).T)
+
+
+def as_points(field: str, value: Any) -> tuple[tuple[float, float], ...]:
+    """Return points as pairs z, y, from pairs or an array (n, 2) [mm].
+
+    Raises
+    ------
+    ModelError
+        for ``field``, if they are not at least four pairs of finite numbers, z increasing
+    """
+    try:
+        X = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        X = np.zeros(0)
+    if X.ndim != 2 or X.shape[1] != 2 or not np.isfinite(X).all():
+        raise ModelError(field, value, "must be a list of points [z, y]")
+    if len(X) < _FEWEST:
+        raise ModelError(field, X.tolist(), f"must have at least {_FEWEST} points")
+    for k in np.flatnonzero(np.diff(X[:, 0]) <= 0)[:1]:
+        allowed = f"must be points whose z increases; these are number {k} and {k + 1}"
+        raise ModelError(field, X[k : k + 2].tolist(), allowed)
+    return tuple((float(z), float(y)) for z, y in X)
 
 
 def checked_points(points: Array) -> Array:
@@ -49,7 +73,7 @@ def checked_points(points: Array) -> Array:
     They must be at least four finite points, the first coordinate increasing.
     """
     X = np.asarray(points, dtype=float)
-    if X.ndim != 2 or len(X) != 2 or X.shape[1] < 4 or not np.isfinite(X).all():
+    if X.ndim != 2 or len(X) != 2 or X.shape[1] < _FEWEST or not np.isfinite(X).all():
         raise ModelError("points", X.shape, "must be two rows of at least four finite numbers")
     for k in np.flatnonzero(np.diff(X[0]) <= 0)[:1]:
         raise ModelError("points", X[:, k + 1].tolist(), f"must lie to the right of {X[0, k]:g}")

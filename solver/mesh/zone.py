@@ -38,6 +38,8 @@ _TURN = 0.6
 """Largest ratio of the turn of columns to that of the surface, and of the part of their distance
 that they lose at the bottom of the zone. Columns in one direction meet those beside the zone at 20
 degrees where it reaches the side of the head."""
+_SHARPEST = math.sin(math.radians(15.0))
+"""Least sine of the angles of elements."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,14 +87,16 @@ def rail_mesh(section: RailSection, zone: Zone) -> MeshQuad2:
     """Return the mesh of a rail; its boundaries are ``running`` and ``foot``, the base.
 
     With zones of 20 x 14 mm and less in the middle of the head, up to 25 mm from its axis, angles
-    of elements are from 30 to 150 degrees. Corners of the rail are flattened a little: the area of
-    the mesh is 0.1 % too small.
+    of elements are from 30 to 150 degrees. A zone over the corner of the head may reach from 13 mm
+    below the top to the middle of the head, if it is 10 mm deep. Corners of the rail are flattened
+    a little: the area of the mesh is 0.1 % too small.
 
     Raises
     ------
     ModelError
-        for ``at`` or ``half_width``, if the zone leaves the running surface; for ``depth``, if it
-        is deeper than the head
+        for ``at`` or ``half_width``, if the zone leaves the running surface, or reaches so far over
+        the side of the head that elements beside it are too sharp; for ``depth``, if it is deeper
+        than the head
     """
     outline, places, (right, left) = section.outline, section.places, section.running
     middle = section.place(zone.at)
@@ -123,7 +127,20 @@ def rail_mesh(section: RailSection, zone: Zone) -> MeshQuad2:
         patch(ankle, web[1], neck, web[0]),
         *foot,
     ]
-    return joined_patches(patches, {"running": block[:, 1::2, -1], "foot": base[:, 1::2]})
+    mesh = joined_patches(patches, {"running": block[:, 1::2, -1], "foot": base[:, 1::2]})
+    if _sharpest(mesh) < _SHARPEST:
+        allowed = "must be smaller or less deep: elements beside the zone would be too sharp"
+        raise ModelError("half_width", zone.half_width, allowed)
+    return mesh
+
+
+def _sharpest(mesh: MeshQuad2) -> float:
+    """Return the least sine of an angle between the straight sides of an element."""
+    X = mesh.p[:, mesh.t]
+    side = np.roll(X, -1, axis=1) - X
+    side /= np.hypot(*side)
+    before = np.roll(side, 1, axis=1)
+    return float((before[0] * side[1] - before[1] * side[0]).min())
 
 
 def _head(

@@ -169,9 +169,7 @@ class RollingPatch:
         with one_thread():
             found = self._solve(u, start)
         status = found.status
-        rim = [status[0], status[-1], status[:, 0], status[:, -1]]
-        if any((part != OPEN).any() for part in rim):
-            raise WindowTooSmall("the contact reaches the outermost stations or vertices")
+        _check_rim(status)
         rigid = self._given.copy()
         rigid[self._free] = found.rigid
         return PatchContact(
@@ -200,6 +198,7 @@ class RollingPatch:
         try:
             found = solve_cone(problem, smooth.values, self._rolling_freely(problem, smooth))
         except NoContact:
+            _check_rim(smooth.status)
             self._check_sliding(u)
             raise
         found.steps += smooth.steps
@@ -323,6 +322,13 @@ class RollingPatch:
             raise LimitLoad(much, carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
         raise Spins(much, carried, 1.0)
+
+
+def _check_rim(status: NDArray[np.int64]) -> None:
+    """Raise `WindowTooSmall` if an outermost station or vertex (n, m) is closed."""
+    rim = [status[0], status[-1], status[:, 0], status[:, -1]]
+    if any((part != OPEN).any() for part in rim):
+        raise WindowTooSmall("the contact reaches the outermost stations or vertices")
 
 
 def _apart(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Array:

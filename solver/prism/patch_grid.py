@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.prism.hats import Hats
+from solver.prism.hats import SHARES, Hats
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 
 _FEWEST = 3
 """Smallest number of vertices and of stations: the outermost ones must not touch."""
+_CUBIC = (
+    [(t * (1 - t) ** 2, -(t**2) * (1 - t)) for t in SHARES],
+    [((1 - t) * (1 - 3 * t), t * (3 * t - 2)) for t in SHARES],
+)
+"""Heights and slopes at the points of the hats, over the length of an edge, of the two cubics that
+are 0 at both ends, and have the slope 1 at one of them and 0 at the other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,17 +92,18 @@ class PatchGrid:
 
     @property
     def surface(self) -> tuple[Array, Array, Array]:
-        """Positions z, y and slope dy/dz (2m - 2,) of the surface at the points of the hats.
+        """Positions z, y and slope angle (2m - 2,) of the surface at the points of the hats.
 
-        Between vertices it is the cubic with their positions and slopes.
+        Between vertices it is the cubic with their positions and directions over the straight line
+        between them.
         """
-        z = Hats.along(self.z[:-1], self.z[1:])
-        length = np.repeat(np.diff(self.z), 2)
-        share = (z - np.repeat(self.z[:-1], 2)) / length
-        slope = np.tan(self.angle)
-        first, last = (np.repeat(part, 2) for part in (self.y[:-1], self.y[1:]))
-        before, after = (np.repeat(part, 2) * length for part in (slope[:-1], slope[1:]))
-        rise = last - first
-        bend, twist = 3 * rise - 2 * before - after, before + after - 2 * rise
-        y = first + share * (before + share * (bend + share * twist))
-        return z, y, (before + share * (2 * bend + 3 * share * twist)) / length
+        along = np.stack([np.diff(self.z), np.diff(self.y)])
+        chord = np.arctan2(along[1], along[0])
+        before, after = np.tan(self.angle[:-1] - chord), np.tan(self.angle[1:] - chord)
+        rise, slope = (
+            np.stack([a * before + b * after for a, b in pairs], axis=1) for pairs in _CUBIC
+        )
+        across = np.stack([-along[1], along[0]])[..., None] * rise
+        first = np.stack([self.z, self.y])[:, :-1, None]
+        z, y = (first + along[..., None] * SHARES + across).reshape(2, -1)
+        return z, y, (chord[:, None] + np.arctan(slope)).ravel()

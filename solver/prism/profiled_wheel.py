@@ -1,4 +1,8 @@
-"""A wheel of revolution that rolls along a surface: its gap, and its rigid slip."""
+"""A wheel of revolution that rolls along a surface: its gap, and its rigid slip.
+
+The surface is a prism along x, so that its normals lie in planes across. The wheel may be yawed:
+its axle is turned about y, and with it its shape.
+"""
 
 from __future__ import annotations
 
@@ -19,45 +23,150 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_FAR = 10.0
+"""Largest gap that is told apart [mm]; no contact is so soft that a larger one closes."""
+_STEPS, _CLOSE = 40, 1e-13
+"""Newton steps along a normal, and the last one of them over the radius."""
+_TURNS = 8
+"""Iterations for the lowest line of a yawed wheel; each is better by about the yaw."""
+_LONGEST, _LEAST = 1.0, 0.1
+"""Longest Newton step [mm], and smallest rate at which a gap is taken to close along a normal."""
+_ASIDE = 1e-4
+"""Half the distance over which slopes of the wheel are differences [mm]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProfiledWheel:
-    """A wheel whose axle is along z, above x = 0.
+    """A wheel whose running circle touches y = 0 at x = 0 when its height is 0.
 
     Attributes
     ----------
-    profile : (positions z) -> height of the wheel's lowest line above the height of the wheel [mm]
+    profile : (positions z) -> height of the wheel's lowest line above the height of the wheel, when
+        its axle is along z [mm]; inf where there is no wheel
     radius : R, rolling radius where the profile is zero [mm]
     elasticity : elastic constants of its surface; with an infinite modulus it is rigid
+    middle : position z of the vertical axis of yaw and spin [mm]
+    yaw : angle by which the wheel is turned about y: a positive one turns its heading from x
+        towards -z [rad]
     """
 
     profile: Callable[[Array], Array]
     radius: float
     elasticity: Elasticity
+    middle: float = 0.0
+    yaw: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise `ModelError` for a radius that is not positive."""
+        """Raise `ModelError` for a radius that is not positive, or a yaw of a quarter turn."""
         if not self.radius > 0:
             raise ModelError("radius", self.radius, "must be positive")
+        if not abs(self.yaw) < np.pi / 4:
+            raise ModelError("yaw", self.yaw, "must lie between -pi/4 and pi/4")
+
+    def lowest(self, z: Array) -> Array:
+        """Return the position x (...) where the wheel is lowest over a line along x at ``z`` [mm].
+
+        There a surface along x touches the wheel first: ahead of the axle, or behind it, on the
+        slopes of a yawed wheel.
+        """
+        sin, cos = np.sin(self.yaw), np.cos(self.yaw)
+        x = np.zeros_like(z)
+        if not sin:
+            return x
+        for _ in range(_TURNS):
+            at = self._axial(x, z)
+            slope = (self.profile(at + _ASIDE) - self.profile(at - _ASIDE)) / (2 * _ASIDE)
+            across = (self.radius - self.profile(at)) * slope * sin / cos
+            x = np.where(np.isfinite(across), (sin * (z - self.middle) - across) / cos, 0.0)
+        return x
+
+    def surface(self, x: Array, z: Array) -> Array:
+        """Return the height y (...) of the wheel's surface over places, inf where it is not [mm].
+
+        Raises `ModelError` for places beyond the radius.
+        """
+        radius = self.radius - np.asarray(self.profile(self._axial(x, z)), dtype=float)
+        across = np.cos(self.yaw) * x - np.sin(self.yaw) * (z - self.middle)
+        here = np.isfinite(radius)
+        below = np.where(here, radius, self.radius) ** 2 - across**2
+        if not (below > 0).all():
+            reach = float(np.where(here, radius, np.inf).min())
+            allowed = f"stations must lie within {reach:g} of x = 0"
+            raise ModelError("ahead", float(np.abs(x).max()), allowed)
+        return np.asarray(np.where(here, self.radius - np.sqrt(below), np.inf))
+
+    def above(self, x: Array, z: Array, y: Array, angle: Array) -> tuple[Array, Array, float]:
+        """Return what lies above places on a surface, along its normals.
+
+        The gap is that of the wheel at a height at which it touches one of the places.
+
+        Parameters
+        ----------
+        x, z, y : (...) positions, arrays that fit together [mm]
+        angle : (...) slope angles of the surface [rad]
+
+        Returns
+        -------
+        gap (...), at most 10 [mm]; position z of the wheel's surface there (...); that height [mm]
+
+        Raises
+        ------
+        ModelError
+            for ``profile``, if there is nowhere a wheel above
+        """
+        x, z, y, angle = np.broadcast_arrays(x, z, y, angle)
+        vertical = self.surface(x, z) - y
+        height = -float(vertical.min())
+        if not np.isfinite(height):
+            raise ModelError("profile", height, "must have a wheel above the surface")
+        sin, cos = np.sin(angle), np.cos(angle)
+
+        def left(t: Array) -> Array:
+            return self.surface(x, z - t * sin) + height - y - t * cos
+
+        # the first root along the normal lies between what was found open and what was closed
+        t, last = np.zeros_like(z), np.full_like(z, _FAR)
+        first, gap = t, vertical + height
+        for _ in range(_STEPS):
+            beside = [self.surface(x, z - t * sin + side) for side in (-_ASIDE, _ASIDE)]
+            with np.errstate(invalid="ignore"):
+                slope = (beside[1] - beside[0]) / (2 * _ASIDE)
+                rate = np.maximum(np.nan_to_num(cos + sin * slope, posinf=1.0), _LEAST)
+            step = np.nan_to_num(gap, posinf=_FAR) / rate
+            t_new = np.minimum(t + np.clip(step, -_LONGEST, _LONGEST), _FAR)
+            t_new = np.where((first <= t_new) & (t_new <= last), t_new, (first + last) / 2)
+            done = np.abs(t_new - t).max() <= _CLOSE * self.radius
+            t, gap = t_new, left(t_new)
+            if done:
+                break
+            first, last = np.where(gap > 0, t, first), np.where(gap > 0, last, t)
+        return t, z - t * sin, height
+
+    def _axial(self, x: Array, z: Array) -> Array:
+        """Return the position along the axle, from that of the running circle, as of a profile."""
+        along = np.sin(self.yaw) * x + np.cos(self.yaw) * (z - self.middle)
+        return np.asarray(self.middle + along)
+
+    def _at(self, grid: PatchGrid) -> tuple[Array, Array]:
+        """Return gap at height 0 [mm], and rolling radius of what lies above over R, (n, m)."""
+        z, y, angle = grid.surface
+        x = grid.x[:, None]
+        if not np.isfinite(self.surface(x, z)).all():
+            allowed = "must be finite at every vertex and between"
+            raise ModelError("profile", f"{z[0]:g} to {z[-1]:g} mm", allowed)
+        gap, at, height = self.above(x, z, y, angle)
+        rise = np.asarray(self.profile(self._axial(x, at)), dtype=float)
+        arc = 1 - np.where(np.isfinite(rise), rise, y) / self.radius
+        mean = grid.hats.mean.T
+        return gap @ mean - height * np.cos(grid.angle), arc @ mean
 
     def gap(self, grid: PatchGrid) -> Array:
         """Return the gap (n, m) above the surface along its normals, at height 0 [mm].
 
-        At height d it is larger by d cos(angle). Raises `ModelError` where there is no wheel above.
+        At height d it is larger by d cos(angle). It is exact at the height at which the undeformed
+        bodies touch. Raises `ModelError` where there is no wheel above.
         """
-        z, y, slope = grid.surface
-        height = np.asarray(self.profile(z), dtype=float)
-        if not np.isfinite(height).all():
-            raise ModelError("profile", height, "must be finite at every vertex and between")
-        radius = self.radius - height
-        below = radius**2 - grid.x[:, None] ** 2
-        if not (below > 0).all():
-            reach = float(radius.min())
-            raise ModelError(
-                "ahead", float(grid.ahead), f"stations must lie within {reach:g} of x = 0"
-            )
-        gap = height - y + radius - np.sqrt(below)
-        return np.asarray((gap / np.hypot(1, slope)) @ grid.hats.mean.T)
+        return self._at(grid)[0]
 
     def rolling(self, grid: PatchGrid) -> tuple[Array, Array]:
         """Return slip and gap of the rigid wheel: (n, m, 3) at rest, (4, n, m, 3) of its motions.
@@ -66,17 +175,20 @@ class ProfiledWheel:
         and across; the gap lies between, as the normal does among local axes. Motions are height
         [mm], longitudinal creepage, lateral creepage, spin [1/mm]. With a wheel that turns by w and
         advances by V per time, longitudinal creepage is 1 - w R / V, lateral creepage its velocity
-        along z over V, spin its rotation about -y over V.
+        along z over V, spin its rotation about -y over V. That of yaw is in what is at rest.
         """
         h, sin, cos = grid.spacing, np.sin(grid.angle), np.cos(grid.angle)
-        x = grid.x[:, None]
-        arc = 1 - grid.hats.mean @ np.asarray(self.profile(grid.surface[0])) / self.radius
-        turned = x * sin / self.radius  # the wheel's rotation has a part along the normal
-        rest = np.zeros((grid.stations, len(grid.z), 3))
-        rest[..., 0], rest[..., 1], rest[..., 2] = h * (arc - 1), self.gap(grid), h * turned
+        x, z = grid.x[:, None], grid.z - self.middle
+        gap, arc = self._at(grid)
+        ahead, aside = np.cos(self.yaw), np.sin(self.yaw)
+        # the velocity of the wheel's surface over w R, about the axle (aside, 0, ahead)
+        along, up, across = ahead * arc, (ahead * x - aside * z) / self.radius, -aside * arc
+        turned = up * sin + across * cos
+        rest = np.zeros((grid.stations, len(z), 3))
+        rest[..., 0], rest[..., 1], rest[..., 2] = h * (along - 1), gap, h * turned
         motions = np.zeros((4, *rest.shape))
         motions[0, ..., 1] = cos
-        motions[1, ..., 0], motions[1, ..., 2] = -h * arc, -h * turned
+        motions[1, ..., 0], motions[1, ..., 2] = -h * along, -h * turned
         motions[2, ..., 2] = -h * cos
-        motions[3, ..., 0], motions[3, ..., 2] = h * grid.z, -h * cos * x
+        motions[3, ..., 0], motions[3, ..., 2] = h * z, -h * cos * x
         return rest, motions

@@ -12,7 +12,7 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), chapter 6.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -33,11 +33,20 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from solver.prism.patch_contact import PatchContact
     from solver.results.run import FinishedRun, Values
     from solver.scenes.wheel_rail_track import RailGeometry
 
     Array = NDArray[np.float64]
 
+AXLE_LATERAL_CREEPAGE = declare(
+    "axle_lateral_creepage", "velocity of the axle along z over that along x", "1"
+)
+SPIN_MOMENT = declare(
+    "spin_moment",
+    "moment of the contact on the rail about the downward vertical through the running circle",
+    "N mm",
+)
 _HALF_HEAD, _MAPPED, _ALONG = 36.0, 16.0, 20.0
 """Half the width of maps, their depth, and half their length along the rail [mm]."""
 _PIXEL = 0.5
@@ -61,7 +70,7 @@ def method(parameters: WheelRailParameters) -> Method:
 
 def view(parameters: WheelRailParameters) -> View:
     """Return the positions of results: the head of the rail, and profiles under the contact."""
-    from solver.scenes.wheel_rail_track import expected_contact  # loads scikit-fem
+    from solver.scenes.wheel_rail_contact import expected_contact  # loads scikit-fem
 
     contact = expected_contact(parameters)
     beside = round(contact.across) / 2
@@ -81,11 +90,18 @@ def view(parameters: WheelRailParameters) -> View:
 
 
 def axle(run: FinishedRun) -> Values:
-    """Return the height of the axle over that at which the undeformed bodies touch."""
-    from solver.scenes.wheel_rail_track import expected_contact
+    """Return the height of the axle over that at which the undeformed bodies touch, and its slip.
 
-    contact: Any = run.outcome.points[run.view.loaded].touching
-    return {AXLE_HEIGHT: contact.height + expected_contact(run.parameters).gap}
+    The moment is that about the vertical through the running circle.
+    """
+    from solver.scenes.wheel_rail_contact import expected_contact
+
+    p, contact = run.parameters, cast("PatchContact", run.outcome.points[run.view.loaded].touching)
+    return {
+        AXLE_HEIGHT: contact.height + expected_contact(p).gap,
+        AXLE_LATERAL_CREEPAGE: contact.lateral_creepage,
+        SPIN_MOMENT: contact.spin_moment + p.lateral_position * float(contact.force[0]),
+    }
 
 
 def setup(parameters: WheelRailParameters) -> RailGeometry:
@@ -97,18 +113,17 @@ def setup(parameters: WheelRailParameters) -> RailGeometry:
 
 def wheel(run: FinishedRun) -> Values:
     """Return the profile of the undeformed wheel that touches the rail."""
-    from solver.scenes.wheel_rail_track import expected_contact, wheel_profile
+    from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
 
-    p = run.parameters
-    height = wheel_profile(p).height(run.view.z - p.lateral_position)
-    return {WHEEL_SURFACE: height - expected_contact(p).gap}
+    own, z = wheel_of(run.parameters), run.view.z
+    return {WHEEL_SURFACE: own.surface(own.lowest(z), z) - expected_contact(run.parameters).gap}
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
-    from solver.scenes.wheel_rail_track import geometry, section_of
+    from solver.scenes.wheel_rail_track import geometry, meshed
 
-    section, count = section_of(geometry(parameters)), int(max(passes))
+    section, count = meshed(parameters, geometry(parameters)), int(max(passes))
     return Effort(
         elements=len(section.weights),
         unknowns=len(section.free),

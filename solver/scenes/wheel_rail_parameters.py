@@ -10,6 +10,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
+from solver.mesh.points import as_points
 from solver.parameters import Fraction, Poisson, Stress, described
 from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
 from solver.scenes.material_parameters import MaterialParameters
@@ -17,8 +18,13 @@ from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
+_HEAD, _WIDEST, _LOWEST, _HIGHEST = 28.0, 38.0, -30.0, 5.0
+"""Where the ends of a running surface given by points may be, on either side of the axis of the
+rail; heights between which it lies [mm]."""
 _CLOSEST = 1.0
 """Least distance of stations along the rail [mm]."""
+Points = tuple[tuple[float, float], ...]
+"""Points z, y of a profile, z increasing [mm]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,15 +49,35 @@ class WheelRailParameters(MaterialParameters):
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
     )
+    lateral_control: Literal["creepage", "force"] = described(
+        "creepage", "whether `lateral_creepage` is prescribed, or `given_lateral_force`"
+    )
     lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
-        "velocity of the wheel along z over that along x, relative to rolling: the yaw angle of a "
-        "wheel whose heading is turned towards the middle of the track",
+        "velocity of the axle along z over that along x; yaw makes the wheel creep too",
+    )
+    given_lateral_force: Annotated[float, Interval(ge=-1e6, le=1e6), Unit("N")] = described(
+        0.0, "prescribed force of the wheel on the rail along z"
+    )
+    yaw: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("rad")] = described(
+        0.0,
+        "angle by which the wheel is turned about the vertical; a positive one turns its heading "
+        "towards the middle of the track",
+    )
+    spin: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1/mm")] = described(
+        0.0,
+        "rotation of the wheel about the downward vertical over its velocity, beside the spin that "
+        "the slope of the contact makes",
     )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
         -4.0,
         "position z of the wheel's running circle from the axis of the upright rail; z points to "
         "the outside of the track",
+    )
+    rail_profile: Literal["60e1"] | Points = described(
+        "60e1",
+        "rail: 60E1, or 60E1 with a running surface through a list of points [z, y] in mm, z from "
+        "the axis of the upright rail and increasing, y from the top of the new rail",
     )
     cant: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.025, "cant of the rail towards the middle of the track, its tangent"
@@ -59,8 +85,10 @@ class WheelRailParameters(MaterialParameters):
     wheel_radius: Annotated[float, Interval(ge=50.0, le=5000.0), Unit("mm")] = described(
         460.0, "radius of the wheel at its running circle"
     )
-    wheel_profile: Literal["s1002", "conical", "crowned"] = described(
-        "s1002", "profile of the wheel: S1002, a cone, or a crown lowest at the running circle"
+    wheel_profile: Literal["s1002", "conical", "crowned"] | Points = described(
+        "s1002",
+        "profile of the wheel: S1002, a cone, a crown lowest at the running circle, or a list of "
+        "points [z, y] in mm, z from the running circle and increasing to the outside of the track",
     )
     wheel_slope: Annotated[float, Interval(ge=-0.2, le=0.2), Unit("1")] = described(
         0.05, "slope dy/dz of the profile of a conical wheel"
@@ -93,10 +121,16 @@ class WheelRailParameters(MaterialParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         MaterialParameters.__post_init__(self)
+        for name in ("rail_profile", "wheel_profile"):
+            value = getattr(self, name)
+            if not isinstance(value, str):
+                object.__setattr__(self, name, as_points(name, value))
+        self._check_head()
         if self.traction and not self.friction:
             raise ModelError("traction", self.traction, "must be 0 without friction")
         check_control(self.control, self.traction, self.given_creepage)
         _ = self.rail_stress  # raises an error for parameters that do not fit together
+        self._check_lateral()
 
     @property
     def rail_stress(self) -> SectionStress:
@@ -107,6 +141,31 @@ class WheelRailParameters(MaterialParameters):
     def thermal_strain(self) -> float:
         """Strain by which the rail would expand if nothing held it."""
         return self.expansion * self.temperature_change
+
+    def _check_head(self) -> None:
+        """Raise `ModelError` for points that are no running surface of the rail."""
+        if isinstance(self.rail_profile, str):
+            return
+        (first, *_), (last, *_) = self.rail_profile[0], self.rail_profile[-1]
+        y = [y for _, y in self.rail_profile]
+        if first > -_HEAD or last < _HEAD or max(map(abs, (first, last))) > _WIDEST:
+            allowed = f"must end at the sides of the head, {_HEAD:g} to {_WIDEST:g} mm away"
+            raise ModelError("rail_profile", f"z = {first:g} to {last:g}", allowed)
+        if not (min(y) > _LOWEST and max(y) < _HIGHEST):
+            allowed = f"must lie between {_LOWEST:g} and {_HIGHEST:g} mm"
+            raise ModelError("rail_profile", f"y = {min(y):g} to {max(y):g}", allowed)
+
+    def _check_lateral(self) -> None:
+        """Raise `ModelError` for a lateral force or creepage that has no effect."""
+        force, creepage = self.given_lateral_force, self.lateral_creepage
+        if self.lateral_control == "creepage" and force:
+            raise ModelError("given_lateral_force", force, "needs lateral_control = force")
+        if self.lateral_control == "force" and creepage:
+            allowed = "must be 0 with lateral_control = force"
+            raise ModelError("lateral_creepage", creepage, allowed)
+        if self.lateral_control == "force" and not self.friction:
+            allowed = "must be creepage without friction"
+            raise ModelError("lateral_control", self.lateral_control, allowed)
 
     @property
     def idle(self) -> Mapping[str, str]:

@@ -1,7 +1,6 @@
-"""The rail of the wheel-rail scene: where the contact will be, and the zone and window around it.
+"""The rail of the wheel-rail scene: the zone and the window around the expected contact.
 
-The part of the section whose elements are small, and the length along the rail, follow from the gap
-of the undeformed profiles. Runs of the same geometry share what is set up for it.
+Runs of the same geometry share what is set up for it.
 """
 
 from __future__ import annotations
@@ -15,116 +14,47 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.materials import Elasticity
-from solver.mesh.rail import rail_60e1
-from solver.mesh.wheel_profile import conical, crowned, s1002
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
-from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.track import PrismTrack
 from solver.scenes.initial_stress import stressed
+from solver.scenes.wheel_rail_contact import (
+    canted,
+    expected_contact,
+    rail_of,
+    upper,
+    wheel_of,
+    wheel_profile,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.mesh.rail import RailSection
-    from solver.mesh.wheel_profile import WheelProfile
     from solver.scenes.initial_stress import SectionStress
-    from solver.scenes.wheel_rail_parameters import WheelRailParameters
+    from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
 
     Array = NDArray[np.float64]
 
 _FOOT = 150.0
 """Width of the foot of the rail, over which the foundation acts [mm]."""
-_PRESSED = 0.5
-"""Ratio of the gap of undeformed bodies at the edge of contact to their approach, as for a ball."""
-_APPROACH = 1.122
-"""Approach in the middle of a uniform pressure p on a square of side s, over p s / E*: K.L.
-Johnson, Contact Mechanics (1985), section 3.3."""
-_STEP, _GRID = 0.05, 0.5
-"""Step with which gaps are searched, and to which the middle of the zone is rounded [mm]."""
+_DEEPEST = 0.9
+"""Largest depth of the zone over the least radius of the surface there."""
 _BESIDE, _DEPTH = 0.35, 1.5
 """Width of the zone beside the contact over half its width; depth over the mean half-axis."""
 _REACH, _AHEAD, _BEHIND, _LENGTH = 1.15, 2.2, 2.6, 7.0
 """Half the length where the load may act over half that of the contact; over it, the window ahead
 and behind, and the length after which waves repeat."""
-_STEEPEST = math.radians(80.0)
-"""Steepest slope of the running surface within the zone [rad]."""
+_STEP = 0.05
+"""Step with which the radius of the surface is searched [mm]."""
+_SMOOTH = 4.0
+"""Least radius of a curve through points in the zone, over the side of elements."""
+_APART = 6.0
+"""Largest distance of points of a profile in the zone [mm]."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _LEVELS = 4
 """Levels of the far field: the last one is 260 m long, where a rail on 21 MPa turns over 10 m."""
-
-
-@dataclass(frozen=True, slots=True)
-class ExpectedContact:
-    """The contact as the gap of the undeformed bodies tells it.
-
-    Attributes
-    ----------
-    middle : position z of its middle [mm]
-    across, along : half its width across the rail, and half its length [mm]
-    gap : gap at height 0 where the bodies first touch [mm]
-    """
-
-    middle: float
-    across: float
-    along: float
-    gap: float
-
-
-def expected_contact(parameters: WheelRailParameters) -> ExpectedContact:
-    """Return where the wheel will touch the rail.
-
-    Raises
-    ------
-    ModelError
-        for ``lateral_position``, if the wheel does not meet the running surface within its ends
-    """
-    p = parameters
-    section, profile = _rail(p.cant), wheel_profile(p)
-    ends = section.running
-    z, y = section.outline.at(np.arange(ends[1], ends[0], -_STEP))
-    rising = np.append(True, np.diff(z) > 0)  # the sides of the head lean
-    z, y = z[rising], y[rising]
-    gap = profile.height(z - p.lateral_position) - y
-    least = int(gap.argmin())
-    gap0 = float(gap[least])
-    allowed = "must let the wheel touch the running surface, not beside it"
-    if not 0 < least < len(z) - 1 or not np.isfinite(gap0):
-        raise ModelError("lateral_position", p.lateral_position, allowed)
-    own, wheel = p.elasticity.plane_strain_modulus, p.wheel_elasticity.plane_strain_modulus
-    modulus = 1 / (1 / own + 1 / wheel)
-    level = np.sort(gap[np.isfinite(gap)])[1:] - gap0
-    width = np.gradient(z)
-    # the contact grows with the gap at its edge, and the approach of its area falls
-    first, last = 0, len(level) - 1
-    while first < last:
-        at = (first + last) // 2
-        d = level[at]
-        length = 2 * np.sqrt(2 * p.wheel_radius * np.clip(d - (gap - gap0), 0.0, None))
-        approach = _APPROACH * p.load / (modulus * math.sqrt(float(length @ width) + 1e-9))
-        first, last = (first, at) if d > _PRESSED * approach else (at + 1, last)
-    inside = z[gap - gap0 <= level[first]]
-    return ExpectedContact(
-        middle=round(float(inside[0] + inside[-1]) / 2 / _GRID) * _GRID,
-        across=float(np.ptp(inside)) / 2 + _GRID,
-        along=math.sqrt(2 * p.wheel_radius * float(level[first])),
-        gap=gap0,
-    )
-
-
-def wheel_profile(parameters: WheelRailParameters) -> WheelProfile:
-    """Return the profile of the wheel, its running circle at z = 0."""
-    p = parameters
-    if p.wheel_profile == "s1002":
-        return s1002()
-    return conical(p.wheel_slope) if p.wheel_profile == "conical" else crowned(p.crown_radius)
-
-
-@lru_cache(maxsize=16)
-def _rail(cant: float) -> RailSection:
-    return rail_60e1().canted(cant)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +63,13 @@ class RailGeometry:
 
     Attributes
     ----------
-    cant, foundation : of the rail
+    profile, cant, foundation : of the rail
     elasticity : Young's modulus and Poisson ratio of the rail
     at, half_width, depth, size : of the zone [mm]
     spacing, reach : distance of stations; half the length where the load may act [mm]
     """
 
+    profile: str | Points
     cant: float
     foundation: float
     elasticity: tuple[float, float]
@@ -156,37 +87,89 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     Raises
     ------
     ModelError
-        for ``lateral_position``, if the zone would reach the side of the head
+        for ``lateral_position``, if the contact is on the side of the head, or at the end of the
+        wheel's profile
     """
     p, contact = parameters, expected_contact(parameters)
+    h, section = p.element_size, rail_of(p)
 
     def whole(length: float, size: float) -> float:
         return size * max(_LEAST, math.ceil(reach * length / size))
 
-    h = p.element_size
-    mean = math.sqrt(contact.across * contact.along)
-    half_width = whole((1 + _BESIDE) * contact.across, h)
-    section = _rail(p.cant)
-    right, left = section.running
-    ends = section.place(contact.middle) + half_width * np.array([-1, 1])
-    inside = right < ends[0] and ends[1] < left
-    if not inside or abs(section.outline.direction(ends)[0]).min() < math.cos(_STEEPEST):
+    at, half = contact.middle, contact.across + _BESIDE * contact.widest
+    middle, (right, left) = section.place(at), upper(section)
+    low, high = contact.near
+    if low < middle - half or high > middle + half:
+        low, high = min(middle - half, low), max(middle + half, high)
+        middle, half = (low + high) / 2, (high - low) / 2
+        at = float(section.outline.at(np.array(middle))[0])
+    # as far as the sides of the head
+    half_width = min(whole(half, h), h * math.floor((left - right) / (2 * h)))
+    inside = float(np.clip(middle, right + half_width, left - half_width))
+    if inside != middle:
+        at = float(section.outline.at(np.array(inside))[0])
+    ends = np.array([inside - half_width, inside + half_width])
+    if contact.ends[0] - right < h or left - contact.ends[1] < h:
         raise ModelError(
             "lateral_position", p.lateral_position,
-            f"must keep the contact, expected at z = {contact.middle:g} mm, farther than "
-            f"{half_width:g} mm from the sides of the head",
+            f"must keep the contact, expected about z = {contact.middle:g} mm, above the sides of "
+            "the head",
         )  # fmt: skip
+    if not np.isfinite(wheel_of(p).surface(np.zeros(2), section.outline.at(ends)[0])).all():
+        raise ModelError(
+            "lateral_position", p.lateral_position,
+            f"must keep the contact, expected about z = {contact.middle:g} mm, farther than "
+            f"{half_width:g} mm from the ends of the wheel's profile",
+        )  # fmt: skip
+    s = np.arange(ends[0], ends[1], _STEP)
+    z, curvature = section.outline.at(s)[0], section.outline.curvature(s)
+    _check_points("rail_profile", p.rail_profile, z, curvature, h)
+    z = z - p.lateral_position
+    _check_points("wheel_profile", p.wheel_profile, z, wheel_profile(p).curvature(z), h)
+    mean, bend = math.sqrt(contact.widest * contact.along), float(curvature.max())
+    # columns of the zone that turn with the surface must not meet
+    deepest = h * math.floor(_DEEPEST / bend / h) if bend > 0 else math.inf
     return RailGeometry(
+        profile=p.rail_profile,
         cant=p.cant,
         foundation=p.foundation,
         elasticity=(p.youngs_modulus, p.poisson_ratio),
-        at=contact.middle,
+        at=at,
         half_width=half_width,
-        depth=whole(_DEPTH * mean, h),
+        depth=min(whole(_DEPTH * mean, h), max(deepest, 2 * h)),
         size=h,
         spacing=p.spacing,
-        reach=whole(_REACH * contact.along, p.spacing),
+        reach=whole(_REACH * contact.along + contact.ahead, p.spacing),
     )
+
+
+def _check_points(name: str, points: str | Points, z: Array, curvature: Array, size: float) -> None:
+    """Raise `ModelError` for points that do not tell the profile to elements of a size [mm].
+
+    Parameters
+    ----------
+    z, curvature : (n,) positions in the zone, and the curvature of the profile there [mm, 1/mm]
+    """
+    if isinstance(points, str):
+        return
+    at = int(abs(curvature).argmax())
+    radius = 1 / max(float(abs(curvature[at])), 1e-9)
+    told = f"{len(points)} points"
+    if radius < _SMOOTH * size:
+        allowed = (
+            f"must be smooth: at z = {z[at]:.4g} mm the radius of the curve through them is "
+            f"{radius:.2g} mm, below {_SMOOTH:g} sides of elements; smooth the points"
+        )
+        raise ModelError(name, told, allowed)
+    given = np.array(points)[:, 0]
+    inside = np.flatnonzero((given[1:] > z.min()) & (given[:-1] < z.max()))
+    widest = inside[np.diff(given)[inside].argmax()] if len(inside) else 0
+    if np.diff(given)[widest] > _APART:
+        allowed = (
+            f"must have points at most {_APART:g} mm apart where the bodies touch, not "
+            f"{given[widest]:g} and {given[widest + 1]:g}"
+        )
+        raise ModelError(name, told, allowed)
 
 
 @lru_cache(maxsize=4)
@@ -196,10 +179,19 @@ def section_of(own: RailGeometry) -> Section:
     E, nu = own.elasticity
     spring = own.foundation / _FOOT
     return Section(
-        rail_mesh(_rail(own.cant), zone),
+        rail_mesh(canted(own.profile, own.cant), zone),
         Elasticity(youngs_modulus=E, poisson_ratio=nu),
         springs={"foot": (spring, spring, spring)},
     )
+
+
+def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
+    """Return the section of a run, or raise `ModelError` for ``lateral_position``."""
+    try:
+        return section_of(own)
+    except ModelError as error:
+        allowed = f"leaves no room for the zone of small elements in the head: {error}"
+        raise ModelError("lateral_position", parameters.lateral_position, allowed) from None
 
 
 @lru_cache(maxsize=2)
@@ -240,18 +232,15 @@ class RolledRail:
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
         p, own = self.parameters, geometry(self.parameters, reach)
+        meshed(p, own)
         return stressed_track(own, p.rail_stress, p.thermal_strain)
 
     def load(self, track: PrismTrack) -> RollingPatch:
         """See `RolledPrism`."""
-        p, profile = self.parameters, wheel_profile(self.parameters)
-        wheel = ProfiledWheel(
-            profile=lambda z: profile.height(z - p.lateral_position),
-            radius=p.wheel_radius,
-            elasticity=p.wheel_elasticity,
-        )
+        p = self.parameters
         return RollingPatch(
-            track.grid, track.compliance, wheel, friction=p.friction, force=p.load,
+            track.grid, track.compliance, wheel_of(p), friction=p.friction, force=p.load,
             drive=None if p.control == "creepage" else p.traction,
-            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
+            lateral_force=None if p.lateral_control == "creepage" else p.given_lateral_force,
+            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage, spin=p.spin,
         )  # fmt: skip

@@ -34,7 +34,7 @@ from studies.definition.sweep import (
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
-from studies.toml import read_toml
+from studies.toml import read_study
 
 
 class Study(BaseModel):
@@ -69,8 +69,11 @@ class Study(BaseModel):
 
     @classmethod
     def from_toml(cls, path: Path | str) -> Self:
-        """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``."""
-        content = read_toml(path, "file")
+        """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``.
+
+        So may be the points of a curve: ``wheel_profile = "worn.csv"``.
+        """
+        content = read_study(path)
         return cls.from_dict(content, scenes=beside(Path(path).parent))
 
     @classmethod

@@ -17,12 +17,13 @@ _GAP = "  "
 
 
 def value_text(value: Any) -> str:
-    """Return a value as text, numbers with four digits and NaN as "-"."""
+    """Return a value as text, numbers with four digits, NaN as "-", points as their number."""
     if isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float | np.floating):
         return "-" if np.isnan(value) else f"{value:z.4g}"
-    return "-" if value is None else str(value)
+    text = "-" if value is None else str(value)
+    return f"{text.count('[') - 1} points" if text.startswith("[[") else text
 
 
 def stacked(headings: Sequence[str]) -> list[list[str]]:

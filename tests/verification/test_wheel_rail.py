@@ -17,14 +17,9 @@ from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.scenes import SCENES
 from solver.scenes.initial_stress import RollerStraightened
+from solver.scenes.wheel_rail_contact import expected_contact
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import (
-    RolledRail,
-    expected_contact,
-    geometry,
-    section_of,
-    track_of,
-)
+from solver.scenes.wheel_rail_track import RolledRail, geometry, section_of, track_of
 from tests.verification.hertz_ellipse import HertzEllipse
 
 SCENE = SCENES["wheel_rail"]
@@ -272,7 +267,7 @@ def test_stress_of_straightening_and_cold_stays_where_nothing_yields() -> None:
 
 def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
     parameters = WheelRailParameters(lateral_position=8.0, accuracy="draft")
-    with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must keep the contact"):
+    with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must leave the flange beside"):
         next(SCENE.method(parameters)(SCENE, [parameters], lambda share: None))
 
 

@@ -1,0 +1,85 @@
+"""Curves of points in studies: as lists, and from files that a study file names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from solver.scenes import SCENES
+from studies import Study
+from studies.definition.parameters import parameters_of
+from studies.errors import StudyError
+from studies.views.columns import value_text
+
+POINTS = [[float(z), z**2 / 600.0] for z in range(-40, 41, 4)]
+
+
+def written(folder: Path, text: str, file: str = "wheel.csv") -> Path:
+    """Write a study with one parameter from a file of points; return its path."""
+    lines = [f"{z},{y!r}" if file.endswith(".csv") else f"{z}  {y!r}" for z, y in POINTS]
+    (folder / file).write_text("z, y\n" + "\n".join(lines))
+    path = folder / "study.toml"
+    path.write_text(text)
+    return path
+
+
+def fixed(value: object) -> str:
+    return f'name = "worn"\nscene = "wheel_rail"\n[parameters]\nwheel_profile = {value}\n'
+
+
+@pytest.mark.parametrize("file", ["wheel.csv", "wheel.txt"])
+def test_a_file_of_points_is_read_into_the_study(tmp_path: Path, file: str) -> None:
+    """The study has the id of one with the same points, so that no other file counts."""
+    from_file = Study.from_toml(written(tmp_path, fixed(f'"{file}"'), file))
+    given = Study.from_toml(written(tmp_path, fixed(POINTS)))
+    content = {
+        "name": "worn", "scene": "wheel_rail", "parameters": {"wheel_profile": POINTS}
+    }  # fmt: skip
+    assert from_file.parameters["wheel_profile"] == POINTS
+    assert from_file.id == given.id == Study.from_dict(content).id
+    (case,) = from_file.expansion.cases()
+    assert case.parameters.wheel_profile == tuple(map(tuple, POINTS))
+
+
+def test_a_file_of_points_may_be_swept(tmp_path: Path) -> None:
+    text = (
+        'name = "worn"\nscene = "wheel_rail"\n[sweep.wheel]\nnew = { wheel_profile = "s1002" }\n'
+        'worn = { wheel_profile = "wheel.csv", load = 8e4 }\n'
+    )
+    new, worn = Study.from_toml(written(tmp_path, text)).expansion.cases()
+    assert new.parameters.wheel_profile == "s1002"
+    assert worn.parameters.wheel_profile == tuple(map(tuple, POINTS))
+
+
+def test_a_file_that_cannot_be_read_is_named_with_its_place(tmp_path: Path) -> None:
+    path = written(tmp_path, fixed('"other.csv"'))
+    with pytest.raises(StudyError, match=r"parameters\.wheel_profile = 'other\.csv': file must be"):
+        Study.from_toml(path)
+    (tmp_path / "other.csv").write_text("0,0\n1,0\n1,1\n2,0\n")
+    with pytest.raises(StudyError, match=r"other\.csv': points must lie to the right of 1"):
+        Study.from_toml(path)
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("s1003", "must be one of s1002, conical, crowned or a list of"),
+        ([[0.0, 1.0]], "must have at least 4 points"),
+        ([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 0.0]], "z increases; these are number 1 and 2"),
+        ([1.0, 2.0], "must be one of s1002, conical, crowned or a list of"),
+    ],
+)
+def test_what_is_no_profile_is_refused(value: object, told: str) -> None:
+    content = {"name": "worn", "scene": "wheel_rail", "parameters": {"wheel_profile": value}}
+    with pytest.raises(StudyError, match=rf"wheel_profile = .*{told}"):
+        Study.from_dict(content)
+
+
+def test_the_description_says_that_points_are_allowed() -> None:
+    allowed = parameters_of(SCENES["wheel_rail"])["rail_profile"].allowed
+    assert allowed == "60e1 or a list of [a finite number, a finite number]"
+
+
+def test_tables_count_points() -> None:
+    assert value_text(POINTS) == f"{len(POINTS)} points"

@@ -1,0 +1,95 @@
+"""A wheel on the gauge corner of a rail: on its side, at two places, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import ModelError, Record
+from solver.results.record import Status
+from solver.scenes import SCENES
+from solver.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
+from solver.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.scenes.wheel_rail_track import geometry
+
+SCENE = SCENES["wheel_rail"]
+DRAFT = {"accuracy": "draft", "hardening": "kinematic", "hardening_ratio": 0.0196}
+
+
+def rolled(**changes: object) -> Record:
+    """The record of one pass."""
+    (record,) = SCENE.path(SCENE.parameters(**DRAFT | changes), [1], lambda share: None)
+    assert record.status is Status.OK, record.message
+    return record
+
+
+def test_the_gauge_corner_and_the_top_share_the_load() -> None:
+    """Both contacts of S1002 at z = 2 mm; the audit sums their forces up anew."""
+    record = rolled(lateral_position=2.0)
+    dims, values = record.fields["patch_pressure"]
+    z, pressure = record.coordinates["z"], values.max(axis=dims.index("x"))
+    corner, top, between = (
+        pressure[(z > low) & (z < high)] for low, high in ((-30, -24.5), (-21, -9), (-24.1, -22.9))
+    )
+    assert between.max() < 50.0 < 1000.0 < min(corner.max(), top.max())
+    numbers = record.scalars
+    assert numbers["audit_reactions"] < 1e-6
+    assert numbers["audit_overlap"] < 1e-9
+    # slopes of 20 and 5 degrees carry the load with a force to the outside of the track
+    assert 0.05 < numbers["lateral_force"] / 150e3 < 0.2
+    contact = expected_contact(record.parameters)  # type: ignore[arg-type]
+    outline = rail_of(record.parameters).outline  # type: ignore[arg-type]
+    right, left = outline.at(np.array(contact.ends))[0]
+    assert (left, right) == pytest.approx((numbers["patch_left"], numbers["patch_right"]), abs=3.0)
+
+
+def test_a_wheel_on_the_corner_alone_presses_along_its_normal() -> None:
+    """A stiff foundation, which holds the rail: contact is at slopes of 15 to 45 degrees."""
+    record = rolled(lateral_position=3.5, foundation=1e4, load=40e3, friction=0.0)
+    numbers = record.scalars
+    assert numbers["patch_left"] < numbers["patch_right"] < -24.0
+    section = rail_of(record.parameters)  # type: ignore[arg-type]
+    s = [section.place(numbers[name]) for name in ("patch_left", "patch_right")]
+    dz, dy = section.outline.direction(np.array(s))
+    steep, flat = dy / dz
+    assert flat < numbers["lateral_force"] / 40e3 < steep
+    assert numbers["audit_reactions"] < 1e-6
+
+
+@pytest.mark.parametrize("lateral_position", [-10.0, -4.0, 0.0, 2.0, 3.0, 3.6])
+def test_the_zone_holds_the_expected_contact(lateral_position: float) -> None:
+    p = WheelRailParameters(lateral_position=lateral_position, accuracy="draft")
+    contact, own, section = expected_contact(p), geometry(p), rail_of(p)
+    middle = section.place(own.at)
+    right, left = upper(section)
+    assert right <= middle - own.half_width < contact.ends[0] - own.size
+    assert left >= middle + own.half_width > contact.ends[1] + own.size
+
+
+def test_the_flange_touches_where_the_gap_along_normals_is_least() -> None:
+    """Before the flange touches, the first contact moves from the top over the corner."""
+    slopes = []
+    for position in (-4.0, 1.0, 3.0, 3.6):
+        p = WheelRailParameters(lateral_position=position)
+        s = np.arange(*upper(rail_of(p)), 0.1)
+        z, y = rail_of(p).outline.at(s)
+        dz, dy = -rail_of(p).outline.direction(s)
+        gap, _, height = wheel_of(p).above(0 * z, z, y, np.arctan2(dy, dz))
+        assert height == pytest.approx(-expected_contact(p).gap, abs=1e-3)
+        assert gap.min() == pytest.approx(0.0, abs=1e-12)
+        slopes.append(np.degrees(np.arctan2(dy, dz))[gap.argmin()])
+    assert (np.diff(slopes) > 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("position", "told"),
+    [
+        (4.5, r"about 0\.8\d* mm inside its side at z = -3"),
+        (8.0, r"about 4\.\d* mm inside its side"),
+        (20.0, "it would stand on it"),
+    ],
+)
+def test_a_flange_inside_the_rail_is_told(position: float, told: str) -> None:
+    parameters = WheelRailParameters(lateral_position=position)
+    with pytest.raises(ModelError, match=rf"lateral_position = {position}: must leave.*{told}"):
+        expected_contact(parameters)
