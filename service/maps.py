@@ -14,7 +14,6 @@ from anyio.to_thread import run_sync
 import solver
 from service.errors import Busy
 from service.schemas import MapQuery
-from studies import open_netcdf
 from studies.storage.runfile import verify
 
 
@@ -83,6 +82,7 @@ def draw(path: Path, query: MapQuery) -> bytes:
     StudyError
         If the run has no such field, or the field no such component.
     """
+    from studies import open_netcdf
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
 
     picture = io.BytesIO()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.marks import LONG, allowed, of_folder
+from tests.marks import allowed, of_folder, place
 
 if TYPE_CHECKING:
     from studies import Access
@@ -34,8 +34,8 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put long files first; add the marks of folders before tests are selected by marks."""
-    items.sort(key=lambda item: item.path not in LONG)
+    """Put files in their place; add the marks of folders before tests are selected by marks."""
+    items.sort(key=lambda item: place(item.path))
     for item in items:
         for mark in of_folder(item.path):
             item.add_marker(mark)

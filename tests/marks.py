@@ -42,6 +42,10 @@ LONG = {
 }
 """Files of more than 30 s of CPU; they start first, so that no core waits for them at the end."""
 
+WAITING = HERE / "service"
+"""A folder whose tests share processes that wait; its files start before all others, so that these
+end with the last of them."""
+
 EXPENSIVE = {
     "solves": ("solver.loading.increment.Increment.solve", "solver.steady.search.passing"),
     "processes": (
@@ -62,6 +66,11 @@ _START = subprocess.Popen.__init__
 def of_folder(path: Path) -> tuple[str, ...]:
     """Return the marks that a test file has by its folder."""
     return FOLDERS.get(path.relative_to(HERE).parts[0], ())
+
+
+def place(path: Path) -> tuple[bool, bool]:
+    """Return by what the files of the test run are sorted."""
+    return WAITING not in path.parents, path not in LONG
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from service.files import NETCDF, TAGS, UNCHANGED, netcdf
 from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
 from solver.results.export import vtu_of
-from studies import StudyError, open_netcdf
+from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.ugrid import read
 
@@ -60,6 +60,8 @@ def fetch_mesh(run: TheRun, store: TheStore, stage: str | None = None) -> Respon
 
     The study must say `"keep": "fields"`.
     """
+    from studies import open_netcdf  # xarray takes half a second to import
+
     path = store.run_path(run["id"])
     verify(path)
     with open_netcdf(path) as dataset:

@@ -34,6 +34,10 @@ def environment(log: Path) -> dict[str, str]:
         "FAKE_SCENE_LOG": str(log),
         "RESIDUA_POLL_SECONDS": "0.1",
         "RESIDUA_ATTEMPTS": "2",
+        # Processes of dask that wait for minutes, as those of the package.
+        "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
+        "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
+        "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     }
 
 

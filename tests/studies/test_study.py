@@ -374,12 +374,14 @@ def test_the_ready_study_of_the_punch_is_45_runs_in_15_paths() -> None:
 
 
 @pytest.mark.processes
-def test_importing_studies_loads_neither_dask_nor_matplotlib_nor_xarray_nor_scipy() -> None:
+@pytest.mark.parametrize(
+    "program", ["import studies; studies.Study, studies.Store", "import service.app"]
+)
+def test_studies_and_the_service_load_neither_dask_nor_matplotlib_nor_xarray_nor_scipy(
+    program: str,
+) -> None:
     heavy = "('dask', 'distributed', 'matplotlib', 'xarray', 'scipy', 'skfem', 'numba')"
-    code = (
-        "import sys, studies; studies.Study, studies.Store;"
-        f"print([m for m in {heavy} if m in sys.modules])"
-    )
+    code = f"{program}\nimport sys; print([m for m in {heavy} if m in sys.modules])"
     answer = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )

@@ -253,7 +253,7 @@ def test_no_slip_solution_satisfies_its_integral_equations():
     assert abs((F.imag * weight).sum()) < 1e-10
 
 
-@pytest.mark.parametrize("stiffness", [3.0, 1 / 3, 9.0])
+@pytest.mark.parametrize("stiffness", [1 / 3, 9.0])
 def test_free_creepage_of_dissimilar_rollers_is_bentall_and_johnsons(stiffness):
     """The wheel that pressure shortens more turns more: negative creepage of a soft wheel."""
     ratios = []

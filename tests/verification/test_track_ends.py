@@ -20,7 +20,7 @@ from solver.scenes.rolling_steady import load_on
 from solver.steady import Track, rolling
 
 SIDE = 4.0
-FREE = {"load": "hertz", "friction": 0.0, "element_size": SIDE, "growth": 1.3}
+FREE = {"load": "hertz", "friction": 0.0, "element_size": SIDE, "growth": 1.5}
 LAWS = {
     "none": {},
     "chaboche": {
