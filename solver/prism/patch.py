@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -88,21 +88,58 @@ class RollingPatch:
         if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
             allowed = f"must be ({n} or more, {m}, 3, {m}, 3) on this grid"
             raise ModelError("compliance", compliance.shape, allowed)
-        if not 0 <= friction <= 1:
-            raise ModelError("friction", friction, "must lie between 0 and 1")
-        if not force > 0:
-            raise ModelError("force", force, "must be positive")
-        self.grid, self.wheel, self.force = grid, wheel, force
-        self.friction = friction if friction > LEAST_FRICTION else 0.0
-        self.drive = drive if self.friction else None
-        self.lateral_force = lateral_force if self.friction else None
-        self._given = np.array([0.0, creepage, lateral_creepage, spin])
-        self._rest, self._motions = wheel.rolling(grid)
-        self._axes, self._area = grid.axes, grid.area
+        self.grid, self._axes, self._area = grid, grid.axes, grid.area
+        self._set(wheel, friction, force, drive, lateral_force, (creepage, lateral_creepage, spin))
         with one_thread():
             self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
+
+    def other(
+        self,
+        wheel: ProfiledWheel,
+        *,
+        friction: float,
+        force: float,
+        drive: float | None = None,
+        lateral_force: float | None = None,
+        creepage: float = 0.0,
+        lateral_creepage: float = 0.0,
+        spin: float = 0.0,
+    ) -> Self:
+        """Return another wheel and load on the same surface; influences of tractions are shared.
+
+        Raises `ModelError` for a wheel of other elastic constants, on which they depend.
+        """
+        if wheel.elasticity != self.wheel.elasticity:
+            allowed = "must be that of the first wheel: influences are shared"
+            raise ModelError("elasticity", wheel.elasticity, allowed)
+        changed = copy(self)
+        changed._set(
+            wheel, friction, force, drive, lateral_force, (creepage, lateral_creepage, spin)
+        )
+        return changed
+
+    def _set(
+        self,
+        wheel: ProfiledWheel,
+        friction: float,
+        force: float,
+        drive: float | None,
+        lateral_force: float | None,
+        given: tuple[float, float, float],
+    ) -> None:
+        """Set the wheel and its load; ``given`` are creepages and spin."""
+        if not 0 <= friction <= 1:
+            raise ModelError("friction", friction, "must lie between 0 and 1")
+        if not force > 0:
+            raise ModelError("force", force, "must be positive")
+        self.wheel, self.force = wheel, force
+        self.friction = friction if friction > LEAST_FRICTION else 0.0
+        self.drive = drive if self.friction else None
+        self.lateral_force = lateral_force if self.friction else None
+        self._given = np.array([0.0, *given])
+        self._rest, self._motions = wheel.rolling(self.grid)
         self._sums = self._resultants()
 
     def scaled(self, share: float) -> RollingPatch:

@@ -19,6 +19,7 @@ import numpy as np
 from solver.results.extremes import residual_extremes
 from solver.results.figures import cost, extremes
 from solver.results.maps import maps, profiles
+from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
 from solver.scenes.effort import Effort
@@ -72,12 +73,33 @@ def view(parameters: WheelRailParameters) -> View:
     )
 
 
+PASS_LOAD = declare("pass_load", "vertical force on the wheel of a pass", "N", dims=("pass",))
+PASS_LATERAL_POSITION = declare(
+    "pass_lateral_position", "position z of the running circle of a pass", "mm", dims=("pass",)
+)
+PASS_TRACTION = declare(
+    "pass_traction", "ratio of longitudinal force to that of full slip, of a pass", dims=("pass",)
+)
+
+
+def traffic(run: FinishedRun) -> Values:
+    """Return the figures of every pass, with its load, position and traction."""
+    each = run.parameters.each_pass()
+    return {
+        **cycles(run, run.parameters.cycle),
+        PASS_LOAD: np.array([own.load for own in each]),
+        PASS_LATERAL_POSITION: np.array([own.lateral_position for own in each]),
+        PASS_TRACTION: np.array([own.traction for own in each]),
+    }
+
+
 def axle(run: FinishedRun) -> Values:
     """Return the height of the axle over that at which the undeformed bodies touch."""
     from solver.scenes.wheel_rail_track import expected_contact
 
     contact: Any = run.outcome.points[run.view.loaded].touching
-    return {AXLE_HEIGHT: contact.height + expected_contact(run.parameters).gap}
+    last = run.parameters.each_pass()[-1]
+    return {AXLE_HEIGHT: contact.height + expected_contact(last).gap}
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
@@ -100,7 +122,7 @@ WHEEL_RAIL = Scene(
     branch="passes",
     method=method,
     view=view,
-    outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, axle),
+    outputs=(maps, profiles, residual_extremes, extremes, patch, section, traffic, axle),
     costs=(cost,),
     effort=effort,
     advice={

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,7 +72,30 @@ class ExpectedContact:
 
 
 def expected_contact(parameters: WheelRailParameters) -> ExpectedContact:
-    """Return where the wheel will touch the rail.
+    """Return where wheels will touch the rail in any pass; its gap is the smallest.
+
+    Raises
+    ------
+    ModelError
+        for ``lateral_position``, if a wheel does not meet the running surface within its ends
+    """
+    each = {_contact_of(own) for own in parameters.outermost}
+    if len(each) == 1:
+        return each.pop()
+    left = min(own.middle - own.across for own in each)
+    right = max(own.middle + own.across for own in each)
+    middle = round((left + right) / 2 / _GRID) * _GRID
+    return ExpectedContact(
+        middle=middle,
+        across=max(middle - left, right - middle),
+        along=max(own.along for own in each),
+        gap=min(own.gap for own in each),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _contact_of(parameters: WheelRailParameters) -> ExpectedContact:
+    """Return where the wheel of one pass will touch the rail.
 
     Raises
     ------
@@ -169,8 +192,9 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     ends = section.place(contact.middle) + half_width * np.array([-1, 1])
     inside = right < ends[0] and ends[1] < left
     if not inside or abs(section.outline.direction(ends)[0]).min() < math.cos(_STEEPEST):
+        places = sorted({own.lateral_position for own in p.outermost})
         raise ModelError(
-            "lateral_position", p.lateral_position,
+            "lateral_position", places[0] if len(places) == 1 else (places[0], places[-1]),
             f"must keep the contact, expected at z = {contact.middle:g} mm, farther than "
             f"{half_width:g} mm from the sides of the head",
         )  # fmt: skip
@@ -219,21 +243,32 @@ class RolledRail:
 
     def __init__(self, parameters: WheelRailParameters) -> None:
         self.parameters = parameters
+        self._passes = parameters.each_pass()
+        self._made: tuple[PrismTrack, WheelRailParameters, RollingPatch] | None = None
 
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
         return track_of(geometry(self.parameters, reach))
 
-    def load(self, track: PrismTrack) -> RollingPatch:
-        """See `RolledPrism`."""
-        p, profile = self.parameters, wheel_profile(self.parameters)
+    def load(self, track: PrismTrack, number: int) -> RollingPatch:
+        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
+        p, last = self._passes[number], self._made
+        if last is not None and last[:2] == (track, p):
+            return last[2]
+        profile = wheel_profile(p)
         wheel = ProfiledWheel(
             profile=lambda z: profile.height(z - p.lateral_position),
             radius=p.wheel_radius,
             elasticity=p.wheel_elasticity,
         )
-        return RollingPatch(
-            track.grid, track.compliance, wheel, friction=p.friction, force=p.load,
+        if last is not None and last[0] is track:
+            make = last[2].other
+        else:
+            make = partial(RollingPatch, track.grid, track.compliance)
+        made = make(
+            wheel, friction=p.friction, force=p.load,
             drive=None if p.control == "creepage" else p.traction,
             creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
         )  # fmt: skip
+        self._made = track, p, made
+        return made

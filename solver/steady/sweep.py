@@ -47,7 +47,10 @@ class CompiledSweep:
         )
         self._each = (0,) * strain.shape[2]
         before = np.ascontiguousarray(start.plastic_strain.T), start.accumulated
-        plastic, total, self._path = flow(strain, *before, self._law, parts, self._each)
+        rows, columns, n = strain.shape
+        # memory of zeros is taken as it is written: most points stay elastic
+        self._path = np.zeros((rows, columns - 1, parts, n + 2))
+        plastic, total = flow(strain, *before, self._law, self._path, self._each)
         self.states = PlasticState(np.moveaxis(plastic, 2, 0), total)
 
     @property
@@ -136,34 +139,50 @@ def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignor
     return accumulated + SQRT23 * grows
 
 
+@njit(cache=True, inline="always")
+def _elastic(strain, plastic, accumulated, law, each):  # type: ignore[no-untyped-def]
+    """Whether a strain is elastic with this plastic strain (n,)."""
+    double_shear, kappa, Hi, _, Re = law
+    mean = (strain[0] + strain[1] + strain[2]) / 3.0
+    square = 0.0
+    for k in range(len(each)):
+        trial = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        square += trial * trial
+    return math.sqrt(square) <= SQRT23 * (Re + Hi * accumulated)
+
+
 @njit(cache=True)
-def flow(strain, plastic, accumulated, law, parts, each):  # type: ignore[no-untyped-def]
+def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-untyped-def]
     """Let material flow along rows.
+
+    Where the strain of a column is elastic, so are all since the column before: the yield surface
+    is convex. Their increments are left out.
 
     Parameters
     ----------
     strain : (n_rows, n_columns + 1, n) Mandel, downstream; the first column is before the pass
     plastic, accumulated : (n_rows, n) and (n_rows,), before the pass
     law : 2 G, 2 G + 2/3 Hk, Hi, 2 G + 2/3 H, Re [MPa]
-    parts : number of equal increments of strain from one column to the next
+    steps : (n_rows, n_columns, parts, n + 2) zeros, which receive what `flow_along` takes; there
+        are so many equal increments of strain from one column to the next
     each : a tuple with n entries, see above
 
     Returns
     -------
     plastic strain (n_rows, n_columns, n) and accumulated strain (n_rows, n_columns) at the columns
-    steps (n_rows, n_columns, parts, n + 2) : for `flow_along`
     """
     n = len(each)
-    n_rows, n_columns = strain.shape[0], strain.shape[1] - 1
+    n_rows, n_columns, parts = steps.shape[:3]
     flowed = np.empty((n_rows, n_columns, n))
     total = np.empty((n_rows, n_columns))
-    steps = np.empty((n_rows, n_columns, parts, n + 2))
     now, e = np.empty(n), np.empty(n)
     for row in range(n_rows):
         now[:] = plastic[row]
         a = accumulated[row]
         for column in range(n_columns):
-            for part in range(parts):
+            # the state at the beginning of a row may be given outside of the yield surface
+            elastic = column > 0 and _elastic(strain[row, column + 1], now, a, law, each)
+            for part in range(0 if elastic else parts):
                 share = (part + 1.0) / parts
                 for k in range(n):
                     before = strain[row, column, k]
@@ -171,7 +190,7 @@ def flow(strain, plastic, accumulated, law, parts, each):  # type: ignore[no-unt
                 a = _return(e, now, a, law, steps[row, column, part], each)
             flowed[row, column] = now
             total[row, column] = a
-    return flowed, total, steps
+    return flowed, total
 
 
 @njit(cache=True)
