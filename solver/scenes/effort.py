@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -19,12 +20,18 @@ class Effort:
         if passes end when the shakedown state is decided
     most_increments : the same with all halvings of `Scene.refinement`, or if the shakedown state is
         never decided
+    seconds : processor time of the increments; None if it follows from unknowns and increments
+    set_up : processor time [s] of what paths with equal ``shared`` set up once in a process
+    shared : what that depends on
     """
 
     elements: int
     unknowns: int
     increments: int
     most_increments: int
+    seconds: float | None = None
+    set_up: float = 0.0
+    shared: Hashable = None
 
 
 class GridSize(NamedTuple):

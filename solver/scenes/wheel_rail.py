@@ -106,12 +106,17 @@ def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     from solver.scenes.wheel_rail_track import geometry, section_of
 
-    section, count = section_of(geometry(parameters)), int(max(passes))
+    own, count = geometry(parameters), int(max(passes))
+    section, size = section_of(own), own.prism
+    turns, scattered = len({id(each) for each in parameters.block}), parameters.scattered
     return Effort(
         elements=len(section.weights),
         unknowns=len(section.free),
         increments=count,
         most_increments=count,
+        seconds=size.passes(count, turns, scattered=scattered),
+        set_up=size.set_up,
+        shared=own,
     )
 
 

@@ -22,6 +22,7 @@ from solver.prism.patch import RollingPatch
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.track import PrismTrack
+from solver.scenes.prism_effort import PrismSize
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -170,6 +171,35 @@ class RailGeometry:
     spacing: float
     reach: float
 
+    @property
+    def length(self) -> float:
+        """Length after which waves repeat, an even number of stations [mm]."""
+        return 2 * self._whole(_LENGTH / 2)
+
+    @property
+    def ahead(self) -> float:
+        """Length of the window ahead of the load [mm]."""
+        return self._whole(_AHEAD)
+
+    @property
+    def behind(self) -> float:
+        """Length of the window behind the load [mm]."""
+        return self._whole(_BEHIND)
+
+    def _whole(self, ratio: float) -> float:
+        """Return a ratio of the reach, rounded up to stations [mm]."""
+        return self.spacing * math.ceil(ratio * self.reach / self.spacing)
+
+    @property
+    def prism(self) -> PrismSize:
+        """The size of zone and window."""
+        return PrismSize(
+            columns=round(2 * self.half_width / self.size),
+            rows=round(self.depth / self.size),
+            window=round((self.ahead + self.behind) / self.spacing) + 1,
+            waves=round(self.length / self.spacing / 2) + 1,
+        )
+
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
     """Return the geometry; ``reach`` is the ratio of zone and window to their usual size.
@@ -227,13 +257,11 @@ def section_of(own: RailGeometry) -> Section:
 @lru_cache(maxsize=2)
 def track_of(own: RailGeometry) -> PrismTrack:
     """Return the rail, set up once in a process for each geometry."""
-    section, h = section_of(own), own.spacing
+    section, size = section_of(own), own.prism
     # `rail_mesh` numbers the elements of the zone first
-    elements = round(2 * own.half_width / own.size) * round(own.depth / own.size)
     return PrismTrack(
-        section, np.arange(len(section.weights)) < elements, "running",
-        length=2 * h * math.ceil(_LENGTH * own.reach / h / 2), spacing=h,
-        ahead=h * math.ceil(_AHEAD * own.reach / h), behind=h * math.ceil(_BEHIND * own.reach / h),
+        section, np.arange(len(section.weights)) < size.columns * size.rows, "running",
+        length=own.length, spacing=own.spacing, ahead=own.ahead, behind=own.behind,
         reach=own.reach, levels=_LEVELS,
     )  # fmt: skip
 

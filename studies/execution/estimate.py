@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -22,6 +23,8 @@ _BYTES, _COMBINED = 1.1e6, 1.8
 """Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
 """Bytes per unknown that kept fields add to a run's file, if none is known: 55 to 185."""
+_TOLD = 2.0
+"""Factor of the low and high estimates where the scene tells the seconds."""
 _BATCH = 500
 
 
@@ -124,6 +127,8 @@ def estimate(study: Study, store: Store) -> Estimate:
     scene = study.problem
     pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
+    set_ups: dict[Any, list[float]] = {}
+    basis = pace.basis
     seconds = [0.0, 0.0, 0.0]
     for path, missing in _missing(study, store):
         to_compute += len(missing)
@@ -133,9 +138,16 @@ def estimate(study: Study, store: Store) -> Estimate:
             unknowns = max(unknowns, effort.unknowns)
             increments += effort.increments
             longest = max(longest, effort.most_increments)
-            more = pace.seconds(effort.unknowns, effort.increments, effort.most_increments)
+            set_ups.setdefault(effort.shared, []).append(effort.set_up)
+            if effort.seconds is None:
+                more = pace.seconds(effort.unknowns, effort.increments, effort.most_increments)
+            else:
+                more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
+                basis = f"what passes of {scene.name} took elsewhere"
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
-    fixed = _PER_RUN * to_compute + _PER_PATH * paths
+    processes = os.cpu_count() or 1
+    shared = sum(sum(sorted(each)[-processes:]) for each in set_ups.values())
+    fixed = _PER_RUN * to_compute + _PER_PATH * paths + shared
     low, likely, high = (fixed + each for each in seconds)
     known = scene.effort is not None
     return Estimate(
@@ -147,7 +159,7 @@ def estimate(study: Study, store: Store) -> Estimate:
         longest=longest if known else None,
         cpu_seconds=(low, likely, high) if known else None,
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
-        basis=pace.basis if known else f"{scene.name} does not estimate the work of its paths",
+        basis=basis if known else f"{scene.name} does not estimate the work of its paths",
     )
 
 
