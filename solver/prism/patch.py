@@ -88,30 +88,43 @@ class RollingPatch:
         if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
             allowed = f"must be ({n} or more, {m}, 3, {m}, 3) on this grid"
             raise ModelError("compliance", compliance.shape, allowed)
-        if not 0 <= friction <= 1:
-            raise ModelError("friction", friction, "must lie between 0 and 1")
-        if not force > 0:
-            raise ModelError("force", force, "must be positive")
-        self.grid, self.force = grid, force
-        self.friction = friction if friction > LEAST_FRICTION else 0.0
-        self.drive = drive if self.friction else None
-        self.lateral_force = lateral_force if self.friction else None
-        self._given = np.array([0.0, creepage, lateral_creepage, spin])
-        self._axes, self._area = grid.axes, grid.area
-        self._set(wheel)
+        self.grid, self._axes, self._area = grid, grid.axes, grid.area
+        self._set_wheel(wheel)
+        self._set_load(friction, force, drive, lateral_force, (creepage, lateral_creepage, spin))
         with one_thread():
             self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
 
-    def _set(self, wheel: ProfiledWheel) -> None:
+    def _set_wheel(self, wheel: ProfiledWheel) -> None:
         """Set what depends on the shape of the wheel."""
         self.wheel = wheel
         self._rest, self._motions = wheel.rolling(self.grid)
         self._sums = self._resultants()
 
+    def _set_load(
+        self,
+        friction: float,
+        force: float,
+        drive: float | None,
+        lateral_force: float | None,
+        given: tuple[float, float, float],
+    ) -> None:
+        """Set friction and load; ``given`` are creepages and spin."""
+        if not 0 <= friction <= 1:
+            raise ModelError("friction", friction, "must lie between 0 and 1")
+        if not force > 0:
+            raise ModelError("force", force, "must be positive")
+        self.force = force
+        self.friction = friction if friction > LEAST_FRICTION else 0.0
+        self.drive = drive if self.friction else None
+        self.lateral_force = lateral_force if self.friction else None
+        self._given = np.array([0.0, *given])
+
     def with_wheel(self, wheel: ProfiledWheel) -> Self:
         """Return the same load with a wheel of another shape, or beside the place of this one.
+
+        Influences of tractions are shared.
 
         Raises
         ------
@@ -121,7 +134,23 @@ class RollingPatch:
         if wheel.elasticity != self.wheel.elasticity:
             raise ModelError("elasticity", wheel.elasticity, f"must be {self.wheel.elasticity}")
         other = copy(self)
-        other._set(wheel)
+        other._set_wheel(wheel)
+        return other
+
+    def with_load(
+        self,
+        *,
+        friction: float,
+        force: float,
+        drive: float | None = None,
+        lateral_force: float | None = None,
+        creepage: float = 0.0,
+        lateral_creepage: float = 0.0,
+        spin: float = 0.0,
+    ) -> Self:
+        """Return the same wheel with another load and friction; see the class."""
+        other = copy(self)
+        other._set_load(friction, force, drive, lateral_force, (creepage, lateral_creepage, spin))
         return other
 
     def scaled(self, share: float) -> Self:

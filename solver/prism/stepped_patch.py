@@ -36,12 +36,12 @@ class SteppedPatch(RollingPatch):
     is creepage if it advances by one.
     """
 
-    def __init__(self, *given: Any, **named: Any) -> None:
-        super().__init__(*given, **named)
+    def _set_load(self, *given: Any) -> None:
+        super()._set_load(*given)
         self._creepages, self._given = self._given, np.zeros_like(self._given)
 
-    def _set(self, wheel: ProfiledWheel) -> None:
-        super()._set(wheel)
+    def _set_wheel(self, wheel: ProfiledWheel) -> None:
+        super()._set_wheel(wheel)
         self._rest[..., TANGENTS] = 0.0
 
     def following(self, u: Array, contact: PatchContact, stations: int) -> SteppedPatch:

@@ -160,7 +160,7 @@ class PrismTrack:
 
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""
-        return PrismField(self, eigenstress)
+        return PrismField(self, eigenstress if eigenstress.any() else None)
 
     def strain(self, field: PrismField) -> Array:
         """Return the strain (n_points, window, 6) of a field, Mandel."""

@@ -19,12 +19,16 @@ class Effort:
         if passes end when the shakedown state is decided
     most_increments : the same with all halvings of `Scene.refinement`, or if the shakedown state is
         never decided
+    seconds : processor time of the increments; None if it follows from unknowns and increments
+    set_up : processor time [s] of what paths with equal `Scene.setup` share
     """
 
     elements: int
     unknowns: int
     increments: int
     most_increments: int
+    seconds: float | None = None
+    set_up: float = 0.0
 
 
 class GridSize(NamedTuple):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.results.quantities import declare
-from solver.results.shakedown import classify
+from solver.results.shakedown import Shakedown, ShakedownState, classify
 from solver.scenes.passes import (
     PASS,
     PASS_CREEPAGE,
@@ -26,9 +26,12 @@ from solver.scenes.rolling import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from solver.results.run import FinishedRun, Values
+    from solver.scenes.prism_passes import PassTrace
 
     Array = NDArray[np.float64]
 
@@ -95,6 +98,20 @@ LEAST_YIELDED_DEPTH = declare(
 MOST_YIELDED_DEPTH = declare(
     "most_yielded_depth", "depth below the top of the deepest point that has yielded", "mm"
 )
+PASS_RESIDUAL_MIN = declare(
+    "pass_residual_min", "smallest residual stress after a pass, at points of the zone", "MPa",
+    dims=("component", "pass"),
+)  # fmt: skip
+MEAN_PLASTIC_INCREMENT = declare(
+    "mean_plastic_increment",
+    "largest equivalent plastic strain accumulated in a pass, its mean over the last passes",
+)
+MEAN_NET_INCREMENT = declare(
+    "mean_net_increment",
+    "largest equivalent of the signed plastic strain left by a pass, mean over the last passes",
+)
+_AVERAGED = 100
+"""Largest number of passes in a mean over the last ones, which are at most half of all."""
 _YIELDED = 1e-6
 """Plastic strain above which a point counts as yielded."""
 
@@ -164,24 +181,54 @@ def section(run: FinishedRun) -> Values:
     }
 
 
-def cycles(run: FinishedRun) -> Values:
-    """Return the figures of every pass, and the shakedown state that the passes tend to."""
+def cycles(run: FinishedRun, cycle: int | None = 1) -> Values:
+    """Return the figures of every pass, and the shakedown state that the passes tend to.
+
+    Parameters
+    ----------
+    cycle : passes after which the loading repeats itself; increments are those of the cycle that
+        ends with a pass. With None it never does: increments are those of a pass, and if anything
+        yields no state is decided
+    """
     p, traces = run.parameters, run.outcome.traces
-    nothing = np.zeros_like(traces[0].accumulated), np.zeros_like(traces[0].plastic_strain)
-    accumulated = np.diff(np.stack([nothing[0], *(t.accumulated for t in traces)]), axis=0)
-    flow = np.diff(np.stack([nothing[1], *(t.plastic_strain for t in traces)]), axis=0)
-    net = np.sqrt(2 / 3 * (flow**2).sum(axis=2))
-    material = p.material()
+    numbers = range(len(traces))
+    accumulated, net = map(
+        np.stack, zip(*(_added(traces, number, cycle or 1) for number in numbers), strict=True)
+    )
+    last = slice((len(traces) - 1) % (cycle or 1), None, cycle)
     yield_strain = p.yield_stress / p.youngs_modulus
-    found = classify(accumulated, net, yield_strain, hardens=material.hardens)
+    hardens = p.material().hardens
+    found = classify(accumulated[last], net[last], yield_strain, hardens=hardens)
+    if cycle is None and found.state is not ShakedownState.ELASTIC:
+        found = Shakedown(ShakedownState.UNDECIDED, np.nan, np.nan)
+    average = max(min(len(traces) // 2, _AVERAGED), 1)
+    mean, mean_net = (each.max() / average for each in _added(traces, numbers[-1], average))
+    surface = np.array([t.surface for t in traces])
+    before = np.concatenate([np.zeros(cycle or 1), surface])[: len(surface)]
     return {
         PASS: np.arange(1, len(traces) + 1),
         PASS_CREEPAGE: np.array([t.creepage for t in traces]),
         PASS_MAX_PLASTIC_STRAIN: np.array([t.accumulated.max() for t in traces]),
+        PASS_RESIDUAL_MIN: np.stack([t.lowest for t in traces], axis=1),
         PASS_PLASTIC_INCREMENT: accumulated.max(axis=1),
         PASS_NET_INCREMENT: net.max(axis=1),
-        PASS_SURFACE_ADVANCE: np.diff([0.0, *(t.surface for t in traces)]),
+        PASS_SURFACE_ADVANCE: surface - before,
         SHAKEDOWN_STATE: found.state,
         STEADY_PLASTIC_INCREMENT: found.accumulated,
         STEADY_NET_INCREMENT: found.net,
+        MEAN_PLASTIC_INCREMENT: float(mean),
+        MEAN_NET_INCREMENT: float(mean_net),
     }
+
+
+def _added(traces: Sequence[PassTrace], number: int, cycle: int) -> tuple[Array, Array]:
+    """Return the plastic strain (n,) that the cycle which ends with a pass adds at each point.
+
+    It is that accumulated, and the equivalent of the signed one that is left.
+    """
+    after = traces[number]
+    accumulated, flow = after.accumulated, after.plastic_strain
+    if number >= cycle:
+        accumulated = accumulated - traces[number - cycle].accumulated
+        flow = flow - traces[number - cycle].plastic_strain
+    return accumulated, np.sqrt(2 / 3 * (flow**2).sum(axis=1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -22,6 +22,7 @@ from solver.results.prism_fields import zone_fields
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.steady.passing import passing
+from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -52,12 +53,14 @@ class PassTrace:
     plastic_strain : (n, 6) signed plastic strain there, Mandel
     creepage : creepage of the wheel
     surface : displacement along x of the surface, mean over the zone [mm]
+    lowest : (6,) smallest residual stress in the zone [MPa]
     """
 
     accumulated: Array
     plastic_strain: Array
     creepage: float
     surface: float
+    lowest: Array
 
 
 class RolledPrism(Protocol):
@@ -76,8 +79,11 @@ class RolledPrism(Protocol):
         Raises `ModelError` if the section has no room for them.
         """
 
-    def load(self, track: PrismTrack) -> PatchLoad:
-        """Return the load of a pass over the prism."""
+    def load(self, track: PrismTrack, number: int) -> PatchLoad:
+        """Return the load of a pass over the prism, counted from 0.
+
+        It is the same object as in the pass before if the load is the same.
+        """
 
 
 def by_passes(
@@ -125,6 +131,7 @@ class _Path:
         self._samples = Samples(self._body, view)
         self._found: Pass[PrismState] | None = None
         self._previous: Pass[PrismState] | None = None
+        self._load: PatchLoad | None = None
         self._steps: list[int] = []
         self._traces: list[PassTrace] = []
         self.error: NotConverged | None = None
@@ -144,28 +151,31 @@ class _Path:
         except NotConverged as failure:
             self.error = failure
 
-    @cached_property
-    def _load(self) -> PatchLoad:
-        """The load, the same in every pass."""
-        return self._prism.load(self._track)
-
     def _roll(self) -> None:
-        """Compute the next pass."""
+        """Compute the next pass.
+
+        It begins with the strain of the last pass if that had the same load, else with the elastic
+        solution of its load on the strain that is left: the strain of another load leads nowhere.
+        """
         found = self._found
         before = self._track.virgin(self._law) if found is None else found.after
+        load = self._prism.load(self._track, len(self._traces))
+        guess = found.strain if found is not None and load is self._load else None
         with one_thread():
-            strain, contact = (None, None) if found is None else (found.strain, contact_of(found))
-            load = PatchPassing(self._load, before.displacement, contact)
-            self._found = passing(self._track, self._law, load, before, strain)
-        self._previous = found
+            contact = None if found is None else contact_of(found)
+            moving = PatchPassing(load, before.displacement, contact)
+            self._found = passing(self._track, self._law, moving, before, guess)
+        self._previous, self._load = found, load
         self._steps.append(max(self._found.steps, 1))
         after = self._found.after
+        stress = self._law.stiffness(6) @ (after.strain - after.plastic_strain).T
         self._traces.append(
             PassTrace(
                 accumulated=after.accumulated,
                 plastic_strain=after.plastic_strain,
                 creepage=contact_of(self._found).creepage,
                 surface=float(after.displacement[:, 0].mean()),
+                lowest=to_tensor(stress).min(axis=1),
             )
         )
 

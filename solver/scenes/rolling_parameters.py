@@ -14,7 +14,7 @@ from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import MOST_COLUMNS, window_elements
 from solver.parameters import Accuracy, by_accuracy, described
 from solver.scenes.schedule import Schedule
-from solver.scenes.sequence import OF_A_PASS, block_of
+from solver.scenes.sequence import block_of
 from solver.scenes.wheel_parameters import WheelParameters
 
 ENDLESS: Literal["endless"] = "endless"
@@ -38,6 +38,8 @@ _PERIOD = 6.0
 _LONGEST_REACH = 0.8
 """Largest ratio of `RollingParameters.reach` to half the circumference of the wheel."""
 _MOST_INCREMENTS = 100_000
+_OF_A_PASS = ("load_ratio", "friction", "traction", "control", "given_creepage", "heading")
+"""Parameters that may differ from pass to pass."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +50,7 @@ class RollingParameters(WheelParameters):
     sequence: tuple[Mapping[str, float | str], ...] = described(
         (),
         "list of different passes, repeated; each is a table of what differs from the run: "
-        f"{', '.join(OF_A_PASS)}, and `times`",
+        f"{', '.join(_OF_A_PASS)}, and `times`",
     )
     direction: Literal["same", "back_and_forth"] = described(
         "same", "whether every pass has the same direction, or the wheel rolls back"
@@ -241,7 +243,7 @@ class RollingParameters(WheelParameters):
     @property
     def block(self) -> tuple[RollingParameters, ...]:
         """The parameters of each pass of the sequence; without one those of the run."""
-        return block_of(self, self.sequence) or (self,)
+        return block_of(self, self.sequence, _OF_A_PASS) or (self,)
 
     @property
     def widest(self) -> RollingParameters:

@@ -2,38 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from solver.errors import ModelError
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-OF_A_PASS = ("load_ratio", "friction", "traction", "control", "given_creepage", "heading")
-"""Parameters that may differ from pass to pass."""
 _TIMES = "times"
 _MOST_TIMES = 1000
 
 
-def block_of(parameters: Any, sequence: Sequence[Mapping[str, float | str]]) -> tuple[Any, ...]:
+def block_of(
+    parameters: Any, sequence: Sequence[Mapping[str, float | str]], names: Sequence[str]
+) -> tuple[Any, ...]:
     """Return the parameters of each pass of a sequence; passes of one entry share an object.
+
+    Parameters
+    ----------
+    parameters : of the run; they are those of a pass unless its entry gives others
+    sequence : a table for each entry
+    names : parameters that may differ from pass to pass
 
     Raises
     ------
     ModelError
         naming the entry and its field, if a parameter is wrong or cannot differ between passes
     """
+    if not isinstance(sequence, tuple | list):
+        raise ModelError("sequence", sequence, "must be a list of tables")
     block: list[Any] = []
     for number, entry in enumerate(sequence):
+        if not isinstance(entry, Mapping):
+            raise ModelError(f"sequence[{number}]", entry, "must be a table")
         own: dict[str, Any] = dict(entry)
         try:
             times = _times(own.pop(_TIMES, 1))
             for name, value in own.items():
-                if name not in OF_A_PASS:
-                    raise ModelError(
-                        name, value, f"must be one of {', '.join(OF_A_PASS)}, {_TIMES}"
-                    )
+                if name not in names:
+                    raise ModelError(name, value, f"must be one of {', '.join(names)}, {_TIMES}")
             block += [replace(parameters, sequence=(), **own)] * times
         except ModelError as error:
             field = f"sequence[{number}].{error.field}"

@@ -89,6 +89,26 @@ def view(parameters: WheelRailParameters) -> View:
     )
 
 
+PASS_LOAD = declare("pass_load", "vertical force on the wheel of a pass", "N", dims=("pass",))
+PASS_LATERAL_POSITION = declare(
+    "pass_lateral_position", "position z of the running circle of a pass", "mm", dims=("pass",)
+)
+PASS_TRACTION = declare(
+    "pass_traction", "ratio of longitudinal force to that of full slip, of a pass", dims=("pass",)
+)
+
+
+def traffic(run: FinishedRun) -> Values:
+    """Return the figures of every pass, with its load, position and traction."""
+    each = run.parameters.each_pass()
+    return {
+        **cycles(run, run.parameters.cycle),
+        PASS_LOAD: np.array([own.load for own in each]),
+        PASS_LATERAL_POSITION: np.array([own.lateral_position for own in each]),
+        PASS_TRACTION: np.array([own.traction for own in each]),
+    }
+
+
 def axle(run: FinishedRun) -> Values:
     """Return the height of the axle over that at which the undeformed bodies touch, and its slip.
 
@@ -96,7 +116,8 @@ def axle(run: FinishedRun) -> Values:
     """
     from solver.scenes.wheel_rail_contact import expected_contact
 
-    p, contact = run.parameters, cast("PatchContact", run.outcome.points[run.view.loaded].touching)
+    contact = cast("PatchContact", run.outcome.points[run.view.loaded].touching)
+    p = run.parameters.each_pass()[-1]
     return {
         AXLE_HEIGHT: contact.height + expected_contact(p).gap,
         AXLE_LATERAL_CREEPAGE: contact.lateral_creepage,
@@ -112,23 +133,28 @@ def setup(parameters: WheelRailParameters) -> RailGeometry:
 
 
 def wheel(run: FinishedRun) -> Values:
-    """Return the profile of the undeformed wheel that touches the rail."""
+    """Return the profile of the undeformed wheel of the last pass as it touches the rail."""
     from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
 
-    own, z = wheel_of(run.parameters), run.view.z
-    return {WHEEL_SURFACE: own.surface(own.lowest(z), z) - expected_contact(run.parameters).gap}
+    p, z = run.parameters.each_pass()[-1], run.view.z
+    own = wheel_of(p)
+    return {WHEEL_SURFACE: own.surface(own.lowest(z), z) - expected_contact(p).gap}
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     from solver.scenes.wheel_rail_track import geometry, meshed
 
-    section, count = meshed(parameters, geometry(parameters)), int(max(passes))
+    own, count = geometry(parameters), int(max(passes))
+    section, size = meshed(parameters, own), own.prism
+    turns, scattered = len({id(each) for each in parameters.block}), parameters.scattered
     return Effort(
         elements=len(section.weights),
         unknowns=len(section.free),
         increments=count,
         most_increments=count,
+        seconds=size.passes(count, turns, scattered=scattered),
+        set_up=size.set_up,
     )
 
 
@@ -139,7 +165,17 @@ WHEEL_RAIL = Scene(
     branch="passes",
     method=method,
     view=view,
-    outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, axle, wheel),
+    outputs=(
+        maps,
+        profiles,
+        residual_extremes,
+        extremes,
+        patch,
+        section,
+        traffic,
+        axle,
+        wheel,
+    ),
     costs=(cost,),
     effort=effort,
     setup=setup,

@@ -67,9 +67,41 @@ class ExpectedContact:
     gap: float
 
 
-@lru_cache(maxsize=16)
 def expected_contact(parameters: WheelRailParameters) -> ExpectedContact:
-    """Return where the wheel will touch the rail.
+    """Return where wheels will touch the rail in any pass; its gap is the smallest.
+
+    Raises
+    ------
+    ModelError
+        for ``lateral_position``, if a wheel does not meet the running surface within its ends, or
+        if its flange is inside the rail
+    """
+    each = list(dict.fromkeys(_contact_of(own) for own in parameters.outermost))
+    if len(each) == 1:
+        return each[0]
+    (right, left), near = _around([own.ends for own in each]), _around([own.near for own in each])
+    outline = rail_of(parameters).outline
+    middle = float(outline.at(np.array((right + left) / 2))[0])
+    return ExpectedContact(
+        ends=(right, left),
+        near=near,
+        middle=round(middle / _GRID) * _GRID,
+        across=(left - right) / 2 + _GRID,
+        along=max(own.along for own in each),
+        widest=max(own.widest for own in each),
+        ahead=max(own.ahead for own in each),
+        gap=min(own.gap for own in each),
+    )
+
+
+def _around(each: list[tuple[float, float]]) -> tuple[float, float]:
+    """Return the smallest and the largest length of several ends."""
+    return min(low for low, _ in each), max(high for _, high in each)
+
+
+@lru_cache(maxsize=4096)
+def _contact_of(parameters: WheelRailParameters) -> ExpectedContact:
+    """Return where the wheel of one pass will touch the rail.
 
     Raises
     ------

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
+import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
@@ -14,6 +15,8 @@ from solver.mesh.points import as_points
 from solver.parameters import Fraction, Poisson, Stress, described
 from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
 from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.sequence import block_of
+from solver.scenes.traffic import CUT, check_spreads, deviations
 from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
@@ -25,6 +28,15 @@ _CLOSEST = 1.0
 """Least distance of stations along the rail [mm]."""
 Points = tuple[tuple[float, float], ...]
 """Points z, y of a profile, z increasing [mm]."""
+_OF_A_PASS = (
+    "load", "lateral_position", "traction", "friction", "lateral_creepage", "yaw", "spin",
+    "wheel_profile", "wheel_slope", "crown_radius", "wheel_radius",
+)  # fmt: skip
+"""Parameters that may differ from pass to pass."""
+_SPREADS = ("load_spread", "lateral_spread", "traction_spread")
+_POSITIONS = 13
+"""Number of lateral positions that stand for those of random traffic, half a standard deviation
+apart."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +46,25 @@ class WheelRailParameters(MaterialParameters):
 
     yield_stress: Stress = described(502.0, "uniaxial yield stress Re of the rail")
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
+    sequence: tuple[Mapping[str, float | str], ...] = described(
+        (),
+        "list of different passes, repeated; each is a table of what differs from the run: "
+        f"{', '.join(_OF_A_PASS)}, and `times`",
+    )
+    load_spread: Annotated[float, Interval(ge=0.0, le=0.33), Unit("1")] = described(
+        0.0,
+        "standard deviation of the loads of random passes over their mean, `load`; cut off at "
+        f"{CUT:g} of them, as all spreads",
+    )
+    lateral_spread: Annotated[float, Interval(ge=0.0, le=10.0), Unit("mm")] = described(
+        0.0, "standard deviation of the lateral positions of random passes"
+    )
+    traction_spread: Annotated[float, Interval(ge=0.0, le=0.33), Unit("1")] = described(
+        0.0, "standard deviation of the tractions of random passes"
+    )
+    seed: Annotated[int, Interval(ge=0, le=2**32 - 1)] = described(
+        0, "seed of random passes: another one draws other passes"
+    )
     load: Annotated[float, Interval(gt=0.0, le=1e6), Unit("N")] = described(
         150e3, "vertical force on the wheel"
     )
@@ -131,6 +162,10 @@ class WheelRailParameters(MaterialParameters):
         check_control(self.control, self.traction, self.given_creepage)
         _ = self.rail_stress  # raises an error for parameters that do not fit together
         self._check_lateral()
+        if self.scattered:
+            check_spreads(self, _SPREADS)
+        if self.sequence:
+            _ = self.block  # raises an error for a wrong entry
 
     @property
     def rail_stress(self) -> SectionStress:
@@ -171,8 +206,61 @@ class WheelRailParameters(MaterialParameters):
     def idle(self) -> Mapping[str, str]:
         """Parameters without effect, each with the parameter whose word has no use for it."""
         own = {"conical": "wheel_slope", "crowned": "crown_radius"}
-        unused = {name: "wheel_profile" for word, name in own.items() if word != self.wheel_profile}
+        profiles = {each.wheel_profile for each in self.block}
+        unused = {name: "wheel_profile" for word, name in own.items() if word not in profiles}
+        if not self.scattered:
+            unused["seed"] = "load_spread"
         return {**MaterialParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
+
+    @property
+    def scattered(self) -> bool:
+        """Whether passes are random."""
+        return any(getattr(self, name) for name in _SPREADS)
+
+    @property
+    def block(self) -> tuple[WheelRailParameters, ...]:
+        """The parameters of each pass of the sequence; without one those of the run."""
+        return block_of(self, self.sequence, _OF_A_PASS) or (self,)
+
+    @property
+    def cycle(self) -> int | None:
+        """Passes after which the loading repeats itself; None if it is random."""
+        return None if self.scattered else len(self.block)
+
+    def each_pass(self) -> list[WheelRailParameters]:
+        """Return the parameters of each pass; those of one entry of the sequence are one object."""
+        block = self.block
+        turns = [block[number % len(block)] for number in range(self.passes)]
+        if not self.scattered:
+            return turns
+        drawn = deviations(self.seed, self.passes, len(_SPREADS))
+        return [own.deviating(each) for own, each in zip(turns, drawn, strict=True)]
+
+    def deviating(self, deviation: Sequence[float]) -> WheelRailParameters:
+        """Return the parameters of a pass with these deviations of load, position and traction.
+
+        They are in standard deviations; the pass itself has no spread.
+        """
+        load, lateral, traction = deviation
+        return replace(
+            self,
+            load=float(self.load * (1 + self.load_spread * load)),
+            lateral_position=float(self.lateral_position + self.lateral_spread * lateral),
+            traction=float(self.traction + self.traction_spread * traction),
+            sequence=(),
+            load_spread=0.0,
+            lateral_spread=0.0,
+            traction_spread=0.0,
+        )
+
+    @property
+    def outermost(self) -> list[WheelRailParameters]:
+        """Passes whose contacts hold those of all passes: heavy ones, beside each other."""
+        found = []
+        for own in dict.fromkeys(self.block) if self.sequence else (self,):
+            places = np.linspace(-CUT, CUT, _POSITIONS) if own.lateral_spread else (0.0,)
+            found += [own.deviating((CUT, place, 0.0)) for place in places]
+        return found
 
     @property
     def elasticity(self) -> Elasticity:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
 from solver.prism.track import PrismTrack
 from solver.scenes.initial_stress import stressed
+from solver.scenes.prism_effort import PrismSize
 from solver.scenes.wheel_rail_contact import (
     canted,
     expected_contact,
@@ -80,6 +81,35 @@ class RailGeometry:
     spacing: float
     reach: float
 
+    @property
+    def length(self) -> float:
+        """Length after which waves repeat, an even number of stations [mm]."""
+        return 2 * self._whole(_LENGTH / 2)
+
+    @property
+    def ahead(self) -> float:
+        """Length of the window ahead of the load [mm]."""
+        return self._whole(_AHEAD)
+
+    @property
+    def behind(self) -> float:
+        """Length of the window behind the load [mm]."""
+        return self._whole(_BEHIND)
+
+    def _whole(self, ratio: float) -> float:
+        """Return a ratio of the reach, rounded up to stations [mm]."""
+        return self.spacing * math.ceil(ratio * self.reach / self.spacing)
+
+    @property
+    def prism(self) -> PrismSize:
+        """The size of zone and window."""
+        return PrismSize(
+            columns=round(2 * self.half_width / self.size),
+            rows=round(self.depth / self.size),
+            window=round((self.ahead + self.behind) / self.spacing) + 1,
+            waves=round(self.length / self.spacing / 2) + 1,
+        )
+
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
     """Return the geometry; ``reach`` is the ratio of zone and window to their usual size.
@@ -111,21 +141,24 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     ends = np.array([inside - half_width, inside + half_width])
     if contact.ends[0] - right < h or left - contact.ends[1] < h:
         raise ModelError(
-            "lateral_position", p.lateral_position,
+            "lateral_position", _places(p),
             f"must keep the contact, expected about z = {contact.middle:g} mm, above the sides of "
             "the head",
         )  # fmt: skip
-    if not np.isfinite(wheel_of(p).surface(np.zeros(2), section.outline.at(ends)[0])).all():
-        raise ModelError(
-            "lateral_position", p.lateral_position,
-            f"must keep the contact, expected about z = {contact.middle:g} mm, farther than "
-            f"{half_width:g} mm from the ends of the wheel's profile",
-        )  # fmt: skip
+    for own in p.outermost:
+        if not np.isfinite(wheel_of(own).surface(np.zeros(2), section.outline.at(ends)[0])).all():
+            raise ModelError(
+                "lateral_position", own.lateral_position,
+                f"must keep the contact, expected about z = {contact.middle:g} mm, farther than "
+                f"{half_width:g} mm from the ends of the wheel's profile",
+            )  # fmt: skip
     s = np.arange(ends[0], ends[1], _STEP)
     z, curvature = section.outline.at(s)[0], section.outline.curvature(s)
     _check_points("rail_profile", p.rail_profile, z, curvature, h)
-    z = z - p.lateral_position
-    _check_points("wheel_profile", p.wheel_profile, z, wheel_profile(p).curvature(z), h)
+    for own in p.outermost:
+        on_wheel = z - own.lateral_position
+        bends = wheel_profile(own).curvature(on_wheel)
+        _check_points("wheel_profile", own.wheel_profile, on_wheel, bends, h)
     mean, bend = math.sqrt(contact.widest * contact.along), float(curvature.max())
     # columns of the zone that turn with the surface must not meet
     deepest = h * math.floor(_DEEPEST / bend / h) if bend > 0 else math.inf
@@ -141,6 +174,12 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         spacing=p.spacing,
         reach=whole(_REACH * contact.along + contact.ahead, p.spacing),
     )
+
+
+def _places(parameters: WheelRailParameters) -> float | tuple[float, float]:
+    """Return the lateral position of all passes, or the least and the largest one [mm]."""
+    each = [own.lateral_position for own in parameters.outermost]
+    return each[0] if min(each) == max(each) else (min(each), max(each))
 
 
 def _check_points(name: str, points: str | Points, z: Array, curvature: Array, size: float) -> None:
@@ -191,7 +230,7 @@ def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
         return section_of(own)
     except ModelError as error:
         allowed = f"leaves no room for the zone of small elements in the head: {error}"
-        raise ModelError("lateral_position", parameters.lateral_position, allowed) from None
+        raise ModelError("lateral_position", _places(parameters), allowed) from None
 
 
 @lru_cache(maxsize=2)
@@ -206,13 +245,11 @@ def track_of(
     span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
         endless
     """
-    section, h = section_of(own), own.spacing
+    section, size = section_of(own), own.prism
     # `rail_mesh` numbers the elements of the zone first
-    elements = round(2 * own.half_width / own.size) * round(own.depth / own.size)
     return PrismTrack(
-        section, np.arange(len(section.weights)) < elements, "running",
-        length=length or 2 * h * math.ceil(_LENGTH * own.reach / h / 2), spacing=h,
-        ahead=h * math.ceil(_AHEAD * own.reach / h), behind=h * math.ceil(_BEHIND * own.reach / h),
+        section, np.arange(len(section.weights)) < size.columns * size.rows, "running",
+        length=length or own.length, spacing=own.spacing, ahead=own.ahead, behind=own.behind,
         reach=own.reach, levels=_LEVELS, span=span,
     )  # fmt: skip
 
@@ -228,6 +265,8 @@ class RolledRail:
 
     def __init__(self, parameters: WheelRailParameters) -> None:
         self.parameters = parameters
+        self._passes = parameters.each_pass()
+        self._made: tuple[PrismTrack, WheelRailParameters, RollingPatch] | None = None
 
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
@@ -235,12 +274,21 @@ class RolledRail:
         meshed(p, own)
         return stressed_track(own, p.rail_stress, p.thermal_strain)
 
-    def load(self, track: PrismTrack) -> RollingPatch:
-        """See `RolledPrism`."""
-        p = self.parameters
-        return RollingPatch(
-            track.grid, track.compliance, wheel_of(p), friction=p.friction, force=p.load,
+    def load(self, track: PrismTrack, number: int) -> RollingPatch:
+        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
+        p, last = self._passes[number], self._made
+        if last is not None and last[:2] == (track, p):
+            return last[2]
+        wheel = wheel_of(p)
+        if last is not None and last[0] is track:
+            make = last[2].with_wheel(wheel).with_load
+        else:
+            make = partial(RollingPatch, track.grid, track.compliance, wheel)
+        made = make(
+            friction=p.friction, force=p.load,
             drive=None if p.control == "creepage" else p.traction,
             lateral_force=None if p.lateral_control == "creepage" else p.given_lateral_force,
             creepage=p.given_creepage, lateral_creepage=p.lateral_creepage, spin=p.spin,
         )  # fmt: skip
+        self._made = track, p, made
+        return made

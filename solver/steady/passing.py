@@ -151,15 +151,21 @@ def passing(
     double_shear = 2 * material.elasticity.shear_modulus
     solves, krylov = 0, _KRYLOV
 
-    def at(added: Array) -> _At[S]:
+    def at(added: Array, elastic: AppliedLoad | None = None) -> _At[S]:
         nonlocal solves
         solves += 1
         flow = track.flow(material, before, added, parts)
+        if elastic is not None and not flow.force.any():  # nothing yields
+            return _At(added, flow, elastic, np.zeros_like(added), 0.0)
         loading = load.on(track.solve(flow.force))
         residual = track.strain(loading.u) - added
         return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
 
-    here = at(track.strain(load.on(track.at_rest).u) if guess is None else guess)
+    if guess is None:
+        elastic = load.on(track.at_rest)
+        here = at(track.strain(elastic.u), elastic)
+    else:
+        here = at(guess)
     start, sizes, shape = here.size, [here.size], here.added.shape
     for step in range(_STEPS):
         left_over = deviation(here.residual)

@@ -33,7 +33,7 @@ def bundles(
         yield from ((path,) for path in paths)
         return
     while window := list(islice(paths, _WINDOW)):
-        most = max(1, min(_MOST, len(window) // (_EACH * max(1, workers()))))
+        most = most_together(len(window), workers())
         alike: dict[Hashable, list[LoadingPath]] = {}
         for path in window:
             alike.setdefault(setup_of(scene, path), []).append(path)
@@ -43,6 +43,11 @@ def bundles(
                 tuple(group[len(group) * k // count : len(group) * (k + 1) // count])
                 for k in range(count)
             )
+
+
+def most_together(paths: int, workers: int) -> int:
+    """Return the largest number of paths in a bundle."""
+    return max(1, min(_MOST, paths // (_EACH * max(1, workers))))
 
 
 def setup_of(scene: Scene, path: LoadingPath) -> Hashable:

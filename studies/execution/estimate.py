@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -13,7 +14,7 @@ from studies.definition.cases import LoadingPath
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
-from studies.execution.bundles import setup_of
+from studies.execution.bundles import most_together, setup_of
 from studies.execution.pace import pace_of
 from studies.storage.store import Store
 
@@ -24,6 +25,8 @@ _BYTES, _COMBINED = 1.1e6, 1.8
 """Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
 """Bytes per unknown that kept fields add to a run's file, if none is known: 55 to 185."""
+_TOLD = 2.0
+"""Factor of the low and high estimates where the scene tells the seconds."""
 _BATCH = 500
 
 
@@ -126,21 +129,30 @@ def estimate(study: Study, store: Store) -> Estimate:
     scene = study.problem
     pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
-    seconds, shared = [0.0, 0.0, 0.0], set[Hashable]()
+    set_ups: dict[Hashable, list[float]] = {}
+    basis, alone = pace.basis, 0.0
+    seconds = [0.0, 0.0, 0.0]
     for path, missing in _missing(study, store):
         to_compute += len(missing)
         paths += 1
-        if scene.setup is not None:
-            shared.add(setup_of(scene, path))
+        set_up = _PER_SETUP
         if scene.effort is not None:
             effort = scene.effort(path.parameters, missing)
+            set_up += effort.set_up
             unknowns = max(unknowns, effort.unknowns)
             increments += effort.increments
             longest = max(longest, effort.most_increments)
-            more = pace.seconds(effort.unknowns, effort.increments, effort.most_increments)
+            if effort.seconds is None:
+                more = pace.seconds(effort.unknowns, effort.increments, effort.most_increments)
+            else:
+                more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
+                basis = f"what passes of {scene.name} took elsewhere"
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
-    setups = paths if scene.setup is None else len(shared)
-    fixed = _PER_RUN * to_compute + _PER_SETUP * setups
+        if scene.setup is None:
+            alone += set_up
+        else:
+            set_ups.setdefault(setup_of(scene, path), []).append(set_up)
+    fixed = _PER_RUN * to_compute + alone + _shared(list(set_ups.values()))
     low, likely, high = (fixed + each for each in seconds)
     known = scene.effort is not None
     return Estimate(
@@ -152,8 +164,18 @@ def estimate(study: Study, store: Store) -> Estimate:
         longest=longest if known else None,
         cpu_seconds=(low, likely, high) if known else None,
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
-        basis=pace.basis if known else f"{scene.name} does not estimate the work of its paths",
+        basis=basis if known else f"{scene.name} does not estimate the work of its paths",
     )
+
+
+def _shared(each: list[list[float]]) -> float:
+    """Return the seconds of set-ups, given those of the paths of each: every process makes its own.
+
+    Paths of equal set-up go to a process in bundles.
+    """
+    processes = os.cpu_count() or 1
+    most = most_together(sum(map(len, each)), processes)
+    return sum(max(own) * min(processes, -(-len(own) // most)) for own in each)
 
 
 def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:

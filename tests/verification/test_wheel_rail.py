@@ -65,7 +65,7 @@ def test_the_rail_clamped_as_the_published_one_sinks_and_turns_as_it() -> None:
     sunk, turned = [], []
     for span in (2400.0, None):
         track = track_of(geometry(parameters), span=span)
-        load = RolledRail(parameters).load(track)
+        load = RolledRail(parameters).load(track, 0)
         contact = load.solve(np.zeros((track.grid.stations, len(track.grid.z), 3)))
         moved = track.beneath(PrismField(track, traction=contact.traction))
         node, axis = np.divmod(track.modes.unknowns, 3)

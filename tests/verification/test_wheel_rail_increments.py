@@ -38,7 +38,7 @@ def rail() -> PrismTrack:
 def both() -> tuple[Pass[PrismState], SteppedIncrement]:
     """The pass, and the state after increments, on the same rail."""
     law = ACCELERATING.material()
-    of, body = RolledRail(ACCELERATING).load(rail()), SteppedPrism(rail(), law)
+    of, body = RolledRail(ACCELERATING).load(rail(), 0), SteppedPrism(rail(), law)
     with one_thread():
         found = passing(rail(), law, PatchPassing(of), rail().virgin(law))
         wheel = SteppedPatch(

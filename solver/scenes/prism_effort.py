@@ -1,0 +1,47 @@
+"""The work of steady passes over a prism, told from the size of its zone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+_FIRST, _FACTOR = 1.2, 4.3e-5
+"""Seconds of a set-up: at least, and per wave and unknown of the zone."""
+_STILL, _POINT = 0.01, 1.5e-6
+"""Seconds of a pass where nothing yields: at least, and per point and station of the window."""
+_YIELDS = 38.0
+"""Passes where nothing yields that take as long as all yielding of a wheel that rolls again and
+again: half of that in the first pass, a quarter in the second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrismSize:
+    """The size of a zone that may yield; seconds are those of one core, measured on rails.
+
+    Attributes
+    ----------
+    columns, rows : elements of the zone, across and in depth
+    window : stations where the material may yield
+    waves : waves along the prism
+    """
+
+    columns: int
+    rows: int
+    window: int
+    waves: int
+
+    @property
+    def set_up(self) -> float:
+        """Seconds to set up the prism."""
+        along, up = self.columns, self.rows
+        nodes = (along + 1) * (up + 1) + along * (up + 1) + up * (along + 1)
+        return _FIRST + _FACTOR * self.waves * 3 * nodes
+
+    def passes(self, count: int, turns: int, *, scattered: bool) -> float:
+        """Return the seconds of passes of ``turns`` loads in turn.
+
+        If they are scattered, ever heavier ones come along, ever more rarely.
+        """
+        still = _STILL + _POINT * 4 * self.columns * self.rows * self.window
+        yields = _YIELDS * turns * (1 - 0.5 ** (count / turns))
+        return still * (count + yields * (1 + math.log(count) * scattered))

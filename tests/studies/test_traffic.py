@@ -1,0 +1,109 @@
+"""Studies of traffic: a sequence of passes is a parameter of TOML and JSON, and an axis."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.scenes import SCENES
+from studies import Store, Study, open_study
+from studies.definition.parameters import scene_schema
+from studies.errors import StudyError
+from studies.execution.estimate import estimate
+from tests.studies.conftest import compute_here
+
+TOML = """
+name = "traffic"
+scene = "wheel_rail"
+
+[parameters]
+accuracy = "draft"
+load = 60e3
+passes = 3
+
+[[parameters.sequence]]
+load = 90e3
+traction = -0.3
+
+[[parameters.sequence]]
+times = 2
+
+[sweep]
+friction = [0.2, 0.3]
+"""
+ENTRIES = [{"load": 90000, "traction": -0.3}, {"times": 2}]
+
+
+def study(sweep: dict[str, Any], **parameters: Any) -> Study:
+    """A study of traffic."""
+    usual = {"accuracy": "draft", "load": 60e3}
+    given = {"name": "traffic", "scene": "wheel_rail", "parameters": usual | parameters}
+    return Study.from_dict(json.loads(json.dumps(given | {"sweep": sweep})))
+
+
+def test_tables_of_a_file_are_those_of_a_request(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text(TOML)
+    posted = study({"friction": [0.2, 0.3]}, passes=3, sequence=ENTRIES)
+    assert Study.from_toml(file).id == posted.id
+
+
+@pytest.mark.solves
+def test_a_study_of_sequences_is_computed_and_read(store: Store) -> None:
+    order = {"first": {"sequence": ENTRIES}, "last": {"sequence": ENTRIES[::-1]}}
+    traffic = study({"order": order}, passes=3, yield_stress=300.0, load_spread=0.05)
+    compute_here(traffic, store, SCENES["wheel_rail"])
+    data = open_study(store.directory).squeeze()
+    assert (data["status"] == "ok").all()
+    mean = [[90e3, 60e3, 60e3], [60e3, 60e3, 90e3]]
+    scatter = data["pass_load"].transpose("order", "pass") / mean - 1
+    assert 0 < abs(scatter).min() and abs(scatter).max() <= 0.15
+    np.testing.assert_allclose(scatter[0], scatter[1], atol=1e-12)
+    lowest = data["pass_residual_min"].sel(component="xx").isel({"pass": -1})
+    assert abs(lowest.diff("order").item()) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("sequence", "told"),
+    [
+        ([{"load": -1.0}], r"parameters\.sequence\[0\]\.load = -1\.0: must be greater than 0"),
+        ([{}, {"gauge": 1}], r"parameters\.sequence\[1\]\.gauge = 1\.0: must be one of load, "),
+        ([5], r"parameters\.sequence = \[5\]: must be a list of tables"),
+        ({"load": 1.0}, r"parameters\.sequence = .*: must be a list of tables"),
+    ],
+)
+def test_wrong_tables_are_refused_by_name(sequence: Any, told: str) -> None:
+    with pytest.raises(StudyError, match=told):
+        study({"friction": [0.3]}, sequence=sequence)
+
+
+def test_an_axis_of_seeds_needs_a_spread() -> None:
+    with pytest.raises(StudyError, match=r"sweep\.seed = \[1, 2\]: changes nothing"):
+        study({"seed": [1, 2]})
+    study({"seed": [1, 2]}, load_spread=0.1)
+
+
+def test_the_schema_has_tables() -> None:
+    own = scene_schema("wheel_rail")["properties"]["sequence"]
+    assert own["type"] == "array" and own["items"]["type"] == "object"
+
+
+def test_a_set_up_is_paid_once_in_a_process(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Paths of one geometry share it; another geometry needs its own."""
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+
+    def likely(sweep: dict[str, Any]) -> float:
+        found = estimate(study(sweep), store).cpu_seconds
+        assert found is not None
+        return found[1]
+
+    one, two = likely({"friction": [0.2]}), likely({"friction": [0.2, 0.3]})
+    other = likely({"foundation": [21.0, 42.0]})
+    assert 1.0 < other - two
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    assert likely({"friction": [0.2, 0.3]}) == pytest.approx(other, rel=1e-9)
+    assert one < two < 2 * one
