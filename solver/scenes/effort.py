@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from solver.prism.section import Section
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +30,17 @@ class Effort:
     unknowns: int
     increments: int
     most_increments: int
+
+
+def effort_of(section: Section, passes: Sequence[float]) -> Effort:
+    """Return the work of so many passes over a prism with this section."""
+    count = int(max(passes))
+    return Effort(
+        elements=len(section.weights),
+        unknowns=len(section.free),
+        increments=count,
+        most_increments=count,
+    )
 
 
 class GridSize(NamedTuple):

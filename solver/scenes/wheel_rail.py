@@ -21,7 +21,7 @@ from solver.results.figures import cost, extremes
 from solver.results.maps import maps, profiles
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
-from solver.scenes.effort import Effort
+from solver.scenes.effort import effort_of
 from solver.scenes.prism_outputs import cycles, patch, section
 from solver.scenes.rolling import AXLE_HEIGHT
 from solver.scenes.scene import Method, Scene
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.results.run import FinishedRun, Values
+    from solver.scenes.effort import Effort
 
     Array = NDArray[np.float64]
 
@@ -84,13 +85,7 @@ def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     from solver.scenes.wheel_rail_track import geometry, section_of
 
-    section, count = section_of(geometry(parameters)), int(max(passes))
-    return Effort(
-        elements=len(section.weights),
-        unknowns=len(section.free),
-        increments=count,
-        most_increments=count,
-    )
+    return effort_of(section_of(geometry(parameters)), passes)
 
 
 WHEEL_RAIL = Scene(

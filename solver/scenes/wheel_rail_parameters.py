@@ -8,11 +8,8 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval, Unit
 
-from solver.errors import ModelError
-from solver.materials.elasticity import Elasticity
-from solver.parameters import Fraction, Poisson, Stress, described
-from solver.scenes.material_parameters import MaterialParameters
-from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
+from solver.parameters import Stress, described
+from solver.scenes.prism_parameters import PrismParameters
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
@@ -21,30 +18,12 @@ _CLOSEST = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WheelRailParameters(MaterialParameters):
+class WheelRailParameters(PrismParameters):
     """Parameters of a wheel on a rail (N, mm, MPa)."""
 
     yield_stress: Stress = described(502.0, "uniaxial yield stress Re of the rail")
-    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
     load: Annotated[float, Interval(gt=0.0, le=1e6), Unit("N")] = described(
         150e3, "vertical force on the wheel"
-    )
-    friction: Fraction = described(0.17, "Coulomb friction coefficient")
-    traction: Annotated[float, Interval(ge=-0.99, le=0.99), Unit("1")] = described(
-        0.0,
-        "ratio of the longitudinal force to that of full slip, friction times load: positive "
-        "brakes, negative accelerates",
-    )
-    control: Literal["moment", "creepage"] = described(
-        "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
-    )
-    given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
-        0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
-    )
-    lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
-        0.0,
-        "velocity of the wheel along z over that along x, relative to rolling: the yaw angle of a "
-        "wheel whose heading is turned towards the middle of the track",
     )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
         -4.0,
@@ -66,41 +45,18 @@ class WheelRailParameters(MaterialParameters):
     crown_radius: Annotated[float, Interval(ge=50.0, le=1e5), Unit("mm")] = described(
         300.0, "radius across the wheel of a crowned one"
     )
-    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
-        1.0, "ratio of Young's modulus of the wheel to that of the rail"
-    )
-    wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
-        "same", "Poisson ratio of the wheel; same: that of the rail"
-    )
     foundation: Annotated[float, Interval(ge=0.1, le=1e4), Unit("MPa")] = described(
         21.0,
         "modulus of the foundation: force per length of the rail and displacement, along x, y and "
         "z",
     )
 
-    def __post_init__(self) -> None:
-        # zero-argument super() does not see the class that dataclass(slots=True) makes
-        MaterialParameters.__post_init__(self)
-        if self.traction and not self.friction:
-            raise ModelError("traction", self.traction, "must be 0 without friction")
-        check_control(self.control, self.traction, self.given_creepage)
-
     @property
     def idle(self) -> Mapping[str, str]:
         """Parameters without effect, each with the parameter whose word has no use for it."""
         own = {"conical": "wheel_slope", "crowned": "crown_radius"}
         unused = {name: "wheel_profile" for word, name in own.items() if word != self.wheel_profile}
-        return {**MaterialParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
-
-    @property
-    def elasticity(self) -> Elasticity:
-        """Elastic constants of the rail."""
-        return Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
-
-    @property
-    def wheel_elasticity(self) -> Elasticity:
-        """Elastic constants of the wheel."""
-        return elasticity_of_wheel(self.elasticity, self.wheel_stiffness, self.wheel_poisson_ratio)
+        return {**PrismParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
 
     @property
     def element_size(self) -> float:

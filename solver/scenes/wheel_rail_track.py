@@ -21,13 +21,14 @@ from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
-from solver.prism.track import PrismTrack
+from solver.scenes.prism_window import whole, windowed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.mesh.rail import RailSection
     from solver.mesh.wheel_profile import WheelProfile
+    from solver.prism.track import PrismTrack
     from solver.scenes.wheel_rail_parameters import WheelRailParameters
 
     Array = NDArray[np.float64]
@@ -43,13 +44,10 @@ _STEP, _GRID = 0.05, 0.5
 """Step with which gaps are searched, and to which the middle of the zone is rounded [mm]."""
 _BESIDE, _DEPTH = 0.35, 1.5
 """Width of the zone beside the contact over half its width; depth over the mean half-axis."""
-_REACH, _AHEAD, _BEHIND, _LENGTH = 1.15, 2.2, 2.6, 7.0
-"""Half the length where the load may act over half that of the contact; over it, the window ahead
-and behind, and the length after which waves repeat."""
+_REACH = 1.15
+"""Half the length where the load may act over half that of the contact."""
 _STEEPEST = math.radians(80.0)
 """Steepest slope of the running surface within the zone [rad]."""
-_LEAST = 4
-"""Least number of elements in half a zone or reach."""
 _LEVELS = 4
 """Levels of the far field: the last one is 260 m long, where a rail on 21 MPa turns over 10 m."""
 
@@ -91,8 +89,6 @@ def expected_contact(parameters: WheelRailParameters) -> ExpectedContact:
     allowed = "must let the wheel touch the running surface, not beside it"
     if not 0 < least < len(z) - 1 or not np.isfinite(gap0):
         raise ModelError("lateral_position", p.lateral_position, allowed)
-    own, wheel = p.elasticity.plane_strain_modulus, p.wheel_elasticity.plane_strain_modulus
-    modulus = 1 / (1 / own + 1 / wheel)
     level = np.sort(gap[np.isfinite(gap)])[1:] - gap0
     width = np.gradient(z)
     # the contact grows with the gap at its edge, and the approach of its area falls
@@ -101,7 +97,9 @@ def expected_contact(parameters: WheelRailParameters) -> ExpectedContact:
         at = (first + last) // 2
         d = level[at]
         length = 2 * np.sqrt(2 * p.wheel_radius * np.clip(d - (gap - gap0), 0.0, None))
-        approach = _APPROACH * p.load / (modulus * math.sqrt(float(length @ width) + 1e-9))
+        approach = (
+            _APPROACH * p.load / (p.contact_modulus * math.sqrt(float(length @ width) + 1e-9))
+        )
         first, last = (first, at) if d > _PRESSED * approach else (at + 1, last)
     inside = z[gap - gap0 <= level[first]]
     return ExpectedContact(
@@ -147,6 +145,11 @@ class RailGeometry:
     spacing: float
     reach: float
 
+    @property
+    def zone(self) -> Zone:
+        """Where elements are small and may yield."""
+        return Zone(at=self.at, half_width=self.half_width, depth=self.depth, size=self.size)
+
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
     """Return the geometry; ``reach`` is the ratio of zone and window to their usual size.
@@ -158,12 +161,9 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     """
     p, contact = parameters, expected_contact(parameters)
 
-    def whole(length: float, size: float) -> float:
-        return size * max(_LEAST, math.ceil(reach * length / size))
-
     h = p.element_size
     mean = math.sqrt(contact.across * contact.along)
-    half_width = whole((1 + _BESIDE) * contact.across, h)
+    half_width = whole(reach * (1 + _BESIDE) * contact.across, h)
     section = _rail(p.cant)
     right, left = section.running
     ends = section.place(contact.middle) + half_width * np.array([-1, 1])
@@ -180,21 +180,20 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         elasticity=(p.youngs_modulus, p.poisson_ratio),
         at=contact.middle,
         half_width=half_width,
-        depth=whole(_DEPTH * mean, h),
+        depth=whole(reach * _DEPTH * mean, h),
         size=h,
         spacing=p.spacing,
-        reach=whole(_REACH * contact.along, p.spacing),
+        reach=whole(reach * _REACH * contact.along, p.spacing),
     )
 
 
 @lru_cache(maxsize=4)
 def section_of(own: RailGeometry) -> Section:
     """Return the meshed section of a rail on its foundation."""
-    zone = Zone(at=own.at, half_width=own.half_width, depth=own.depth, size=own.size)
     E, nu = own.elasticity
     spring = own.foundation / _FOOT
     return Section(
-        rail_mesh(_rail(own.cant), zone),
+        rail_mesh(_rail(own.cant), own.zone),
         Elasticity(youngs_modulus=E, poisson_ratio=nu),
         springs={"foot": (spring, spring, spring)},
     )
@@ -203,15 +202,7 @@ def section_of(own: RailGeometry) -> Section:
 @lru_cache(maxsize=2)
 def track_of(own: RailGeometry) -> PrismTrack:
     """Return the rail, set up once in a process for each geometry."""
-    section, h = section_of(own), own.spacing
-    # `rail_mesh` numbers the elements of the zone first
-    elements = round(2 * own.half_width / own.size) * round(own.depth / own.size)
-    return PrismTrack(
-        section, np.arange(len(section.weights)) < elements, "running",
-        length=2 * h * math.ceil(_LENGTH * own.reach / h / 2), spacing=h,
-        ahead=h * math.ceil(_AHEAD * own.reach / h), behind=h * math.ceil(_BEHIND * own.reach / h),
-        reach=own.reach, levels=_LEVELS,
-    )  # fmt: skip
+    return windowed(section_of(own), own.zone, spacing=own.spacing, reach=own.reach, levels=_LEVELS)
 
 
 class RolledRail:
@@ -233,7 +224,5 @@ class RolledRail:
             elasticity=p.wheel_elasticity,
         )
         return RollingPatch(
-            track.grid, track.compliance, wheel, friction=p.friction, force=p.load,
-            drive=None if p.control == "creepage" else p.traction,
-            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage,
-        )  # fmt: skip
+            track.grid, track.compliance, wheel, friction=p.friction, force=p.load, **p.motion
+        )
