@@ -82,7 +82,9 @@ def audit_prism(
         "audit_yield": max(flow.beyond(), largest(law.yield_value(residual, after.state)))
         / law.yield_stress,
         "audit_dissipation": flow.dissipation(),
-        "audit_history": max(_lost(law, found, previous), _apart(moved, left_surface)),
+        "audit_history": max(
+            _lost(law, found, previous), _apart(moved, left_surface, after.displacement)
+        ),
         "audit_inflow": max(flow.inflow(), flow.over_most(rim) if rim.size else 0.0),
         "audit_outflow": flow.outflow(),
         "audit_steadiness": stiff * max(unsteady, unsteady_behind) / law.yield_stress,
@@ -142,10 +144,10 @@ def _lost(law: Law, found: Pass[PrismState], previous: Pass[PrismState] | None) 
     return max(off, _apart(before.displacement, displacement))
 
 
-def _apart(one: Array, other: Array) -> float:
-    """Return the largest difference of displacements, over the largest of them."""
+def _apart(one: Array, other: Array, whole: Array | float = 0.0) -> float:
+    """Return the largest difference of displacements, over the largest of them and of ``whole``."""
     off = float(np.abs(one - other).max())
-    return off / float(max(np.abs(one).max(), np.abs(other).max())) if off else 0.0
+    return off / max(float(np.abs(each).max()) for each in (one, other, whole)) if off else 0.0
 
 
 def _far(track: PrismTrack, law: Law, resultants: Array) -> float:
