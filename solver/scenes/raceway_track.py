@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
+from solver.loading.bearing import too_much_shear
 from solver.materials import Elasticity
 from solver.mesh.wheel_profile import crowned
 from solver.mesh.zone import Zone, raceway_mesh
@@ -130,13 +131,22 @@ class RolledRaceway:
         return track_of(geometry(self.parameters, reach))
 
     def load(self, track: PrismTrack) -> PatchLoad:
-        """See `RolledPrism`."""
+        """See `RolledPrism`.
+
+        Raises
+        ------
+        LimitLoad
+            if a prescribed shear is above the shear strength of the material
+        """
         p, ellipse = self.parameters, self.parameters.ellipse
         if p.load == "hertz":
+            shear = p.traction * p.friction
+            limit = too_much_shear(p.material(), abs(shear) * ellipse.peak_pressure)
+            if limit is not None:
+                raise limit
             return EllipticPatch(
-                grid=track.grid, force=ellipse.force, a=ellipse.a, b=ellipse.b,
-                shear=(p.traction * p.friction, 0.0),
-            )  # fmt: skip
+                grid=track.grid, force=ellipse.force, a=ellipse.a, b=ellipse.b, shear=(shear, 0.0)
+            )
         wheel = ProfiledWheel(
             profile=crowned(p.across, p.across).height,
             radius=p.radius,

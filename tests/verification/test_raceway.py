@@ -141,6 +141,12 @@ def test_a_ball_shakes_down_below_the_published_limit_only() -> None:
     assert above.fields["pass_plastic_increment"][1][-1] > 1000 * quiet
 
 
+def test_a_prescribed_shear_above_the_shear_yield_stress_is_refused() -> None:
+    record = rolled(load="hertz", friction=0.3, traction=1.0, load_ratio=3.4 / sqrt(3))
+    assert record.status is Status.LIMIT_LOAD
+    assert "is above the shear yield stress" in record.message
+
+
 def test_the_limit_without_friction_is_that_of_the_alternating_shear() -> None:
     """Residual stress cannot change the range of shear xy, which is symmetric about x = 0."""
     x, depth = (each.ravel() for each in np.meshgrid(np.linspace(0.7, 1.0, 13), [0.3, 0.35, 0.4]))
