@@ -3,7 +3,7 @@
 All are 8-node quadrilaterals, their coordinates (z, y). The zone has rows along the running surface
 and straight columns, which turn with the surface, but less. Columns and rows continue through the
 section, with growing distances. The boundary ``running`` is the surface of the zone, its facets in
-the order of increasing z.
+the order of increasing z. The elements of the zone have the first numbers.
 """
 
 from __future__ import annotations
@@ -52,25 +52,29 @@ class Zone:
     half_width : half its width, along the surface [mm]
     depth : its depth [mm]
     size : side of the elements [mm]; width and depth are divided into whole numbers of elements
+    layer : their side in depth, ``size`` if None [mm]
 
     Raises
     ------
     ModelError
-        if a length is not positive, or ``size`` exceeds half of the width or the depth
+        if a length is not positive, or a side exceeds half of the width or the depth
     """
 
     at: float
     half_width: float
     depth: float
     size: float
+    layer: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("half_width", "depth", "size"):
+        lengths = ["half_width", "depth", "size"] + ["layer"] * (self.layer is not None)
+        for name in lengths:
             if not 0 < getattr(self, name) < math.inf:
                 raise ModelError(name, getattr(self, name), "must be positive [mm]")
         most = min(self.half_width, self.depth)
-        if self.size > most:
-            raise ModelError("size", self.size, f"must be at most {most:g} [mm]")
+        for name in lengths[2:]:
+            if getattr(self, name) > most:
+                raise ModelError(name, getattr(self, name), f"must be at most {most:g} [mm]")
 
     @property
     def columns(self) -> int:
@@ -80,7 +84,7 @@ class Zone:
     @property
     def rows(self) -> int:
         """Number of elements in depth."""
-        return round(self.depth / self.size)
+        return round(self.depth / (self.layer or self.size))
 
 
 def rail_mesh(section: RailSection, zone: Zone) -> MeshQuad2:
@@ -267,7 +271,7 @@ def raceway_mesh(
     if edge < half:
         shoulder = edge + _beyond(half - edge, z[-1] - z[-2], half)[1:]
         z = np.concatenate([-shoulder[::-1], z, shoulder])
-    below = zone.depth + _beyond(height - zone.depth, zone.size, height)[1:]
+    below = zone.depth + _beyond(height - zone.depth, zone.layer or zone.size, height)[1:]
     depths = np.concatenate([np.linspace(0, zone.depth, zone.rows + 1), below])
     lines = halved(z)
     deep = halved(depths)[::-1]
@@ -275,7 +279,11 @@ def raceway_mesh(
     X = np.stack(np.broadcast_arrays(lines[:, None], surface(lines)[:, None] * fade - deep))
     middles = X[:, 1::2, -1]
     running = middles[:, (middles[0] > low) & (middles[0] < high)]
-    return joined_patches([X], {"running": running, "foot": X[:, 1::2, 0]})
+    left, right = (2 * int(np.flatnonzero(z == end)[0]) for end in (low, high))
+    down = X.shape[2] - 1 - 2 * zone.rows
+    beside = X[:, : left + 1, down:], X[:, right:, down:], X[:, :, : down + 1]
+    patches = [X[:, left : right + 1, down:], *beside]
+    return joined_patches(patches, {"running": running, "foot": X[:, 1::2, 0]})
 
 
 def _columns(surface: Array, direction: Array, zone: Zone) -> Array:

@@ -4,6 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from solver.scenes.effort import Effort
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from solver.prism.section import Section
 
 _FIRST, _FACTOR = 1.2, 4.3e-5
 """Seconds of a set-up: at least, and per wave and unknown of the zone."""
@@ -45,3 +53,23 @@ class PrismSize:
         still = _STILL + _POINT * 4 * self.columns * self.rows * self.window
         yields = _YIELDS * turns * (1 - 0.5 ** (count / turns))
         return still * (count + yields * (1 + math.log(count) * scattered))
+
+
+def effort_of(
+    section: Section,
+    size: PrismSize,
+    passes: Sequence[float],
+    *,
+    turns: int = 1,
+    scattered: bool = False,
+) -> Effort:
+    """Return the work of so many passes over a prism with this section; see `PrismSize.passes`."""
+    count = int(max(passes))
+    return Effort(
+        elements=len(section.weights),
+        unknowns=len(section.free),
+        increments=count,
+        most_increments=count,
+        seconds=size.passes(count, turns, scattered=scattered),
+        set_up=size.set_up,
+    )

@@ -22,7 +22,7 @@ from solver.results.maps import maps, profiles
 from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
-from solver.scenes.effort import Effort
+from solver.scenes.prism_effort import effort_of
 from solver.scenes.prism_outputs import cycles, patch, section
 from solver.scenes.rolling import AXLE_HEIGHT
 from solver.scenes.scene import Method, Scene
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
     from solver.prism.patch_contact import PatchContact
     from solver.results.run import FinishedRun, Values
+    from solver.scenes.effort import Effort
     from solver.scenes.wheel_rail_track import RailGeometry
 
     Array = NDArray[np.float64]
@@ -145,17 +146,11 @@ def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     from solver.scenes.wheel_rail_track import geometry, meshed
 
-    own, count = geometry(parameters), int(max(passes))
-    section, size = meshed(parameters, own), own.prism
-    turns, scattered = len({id(each) for each in parameters.block}), parameters.scattered
-    return Effort(
-        elements=len(section.weights),
-        unknowns=len(section.free),
-        increments=count,
-        most_increments=count,
-        seconds=size.passes(count, turns, scattered=scattered),
-        set_up=size.set_up,
-    )
+    own, turns = geometry(parameters), len({id(each) for each in parameters.block})
+    return effort_of(
+        meshed(parameters, own), own.window.size, passes, turns=turns,
+        scattered=parameters.scattered,
+    )  # fmt: skip
 
 
 WHEEL_RAIL = Scene(

@@ -162,8 +162,6 @@ class _Gap:
 
     def _edge(self, p: WheelRailParameters) -> float:
         """Return the gap at the edge of contact: it grows with it, its area's approach falls."""
-        own, other = p.elasticity.plane_strain_modulus, p.wheel_elasticity.plane_strain_modulus
-        modulus = 1 / (1 / own + 1 / other)
         level, square = np.sort(self.gap)[1:], np.cos(self.angle) ** 2
         first, last = 0, len(level) - 1
         while first < last:
@@ -171,7 +169,9 @@ class _Gap:
             d = level[at]
             area = 2 * _STEP * np.sqrt(2 * p.wheel_radius * np.clip(d - self.gap, 0.0, None))
             side = math.sqrt(float(area.sum()) + 1e-9)
-            approach = _APPROACH * p.load * side / (modulus * (float(area @ square) + 1e-9))
+            approach = (
+                _APPROACH * p.load * side / (p.contact_modulus * (float(area @ square) + 1e-9))
+            )
             first, last = (first, at) if d > _PRESSED * approach else (at + 1, last)
         return float(level[first])
 

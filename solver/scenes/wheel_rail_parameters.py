@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.materials.elasticity import Elasticity
 from solver.mesh.points import as_points
-from solver.parameters import Fraction, Poisson, Stress, described
+from solver.parameters import Stress, described
 from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
-from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.prism_parameters import PrismParameters
 from solver.scenes.sequence import block_of
 from solver.scenes.traffic import CUT, check_spreads, deviations
-from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
@@ -41,11 +39,10 @@ apart."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 @INITIAL_STRESS.fields
-class WheelRailParameters(MaterialParameters):
+class WheelRailParameters(PrismParameters):
     """Parameters of a wheel on a rail (N, mm, MPa)."""
 
     yield_stress: Stress = described(502.0, "uniaxial yield stress Re of the rail")
-    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
     sequence: tuple[Mapping[str, float | str], ...] = described(
         (),
         "list of different passes, repeated; each is a table of what differs from the run: "
@@ -68,24 +65,8 @@ class WheelRailParameters(MaterialParameters):
     load: Annotated[float, Interval(gt=0.0, le=1e6), Unit("N")] = described(
         150e3, "vertical force on the wheel"
     )
-    friction: Fraction = described(0.17, "Coulomb friction coefficient")
-    traction: Annotated[float, Interval(ge=-0.99, le=0.99), Unit("1")] = described(
-        0.0,
-        "ratio of the longitudinal force to that of full slip, friction times load: positive "
-        "brakes, negative accelerates",
-    )
-    control: Literal["moment", "creepage"] = described(
-        "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
-    )
-    given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
-        0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
-    )
     lateral_control: Literal["creepage", "force"] = described(
         "creepage", "whether `lateral_creepage` is prescribed, or `given_lateral_force`"
-    )
-    lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
-        0.0,
-        "velocity of the axle along z over that along x; yaw makes the wheel creep too",
     )
     given_lateral_force: Annotated[float, Interval(ge=-1e6, le=1e6), Unit("N")] = described(
         0.0, "prescribed force of the wheel on the rail along z"
@@ -127,12 +108,6 @@ class WheelRailParameters(MaterialParameters):
     crown_radius: Annotated[float, Interval(ge=50.0, le=1e5), Unit("mm")] = described(
         300.0, "radius across the wheel of a crowned one"
     )
-    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
-        1.0, "ratio of Young's modulus of the wheel to that of the rail"
-    )
-    wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
-        "same", "Poisson ratio of the wheel; same: that of the rail"
-    )
     foundation: Annotated[float, Interval(ge=0.1, le=1e4), Unit("MPa")] = described(
         21.0,
         "modulus of the foundation: force per length of the rail and displacement, along x, y and "
@@ -151,15 +126,12 @@ class WheelRailParameters(MaterialParameters):
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        MaterialParameters.__post_init__(self)
+        PrismParameters.__post_init__(self)
         for name in ("rail_profile", "wheel_profile"):
             value = getattr(self, name)
             if not isinstance(value, str):
                 object.__setattr__(self, name, as_points(name, value))
         self._check_head()
-        if self.traction and not self.friction:
-            raise ModelError("traction", self.traction, "must be 0 without friction")
-        check_control(self.control, self.traction, self.given_creepage)
         _ = self.rail_stress  # raises an error for parameters that do not fit together
         self._check_lateral()
         if self.scattered:
@@ -210,7 +182,7 @@ class WheelRailParameters(MaterialParameters):
         unused = {name: "wheel_profile" for word, name in own.items() if word not in profiles}
         if not self.scattered:
             unused["seed"] = "load_spread"
-        return {**MaterialParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
+        return {**PrismParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
 
     @property
     def scattered(self) -> bool:
@@ -263,14 +235,11 @@ class WheelRailParameters(MaterialParameters):
         return found
 
     @property
-    def elasticity(self) -> Elasticity:
-        """Elastic constants of the rail."""
-        return Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
-
-    @property
-    def wheel_elasticity(self) -> Elasticity:
-        """Elastic constants of the wheel."""
-        return elasticity_of_wheel(self.elasticity, self.wheel_stiffness, self.wheel_poisson_ratio)
+    def motion(self) -> Mapping[str, Any]:
+        """Drive, lateral force, creepages and spin; see `PrismParameters.motion`."""
+        own: Mapping[str, Any] = PrismParameters.motion.fget(self)  # type: ignore[attr-defined]
+        force = self.given_lateral_force if self.lateral_control == "force" else None
+        return {**own, "lateral_force": force, "spin": self.spin}
 
     @property
     def element_size(self) -> float:

@@ -17,9 +17,8 @@ from solver.materials import Elasticity
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
-from solver.prism.track import PrismTrack
 from solver.scenes.initial_stress import stressed
-from solver.scenes.prism_effort import PrismSize
+from solver.scenes.prism_window import PrismWindow, whole
 from solver.scenes.wheel_rail_contact import (
     canted,
     expected_contact,
@@ -32,6 +31,7 @@ from solver.scenes.wheel_rail_contact import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.prism.track import PrismTrack
     from solver.scenes.initial_stress import SectionStress
     from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
 
@@ -43,17 +43,14 @@ _DEEPEST = 0.9
 """Largest depth of the zone over the least radius of the surface there."""
 _BESIDE, _DEPTH = 0.35, 1.5
 """Width of the zone beside the contact over half its width; depth over the mean half-axis."""
-_REACH, _AHEAD, _BEHIND, _LENGTH = 1.15, 2.2, 2.6, 7.0
-"""Half the length where the load may act over half that of the contact; over it, the window ahead
-and behind, and the length after which waves repeat."""
+_REACH = 1.15
+"""Half the length where the load may act over half that of the contact."""
 _STEP = 0.05
 """Step with which the radius of the surface is searched [mm]."""
 _SMOOTH = 4.0
 """Least radius of a curve through points in the zone, over the side of elements."""
 _APART = 6.0
 """Largest distance of points of a profile in the zone [mm]."""
-_LEAST = 4
-"""Least number of elements in half a zone or reach."""
 _LEVELS = 4
 """Levels of the far field: the last one is 260 m long, where a rail on 21 MPa turns over 10 m."""
 
@@ -82,33 +79,10 @@ class RailGeometry:
     reach: float
 
     @property
-    def length(self) -> float:
-        """Length after which waves repeat, an even number of stations [mm]."""
-        return 2 * self._whole(_LENGTH / 2)
-
-    @property
-    def ahead(self) -> float:
-        """Length of the window ahead of the load [mm]."""
-        return self._whole(_AHEAD)
-
-    @property
-    def behind(self) -> float:
-        """Length of the window behind the load [mm]."""
-        return self._whole(_BEHIND)
-
-    def _whole(self, ratio: float) -> float:
-        """Return a ratio of the reach, rounded up to stations [mm]."""
-        return self.spacing * math.ceil(ratio * self.reach / self.spacing)
-
-    @property
-    def prism(self) -> PrismSize:
-        """The size of zone and window."""
-        return PrismSize(
-            columns=round(2 * self.half_width / self.size),
-            rows=round(self.depth / self.size),
-            window=round((self.ahead + self.behind) / self.spacing) + 1,
-            waves=round(self.length / self.spacing / 2) + 1,
-        )
+    def window(self) -> PrismWindow:
+        """Where the rail may yield."""
+        zone = Zone(at=self.at, half_width=self.half_width, depth=self.depth, size=self.size)
+        return PrismWindow(zone=zone, spacing=self.spacing, reach=self.reach)
 
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
@@ -123,9 +97,6 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     p, contact = parameters, expected_contact(parameters)
     h, section = p.element_size, rail_of(p)
 
-    def whole(length: float, size: float) -> float:
-        return size * max(_LEAST, math.ceil(reach * length / size))
-
     at, half = contact.middle, contact.across + _BESIDE * contact.widest
     middle, (right, left) = section.place(at), upper(section)
     low, high = contact.near
@@ -134,7 +105,7 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         middle, half = (low + high) / 2, (high - low) / 2
         at = float(section.outline.at(np.array(middle))[0])
     # as far as the sides of the head
-    half_width = min(whole(half, h), h * math.floor((left - right) / (2 * h)))
+    half_width = min(whole(reach * half, h), h * math.floor((left - right) / (2 * h)))
     inside = float(np.clip(middle, right + half_width, left - half_width))
     if inside != middle:
         at = float(section.outline.at(np.array(inside))[0])
@@ -169,10 +140,10 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         elasticity=(p.youngs_modulus, p.poisson_ratio),
         at=at,
         half_width=half_width,
-        depth=min(whole(_DEPTH * mean, h), max(deepest, 2 * h)),
+        depth=min(whole(reach * _DEPTH * mean, h), max(deepest, 2 * h)),
         size=h,
         spacing=p.spacing,
-        reach=whole(_REACH * contact.along + contact.ahead, p.spacing),
+        reach=whole(reach * (_REACH * contact.along + contact.ahead), p.spacing),
     )
 
 
@@ -214,11 +185,10 @@ def _check_points(name: str, points: str | Points, z: Array, curvature: Array, s
 @lru_cache(maxsize=4)
 def section_of(own: RailGeometry) -> Section:
     """Return the meshed section of a rail on its foundation."""
-    zone = Zone(at=own.at, half_width=own.half_width, depth=own.depth, size=own.size)
     E, nu = own.elasticity
     spring = own.foundation / _FOOT
     return Section(
-        rail_mesh(canted(own.profile, own.cant), zone),
+        rail_mesh(canted(own.profile, own.cant), own.window.zone),
         Elasticity(youngs_modulus=E, poisson_ratio=nu),
         springs={"foot": (spring, spring, spring)},
     )
@@ -245,13 +215,7 @@ def track_of(
     span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
         endless
     """
-    section, size = section_of(own), own.prism
-    # `rail_mesh` numbers the elements of the zone first
-    return PrismTrack(
-        section, np.arange(len(section.weights)) < size.columns * size.rows, "running",
-        length=length or own.length, spacing=own.spacing, ahead=own.ahead, behind=own.behind,
-        reach=own.reach, levels=_LEVELS, span=span,
-    )  # fmt: skip
+    return own.window.track(section_of(own), _LEVELS, length=length, span=span)
 
 
 @lru_cache(maxsize=2)
@@ -284,11 +248,6 @@ class RolledRail:
             make = last[2].with_wheel(wheel).with_load
         else:
             make = partial(RollingPatch, track.grid, track.compliance, wheel)
-        made = make(
-            friction=p.friction, force=p.load,
-            drive=None if p.control == "creepage" else p.traction,
-            lateral_force=None if p.lateral_control == "creepage" else p.given_lateral_force,
-            creepage=p.given_creepage, lateral_creepage=p.lateral_creepage, spin=p.spin,
-        )  # fmt: skip
+        made = make(friction=p.friction, force=p.load, **p.motion)
         self._made = track, p, made
         return made

@@ -57,6 +57,7 @@ def records() -> list[Record]:
         "rolling": ({"element_size": 2.0, "advance_step": 2.0, "track": 8.0}, 1),
         "rolling, endless": ({"element_size": 3.0}, 1),
         "wheel_rail": ({"accuracy": "draft"}, 1),
+        "raceway": ({"accuracy": "draft"}, 1),
     }
     names = {label: label.split(",")[0] for label in coarse}
     assert set(names.values()) == {each.name for each in built_in()} - {"fake"}, (

@@ -119,7 +119,10 @@ def test_wheels_share_the_influences_of_the_rail() -> None:
     [
         (({}, {"load": -1.0}), r"sequence\[1\]\.load = -1\.0: must be greater than 0"),
         (({"cant": 0.1},), r"sequence\[0\]\.cant = 0\.1: must be one of load, lateral_position"),
-        (({"wheel_profile": "flat"},), r"sequence\[0\]\.wheel_profile = 'flat': must be a list or s1002"),
+        (
+            ({"wheel_profile": "flat"},),
+            r"sequence\[0\]\.wheel_profile = 'flat': must be a list",
+        ),
         (({}, {}, {"load": "much"}), r"sequence\[2\]\.load = 'much': must be a number"),
         (({"traction": 0.5, "friction": 0.0},), r"sequence\[0\]\.traction = 0\.5: must be 0"),
         (({"times": 0},), r"sequence\[0\]\.times = 0: must be an integer"),

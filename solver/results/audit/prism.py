@@ -85,7 +85,7 @@ def audit_prism(
         "audit_history": max(
             _lost(track, law, found, previous),
             _unsettled(track, plain) / law.yield_stress,
-            _apart(moved, left_surface),
+            _apart(moved, left_surface, after.displacement),
         ),
         "audit_inflow": max(flow.inflow(), flow.over_most(rim) if rim.size else 0.0),
         "audit_outflow": flow.outflow(),
@@ -158,10 +158,10 @@ def _lost(
     return max(off, _apart(before.displacement, displacement))
 
 
-def _apart(one: Array, other: Array) -> float:
-    """Return the largest difference of displacements, over the largest of them."""
+def _apart(one: Array, other: Array, whole: Array | float = 0.0) -> float:
+    """Return the largest difference of displacements, over the largest of them and of ``whole``."""
     off = float(np.abs(one - other).max())
-    return off / float(max(np.abs(one).max(), np.abs(other).max())) if off else 0.0
+    return off / max(float(np.abs(each).max()) for each in (one, other, whole)) if off else 0.0
 
 
 def _far(track: PrismTrack, law: Law, resultants: Array) -> float:

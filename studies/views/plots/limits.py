@@ -16,12 +16,15 @@ from matplotlib.lines import Line2D
 from solver.results.sliding_limits import johnson_limit, melan_limit
 
 _POINTS = 51
+_LINE_CONTACT = "rolling"
+"""The scene of a line contact."""
 
 
 def draw_shakedown_limits(axes: Axes, panel: xr.Dataset, outermost: bool) -> Sequence[Line2D]:
     """Draw the largest p0 / k at which a body without hardening shakes down; return the lines.
 
-    The limits hold for shear = friction * pressure: nothing is drawn unless all contacts slide.
+    The limits hold for line contact with shear = friction * pressure: no line is drawn for another
+    scene, and nothing unless all contacts slide.
 
     Parameters
     ----------
@@ -38,6 +41,8 @@ def draw_shakedown_limits(axes: Axes, panel: xr.Dataset, outermost: bool) -> Seq
     right.tick_params(labelright=outermost)
     if outermost:
         right.set_ylabel("$p_0$ / k")
+    if panel.attrs["scene"] != _LINE_CONTACT:
+        return []
     limits = _limits(float(friction.max()), float(poisson))
     styles = {"limit without hardening\n(Johnson)": "-", "the same (Melan, von Mises)": "--"}
     return [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from math import sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -134,7 +135,10 @@ def test_limits_are_those_of_theory_and_drawn_for_full_slip_only() -> None:
             assert y[-1] == pytest.approx(limit / sqrt(3))
     labels = [axes.child_axes[0].get_ylabel() for axes in sheet.axes[:2]]
     assert labels == ["", "$p_0$ / k"]
+    points = swept().assign_attrs(scene="raceway", parameters='{"poisson_ratio": 0.3}')
+    assert sweep_figure(points, "shakedown_state").axes[1].child_axes[0].get_ylabel() == labels[1]
     for other in (
+        sweep_figure(points, "shakedown_state"),
         sweep_figure(swept(traction=0.75), "shakedown_state"),
         sweep_figure(swept(), "creepage"),
     ):
@@ -255,3 +259,19 @@ def test_the_shakedown_map_asks_for_loads_on_both_sides_of_the_limit_on_one_mesh
     for friction in {run.friction for run in runs}:
         loads = {sqrt(3) * run.load_ratio for run in runs if run.friction == friction}
         assert min(loads) < melan_limit(friction, 0.3) <= johnson_limit(friction) < max(loads)
+
+
+def test_the_map_of_point_contact_asks_for_ellipses_of_one_pressure_on_three_meshes() -> None:
+    """Its loads are on both sides of the limits without friction, 4.22, 4.68 and 5.78."""
+    study = Study.from_toml(ROOT / "data" / "studies" / "raceway-shakedown.toml")
+    limits = {0.5: 4.22, 1.0: 4.68, 2.0: 5.78}
+    runs: dict[float, list[Any]] = {ratio: [] for ratio in limits}
+    for case in study.cases():
+        ellipse = case.parameters.ellipse
+        runs[round(ellipse.a / ellipse.b, 3)].append(case.parameters)
+        assert ellipse.peak_pressure == pytest.approx(3000.0, rel=1e-3)
+    for ratio, each in runs.items():
+        assert len({(*run.size, run.elements) for run in each}) == 1
+        assert all(run.traction == (run.friction > 0.0) for run in each)
+        loads = {sqrt(3) * run.load_ratio for run in each if run.friction == 0.0}
+        assert min(loads) < limits[ratio] < max(loads)
