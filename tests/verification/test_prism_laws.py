@@ -73,7 +73,7 @@ def pressure(peak: float, a: float = A) -> EllipticPatch:
 def compared(own: PrismTrack, material: Law) -> None:
     """Assert that increments leave the state of a steady pass, and that the next one is sound."""
     load = PatchPassing(pressure(1360.0))
-    body = SteppedPrism(own, material)
+    body = SteppedPrism(own, material, parts=1)
     with one_thread():
         found = passing(own, material, load, own.virgin(material), parts=1)
         end = body.rolled(body.virgin, pressure(1360.0), round(ADVANCE / SPACING))
