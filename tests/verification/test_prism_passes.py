@@ -193,23 +193,6 @@ def test_a_length_twice_as_long_changes_little() -> None:
     assert np.abs(short - long).max() < 0.04 * RE
 
 
-def test_passes_shake_down_below_the_limit_and_not_above() -> None:
-    """The limit of a frictionless circle is 4.68 k, 2.70 Re (Ponter, Hearle, Johnson, 1985)."""
-    track = block()
-    added = {}
-    for ratio in (2.3, 3.2):
-        load, state, guess = ellipse(track, ratio * RE), track.virgin(PERFECT), None
-        each = []
-        with one_thread():
-            for _ in range(5):
-                found = passing(track, PERFECT, load, state, guess)
-                each.append(float((found.after.accumulated - state.accumulated).max()))
-                state, guess = found.after, found.strain
-        added[ratio] = each
-    assert added[2.3][-1] < 0.02 * added[2.3][0]
-    assert added[3.2][-1] > 0.1 * added[3.2][0]
-
-
 def test_a_zone_that_is_too_small_is_told() -> None:
     small = block(zone_depth=5.0)
     with pytest.raises(WindowTooSmall, match="around"):
