@@ -89,7 +89,7 @@ def plan(quick: bool) -> Iterator[tuple[Case, tuple[Case, ...]]]:
         yield longest, tuple(
             Case(series, f"{L:g} mm", length=L, levels=levels) for L in lengths
         )  # fmt: skip
-    windows = ((16.0, 18.0), (20.0, 24.0), (28.0, 36.0))
+    windows = ((20.0, 20.0), (20.0, 24.0), (28.0, 36.0))
     yield Case("window", "", length=128.0, ahead=40.0, behind=60.0), tuple(
         Case("window", f"{a:g} + {b:g} mm", length=128.0, ahead=a, behind=b)
         for a, b in windows
