@@ -46,6 +46,17 @@ class Hats:
         weights[edges + 1, edges] = half * SHARES
         return weights.reshape(m, -1) / self.width[:, None]
 
+    @property
+    def nearest(self) -> Array:
+        """Weights (m, 2m - 2): the sum of hats nearest to a function, of its values at the points.
+
+        Nearest means least squares. The integral over all hats is that of the function, and so is
+        its product with every hat: forces on the vertices of a mesh are those of the function.
+        """
+        mean = self.mean
+        hats = np.stack([self.along(each[:-1], each[1:]) for each in np.eye(len(self.s))], axis=1)
+        return np.asarray(np.linalg.solve(mean @ hats, mean))
+
     @staticmethod
     def along(first: Array, last: Array) -> Array:
         """Return values (2m - 2,) at the points, of functions linear on every edge.

@@ -1,14 +1,17 @@
 """An elastic wheel that rolls over the surface of a prism, in the frame of its axle.
 
 Material of both bodies flows upstream to downstream through the contact, in which nothing changes.
-The *slip* at station c is the motion of the surface over the wheel while the axle advances by one
-station: with the displacements u of surface minus wheel, in local axes,
+The *slip* at station c is the motion of the surface over the wheel while the axle advances by the
+distance of two stations: with the displacements u of surface minus wheel, in local axes,
 
-    slip[c] = u_t[c] - u_t[c - 1] + rigid slip       gap[c] = gap of the bodies - u_n[c]
+    slip[c] = (3 u_t[c] - 4 u_t[c - 1] + u_t[c - 2]) / 2 + rigid slip
+    gap[c] = gap of the bodies - u_n[c]
 
-The displacements are those without tractions, and linear in the tractions: the influence between
-two stations depends on their distance alone. The rest is the problem of `friction_cone`. The wheel
-is a half-space; its tractions are those of the surface, mirrored.
+The difference is of second order at the station, and looks upstream, where material comes from: a
+difference across the station would not couple it to itself. The displacements are those without
+tractions, and linear in the tractions: the influence between two stations depends on their distance
+alone. The rest is the problem of `friction_cone`. The wheel is a half-space; its tractions are
+those of the surface, mirrored.
 
 J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), sections 1.6 and 4.2.
 """
@@ -43,6 +46,8 @@ _MIRROR = np.array([1.0, -1.0, 1.0])
 _PRESSED = 0.5
 """Ratio of the interpenetration of undeformed bodies to their approach, over the expected contact.
 For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
+UPSTREAM = (1.5, -2.0, 0.5)
+"""Weights of the slip at a station, at the one before and at the second before."""
 _SLIDES = 1.0
 """Creepage at which all of a contact slips."""
 
@@ -238,7 +243,10 @@ class RollingPatch:
         """Return slip and gap (w_x, g, w_s) by tractions, from the motions and gap they make."""
         kernel = apart.copy()
         for axis in TANGENTS:
-            kernel[:, :, axis] -= np.roll(apart[:, :, axis], 1, axis=0)
+            motion = apart[:, :, axis]
+            kernel[:, :, axis] = sum(
+                weight * np.roll(motion, back, axis=0) for back, weight in enumerate(UPSTREAM)
+            )
         return kernel
 
     @property
@@ -260,7 +268,12 @@ class RollingPatch:
         """Return slip and gap (n, m, 3) from displacements (n, m, 3) of the surface."""
         local = np.einsum("jab,cjb->cja", self._axes, u)
         moved = np.zeros_like(local)
-        moved[1:, :, TANGENTS] = np.diff(local[..., TANGENTS], axis=0)
+        tangential = local[..., TANGENTS]
+        before = 2 * tangential[:1] - tangential[1:2]  # one station upstream of the grid
+        path = np.concatenate([before, tangential])
+        moved[1:, :, TANGENTS] = sum(
+            weight * path[2 - back : len(path) - back] for back, weight in enumerate(UPSTREAM)
+        )
         moved[..., NORMAL] = -local[..., NORMAL]
         return moved
 

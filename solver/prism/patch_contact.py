@@ -29,7 +29,7 @@ class PatchContact:
     traction : (n, m, 3) tractions on the surface in x, y, z [MPa]
     gap : (n, m) gap under the load, NaN for a given load [mm]
     slip : (n, m, 2) slip of the surface over the load, along x and across, while the load advances
-        by one station, NaN for a given load [mm]
+        by the distance of two stations, NaN for a given load [mm]
     status : (n, m) OPEN, STICK or SLIP of `solver.prism.friction_cone`
     along : (change (n, m, 3) of the surface's displacement without tractions) -> change of
         ``traction``

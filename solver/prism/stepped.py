@@ -35,7 +35,7 @@ from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
 from solver.steady.passing import deviation, searched
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -78,18 +78,31 @@ class SteppedState:
         return self.state.accumulated.reshape(self.strain.shape[:2])
 
 
+class SteppedContact(Protocol):
+    """What an increment leaves of its contact; see `SteppedIncrement`."""
+
+    @property
+    def contact(self) -> PatchContact:
+        """See above."""
+
+    @property
+    def displacement(self) -> Array:
+        """See above."""
+
+
 class SteppedLoad(Protocol):
     """A load of an increment, as `EllipticPatch` and `SteppedPatch`."""
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """Return the contact on a surface with displacements (n, m, 3); see `PatchLoad`."""
 
-    def following(self, u: Array, contact: PatchContact, stations: int) -> Self:
+    def following(self, before: Sequence[SteppedContact], stations: int) -> Self:
         """Return this load, in an increment in which it advances by so many stations.
 
         Parameters
         ----------
-        u, contact : (n, m, 3) displacements without tractions, and contact, of the last increment
+        before : the last increment; and the one before it, if the load advanced by as many
+            stations in between
         """
 
 
@@ -188,6 +201,7 @@ class SteppedPrism:
         """
         off = _NoLoad(self._track.grid)
         last: SteppedIncrement | None = None
+        earlier: list[SteppedIncrement] = []
         state, place, moved, change = before, 0, 0, np.zeros(self._shape)
         for load, behind in path:
             if not 0 <= behind <= self.most_behind:
@@ -195,7 +209,8 @@ class SteppedPrism:
             step = place - behind if last else 0
             now, guess, start = load or off, state.strain, None
             if last:
-                now, start = now.following(last.displacement, last.contact, step), last.contact
+                again = [last, *earlier] if step and step == moved else [last]
+                now, start, earlier = now.following(again, step), last.contact, [last]
             if load and step and step == moved:
                 # under a load that rolls, the last increment's change comes again
                 guess = guess + np.roll(change, -step, axis=1)
@@ -357,6 +372,6 @@ class _NoLoad:
             along=np.zeros_like,
         )
 
-    def following(self, u: Array, contact: PatchContact, stations: int) -> _NoLoad:
+    def following(self, before: Sequence[SteppedContact], stations: int) -> _NoLoad:
         """See `SteppedLoad`."""
         return self

@@ -1,29 +1,37 @@
 """An elastic wheel that rolls over a prism by increments, over material that stands still.
 
-The slip of a point of the surface is the change of its motion over the wheel since the last
-increment, in which it was s stations further upstream under the wheel that advances by s:
+The slip of a point of the surface is the change of its motion over the wheel in the increment. With
+the motion r[c] at station c, u_t of surface minus wheel, that of the last increment, in which
+the point was s stations further upstream under the wheel that advances by s, and r" of the one
+before it,
 
-    slip[c] = r[c] - r_before[c - s] + s rigid slip,    r = u_t of surface minus wheel
+    slip[c] = r[c] - r'[c - s] + s rigid slip
+    slip[c] = (3 r[c] - 4 r'[c - s] + r"[c - 2 s]) / 2 + s rigid slip
 
-In a steady state r_before is r, which with s = 1 is the slip of `RollingPatch`. Where moment or
+The second difference, of second order, is taken where the last increment advanced by s too. In a
+steady state r' and r" are r, which with s = 1 is the slip of `RollingPatch`. Where moment or
 lateral force is given, the motion of the wheel in the increment is unknown, as its height is.
 """
 
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.prism.friction_cone import NORMAL, TANGENTS
-from solver.prism.patch import RollingPatch
+from solver.prism.patch import UPSTREAM, RollingPatch
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from solver.prism.patch_contact import PatchContact
     from solver.prism.profiled_wheel import ProfiledWheel
+    from solver.prism.stepped import SteppedContact
 
     Array = NDArray[np.float64]
 
@@ -42,20 +50,30 @@ class SteppedPatch(RollingPatch):
 
     def _set_wheel(self, wheel: ProfiledWheel) -> None:
         super()._set_wheel(wheel)
-        self._rest[..., TANGENTS] = 0.0
+        self._rest[..., TANGENTS], self._weight = 0.0, 1.0
 
-    def following(self, u: Array, contact: PatchContact, stations: int) -> SteppedPatch:
+    def following(self, before: Sequence[SteppedContact], stations: int) -> SteppedPatch:
         """See `SteppedLoad`."""
-        values, _ = self._known(contact)
-        motion = (self._offset(u) + self._influence.of(values))[..., TANGENTS]
-        other, n = copy(self), len(motion)
+        other, weights = copy(self), UPSTREAM if len(before) > 1 else (1.0, -1.0)
+        other._weight = weights[0]
         other._given = stations * self._creepages
-        other._rest, _ = self.wheel.rolling(self.grid)
-        other._rest[..., TANGENTS] *= stations
-        first, last = max(0, stations), min(n, n + stations)
-        if first < last:
-            other._rest[first:last, :, TANGENTS] -= motion[first - stations : last - stations]
+        other._rest, other._motions = self.wheel.rolling(self.grid)
+        other._rest[..., TANGENTS] *= stations / weights[0]
+        other._motions[..., TANGENTS] /= weights[0]
+        for count, (own, weight) in enumerate(zip(before, weights[1:], strict=True), start=1):
+            ago = _upstream(self._motion(own), count * stations)
+            other._rest[..., TANGENTS] += weight / weights[0] * ago
         return other
+
+    def _motion(self, of: SteppedContact) -> Array:
+        """Return the motion (n, m, 2) of the surface over the wheel in an increment."""
+        values, _ = self._known(of.contact)
+        return (self._offset(of.displacement) + self._influence.of(values))[..., TANGENTS]
+
+    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+        """See `PatchLoad`."""
+        found = super().solve(u, start)
+        return replace(found, slip=self._weight * found.slip)
 
     @staticmethod
     def _kernel(apart: Array) -> Array:
@@ -67,3 +85,12 @@ class SteppedPatch(RollingPatch):
         local = np.einsum("jab,cjb->cja", self._axes, u)
         local[..., NORMAL] *= -1.0
         return np.asarray(local)
+
+
+def _upstream(motion: Array, stations: int) -> Array:
+    """Return the motion (n, m, 2) by station a number of stations further upstream; 0 outside."""
+    out, n = np.zeros_like(motion), len(motion)
+    first, last = max(0, stations), min(n, n + stations)
+    if first < last:
+        out[first:last] = motion[first - stations : last - stations]
+    return out

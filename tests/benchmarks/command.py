@@ -11,6 +11,7 @@ from tests.benchmarks import (
     accuracy,
     figures,
     hertz,
+    prism,
     punch,
     rolling,
     skips,
@@ -35,8 +36,8 @@ PUNCH_FIGURES = {
 ALONE = {f"{n} alone": text for n, text in punch.MEASURES.items() if n != "plateau"}
 
 
-NAMES = ("hertz", "walls", "punch", "steady", "rolling", "skips", "accuracy", "sweep")
-SLOW = ("accuracy", "sweep")
+NAMES = ("hertz", "walls", "punch", "steady", "rolling", "skips", "prism", "accuracy", "sweep")
+SLOW = ("prism", "accuracy", "sweep")
 """Measured where they are named alone."""
 
 
@@ -58,6 +59,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
         "steady": lambda: of_steady(given.out, quick=given.quick, repeats=repeats),
         "rolling": lambda: of_rolling(given.out, quick=given.quick, repeats=repeats),
         "skips": lambda: of_skips(repeats),
+        "prism": lambda: of_prism(given.out, quick=given.quick, repeats=repeats),
         "accuracy": lambda: of_accuracy(given.out, quick=given.quick, repeats=repeats),
         "sweep": lambda: of_sweep(quick=given.quick),
     }
@@ -154,6 +156,19 @@ def of_load(
     figures.draw(own, measures, series, title, out / f"{name}-{load}.png")
     text = f"{own[0].problem.capitalize()}, {load}: errors of residual sigma_x / Re"
     return [f"{text} against the finest run", *table(own, tuple(measures)), ""]
+
+
+def of_prism(out: Path, *, quick: bool, repeats: int) -> list[str]:
+    """Measure passes over a prism, draw them, and return their tables."""
+    points = prism.measure(quick, repeats)
+    write_csv(points, out / "prism.csv")
+    lines = []
+    for load in prism.loads(quick):
+        own = [p for p in points if p.setting.endswith(load)]
+        title = f"Pass over a prism, {load}: residual stress against the finest of each series"
+        figures.draw(own, prism.MEASURES, prism.SERIES, title, out / f"prism-{load}.png")
+        lines += [title, *table(own, tuple(prism.MEASURES), prism.VALUES), ""]
+    return lines
 
 
 def of_skips(repeats: int) -> list[str]:

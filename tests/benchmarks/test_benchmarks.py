@@ -16,6 +16,7 @@ from tests.benchmarks.command import (
     benchmark,
     of_accuracy,
     of_hertz,
+    of_prism,
     of_punch,
     of_rolling,
     of_steady,
@@ -35,7 +36,7 @@ TINY = punch.Plan(
 )
 
 
-QUICK = (of_walls, of_steady, of_rolling, of_accuracy)
+QUICK = (of_walls, of_steady, of_rolling, of_prism, of_accuracy)
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +79,13 @@ def test_errors_of_rolling_by_increments_fall_with_the_mesh(written: Path) -> No
     rolling = rows(written / "rolling.csv")
     coarse, fine = (rolling[f"mesh {h} mm, free"]["error of first row"] for h in (4, 2))
     assert 0 < fine < 0.8 * coarse
+
+
+def test_errors_of_a_pass_over_a_prism_fall_with_the_elements(written: Path) -> None:
+    prism = rows(written / "prism.csv")
+    coarse, fine = (prism[f"section {h} mm, ellipse"] for h in ("3.33", "2"))
+    for measure in ("mean", "largest"):
+        assert 0 < fine[f"error of {measure}"] < 0.7 * coarse[f"error of {measure}"]
 
 
 def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
@@ -153,6 +161,7 @@ def test_every_figure_and_the_table_are_written(written: Path) -> None:
         "walls-sphere.png",
         "rolling-free.png",
         "accuracy.png",
+        "prism-ellipse.png",
         "steady-free.png",
         "steady-braking.png",
     }

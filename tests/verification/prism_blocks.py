@@ -40,22 +40,30 @@ def lines(fine: float, h: float, far: float, growth: float) -> Array:
     return np.array(at)
 
 
-@cache
-def block(
-    h: float = 2.0, length: float = 64.0, spacing: float | None = None, far: float = 75.0,
-    growth: float = 1.4, levels: int = 0, zone_depth: float = 14.0,
-) -> PrismTrack:  # fmt: skip
-    """A block as deep as half its width ``far``, held at its bottom.
+def half_space_section(h: float, far: float, growth: float) -> tuple[Section, NDArray[np.bool_]]:
+    """A section as deep as half its width ``far``, held at its bottom, and its small elements.
 
-    Elements of h in 20 by 14 mm, growing beside and below; stations ``spacing`` apart, h if None.
-    Those down to ``zone_depth`` may yield.
+    Elements of h in 20 by 14 mm, growing beside and below.
     """
     half, down = (lines(fine, h, far, growth) for fine in (10.0, 14.0))
     z, y = np.concatenate([-half[:0:-1], half]), -down[::-1]
     mesh = within(grid(z, y), "running", ["top"], x=(-10.001, 10.001))
     section = Section(mesh, PERFECT.elasticity, supports={"bottom": "xyz"})
     at = section.points.mean(axis=2)
-    zone = (np.abs(at[0]) < 10) & (at[1] > -zone_depth)
+    return section, (np.abs(at[0]) < 10) & (at[1] > -14.0)
+
+
+@cache
+def block(
+    h: float = 2.0, length: float = 64.0, spacing: float | None = None, far: float = 75.0,
+    growth: float = 1.4, levels: int = 0, zone_depth: float = 14.0,
+) -> PrismTrack:  # fmt: skip
+    """A block of `half_space_section`; stations ``spacing`` apart, h if None.
+
+    Its small elements down to ``zone_depth`` may yield.
+    """
+    section, small = half_space_section(h, far, growth)
+    zone = small & (section.points[1].mean(axis=1) > -zone_depth)
     return PrismTrack(
         section, zone, "running", length=length, spacing=spacing or h, ahead=AHEAD, behind=24.0,
         reach=10.0, levels=levels,

@@ -73,7 +73,7 @@ def random_case(seed: int) -> tuple[RollingPatch, Array, ProfiledWheel, dict[str
 
 
 def moved(contact: PatchContact, compliance: Array, wheel: ProfiledWheel) -> tuple[Array, Array]:
-    """Return gap (n, m) and slip (n - 1, m, 2) of a contact, all but the first station.
+    """Return gap (n, m) and slip (n - 2, m, 2) of a contact, all but the first two stations.
 
     Displacements are sums over stations; those of the wheel are those of a half-space above.
     """
@@ -92,7 +92,8 @@ def moved(contact: PatchContact, compliance: Array, wheel: ProfiledWheel) -> tup
     motions = [contact.height, contact.creepage, contact.lateral_creepage, contact.spin]
     rest, of_motions = wheel.rolling(grid)
     rigid = rest + np.tensordot(motions, of_motions, 1)
-    return rigid[..., 1] - apart[..., 1], (np.diff(apart, axis=0) + rigid[1:])[..., [0, 2]]
+    slip = (3 * apart[2:] - 4 * apart[1:-1] + apart[:-2]) / 2 + rigid[2:]
+    return rigid[..., 1] - apart[..., 1], slip[..., [0, 2]]
 
 
 def worst(contact: PatchContact, friction: float, gap: Array, slip: Array) -> float:
@@ -103,8 +104,8 @@ def worst(contact: PatchContact, friction: float, gap: Array, slip: Array) -> fl
     p, q = contact.pressure, contact.shear
     stiffness = p.max() / abs(contact.height)
     size = np.linalg.norm(q, axis=-1)
-    against = (q[1:] * slip).sum(axis=-1) + friction * p[1:] * np.linalg.norm(slip, axis=-1)
-    sticks = size[1:] < friction * p[1:] * (1 - 1e-6)
+    against = (q[2:] * slip).sum(axis=-1) + friction * p[2:] * np.linalg.norm(slip, axis=-1)
+    sticks = size[2:] < friction * p[2:] * (1 - 1e-6)
     found = [
         -p, -gap * stiffness, np.minimum(p, gap * stiffness), size - friction * p,
         against / p.max() * stiffness, np.where(sticks[..., None], slip, 0.0) * stiffness,

@@ -92,3 +92,14 @@ def test_mean_under_hats_is_exact_for_functions_linear_between_vertices() -> Non
     ])  # fmt: skip
     assert hats.mean @ np.interp(hats.points, S, values) * hats.width == pytest.approx(exact)
     assert hats.mean.sum(axis=1) == pytest.approx(1.0)
+
+
+def test_the_nearest_hats_work_on_every_hat_as_the_function_does() -> None:
+    """And are it where it is linear between vertices; products are those at the points."""
+    hats = Hats(S)
+    values = np.cos(hats.points)
+    nearest = hats.nearest @ values
+    assert hats.mean @ hats.along(nearest[:-1], nearest[1:]) == pytest.approx(hats.mean @ values)
+    assert nearest @ hats.width == pytest.approx(hats.mean @ values @ hats.width)
+    linear = np.sin(S)
+    assert hats.nearest @ hats.along(linear[:-1], linear[1:]) == pytest.approx(linear)

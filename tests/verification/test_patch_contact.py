@@ -16,6 +16,7 @@ from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_grid import PatchGrid
 from solver.prism.profiled_wheel import ProfiledWheel
+from solver.prism.stepped_patch import SteppedPatch
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
 
 FRICTION = 0.3
@@ -33,6 +34,7 @@ def test_hertz_holds_and_the_axes_converge_with_the_square_of_the_distance(
     a: float, b: float
 ) -> None:
     hertz = ellipse(a, b)
+    """At a/16 axes, approach and largest pressure err by 0.16, 0.007 and 0.05 %."""
     misses = []
     for n in (4, 8, 16):
         patch = pressed(hertz, a / n, b / n)
@@ -67,7 +69,7 @@ def creep_forces(a: float, b: float, along: float, across: float, shift: float =
     creep = -grid.spacing * (steps + 0 * x)
     found = []
     for axis, change in ((0, (creep, 0 * x)), (2, (0 * x, creep)),
-                         (2, (-creep * grid.z, -grid.spacing * np.cumsum(x, axis=0)))):  # fmt: skip
+                         (2, (-creep * grid.z, x**2 / 2))):  # fmt: skip
         u = np.stack([change[0], 0 * x, change[1]], axis=-1)
         force = (contact.along(u) * grid.area[:, None]).sum(axis=(0, 1))
         found.append(force[axis] / size)
@@ -75,14 +77,22 @@ def creep_forces(a: float, b: float, along: float, across: float, shift: float =
 
 
 @pytest.mark.parametrize("axes", KALKER)
-def test_creep_coefficients_of_kalker_are_approached_with_the_distance_of_stations(
-    axes: tuple[float, float],
-) -> None:
-    """The difference of slip has an error of first order in the distance h of stations.
+def test_creep_coefficients_of_kalker_are_met_on_one_grid(axes: tuple[float, float]) -> None:
+    """a/16 along, b/8 across: C11 and C22 within 1 %, C23 within 2 %.
 
-    On one grid the contact ends where its stations and vertices allow: up to 2 % of a coefficient,
-    less where they are not symmetric about the middle. Twenty grids, with a / h from 6 to 18, tell
-    the line of errors over h / a: 0.4 h / a for C11 and C22, less for C23. It meets the table.
+    On a grid the contact ends where its stations and vertices allow, which is what is left.
+    """
+    a, b = axes
+    errors = creep_forces(a, b, a / 16, b / 8) / KALKER[axes] - 1
+    assert np.abs(errors[:2]).max() < 0.01
+    assert abs(errors[2]) < 0.02
+
+
+@pytest.mark.parametrize("axes", KALKER)
+def test_creep_coefficients_have_hardly_an_error_of_first_order(axes: tuple[float, float]) -> None:
+    """Errors of twenty grids, with a / h from 6 to 18: 0.05 h / a in the mean, 0.1 h / a for C23.
+
+    A slip from the difference of two stations makes 0.4 h / a. The mean meets the table.
     """
     a, b = axes
     along = np.linspace(6, 18, 20)
@@ -95,32 +105,38 @@ def test_creep_coefficients_of_kalker_are_approached_with_the_distance_of_statio
     limit, slope = np.linalg.lstsq(line, np.array(errors))[0]
     assert limit[:2] == pytest.approx([0.0, 0.0], abs=0.01)
     assert limit[2] == pytest.approx(0.0, abs=0.02)
-    assert slope[:2] == pytest.approx([0.4, 0.4], abs=0.1)
+    assert np.abs(slope[:2]).max() < 0.12
     assert abs(slope[2]) < 0.2
 
 
 @cache
-def carter(ratio: float) -> tuple[float, float, float]:
-    """Return errors of a wide ellipse against Carter's strip: shear, stick length, force."""
+def carter(ratio: float, n: float, shift: float = 0.0) -> tuple[float, float, float]:
+    """Return errors of a wide ellipse against Carter's strip: shear, stick length, force.
+
+    Stations are a / n apart. The shear, root mean square over friction times p0, and the
+    stick length, in distances of stations, are those near the middle.
+    """
     hertz, less = ellipse(1.0, ratio), 0.3
     rolling, peak = hertz.radii[0], hertz.peak_pressure
     patch = pressed(
-        hertz, 1 / 16.5, ratio / 5, friction=FRICTION, creepage=FRICTION * less / rolling
+        hertz, 1 / n, ratio / 5, friction=FRICTION, creepage=FRICTION * less / rolling, shift=shift
     )
     contact = patch.solve(flat(patch))
     middle, x = len(contact.grid.z) // 2, contact.grid.x
+    half = np.sqrt(1 - (contact.grid.z[middle] / ratio) ** 2)
 
-    def root(share: np.ndarray) -> np.ndarray:
-        return np.sqrt(np.maximum(0.0, 1 - share**2))
+    def root(square: np.ndarray) -> np.ndarray:
+        return np.sqrt(np.maximum(0.0, square))
 
-    shear = FRICTION * peak * (root(x) - (1 - less) * root((x - less) / (1 - less)))
-    width = root(np.linspace(-1.0, 1.0, 2001))
+    shear = FRICTION * peak * (root(half**2 - x**2) - root((half - less) ** 2 - (x - less) ** 2))
+    width = root(1 - np.linspace(-1.0, 1.0, 2001) ** 2)
     held = 1 - np.divide(np.maximum(width - less, 0), width, out=0 * width, where=width > 0) ** 2
     force = FRICTION * np.pi / 2 * peak * ratio * np.trapezoid(width**2 * held, dx=1e-3)
-    stick = (contact.status[:, middle] == STICK).sum() * contact.grid.spacing / 2
+    sticks, off = contact.status[:, middle] == STICK, contact.shear[:, middle, 0] - shear
+    assert (np.diff(sticks.astype(int)) == 1).sum() == 1  # one zone, at the leading edge
     return (
-        float(np.abs(contact.shear[:, middle, 0] - shear).max() / (FRICTION * peak)),
-        float(stick / (1 - less) - 1),
+        float(np.sqrt(np.mean(off[np.abs(x) < half] ** 2)) / (FRICTION * peak)),
+        float(sticks.sum() - 2 * (half - less) * n),
         float(contact.force[0] / force - 1),
     )
 
@@ -128,13 +144,39 @@ def carter(ratio: float) -> tuple[float, float, float]:
 def test_the_middle_of_a_wide_ellipse_is_the_strip_of_carter() -> None:
     """Creepage reduces the half-length a of each strip's stick zone by the same amount.
 
-    F.W. Carter (1926), in K.L. Johnson, Contact Mechanics (1985), 8.3.
+    The force is met within 1 % in the mean over places of the stations; a single grid of a/8.5 is
+    within 1.5 %. F.W. Carter (1926), in K.L. Johnson, Contact Mechanics (1985), 8.3.
     """
-    near, far = carter(4.0), carter(16.0)
-    assert far[0] < 0.04
-    assert far[0] < 0.5 * near[0]
-    assert far[1] == pytest.approx(0.0, abs=0.05)
-    assert far[2] == pytest.approx(0.0, abs=0.01)
+    errors = np.array([carter(64.0, 8.5, shift) for shift in (0.0, 0.25, 0.5, 0.75)])
+    assert errors[:, 0].max() < 0.02
+    assert np.abs(errors[:, 1]).max() < 1.0
+    assert np.abs(errors[:, 2]).max() < 0.015
+    assert abs(errors[:, 2].mean()) < 0.006
+    shear, stick, force = carter(64.0, 17.0)
+    assert shear < 0.02
+    assert abs(stick) < 1.0
+    assert abs(force) < 0.006
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.85])
+def test_a_ball_that_is_moved_aside_slips_as_cattaneo_and_mindlin_say(share: float) -> None:
+    """Pressed and moved along x, by its only increment: from the rim inwards.
+
+    K.L. Johnson, Contact Mechanics (1985), (7.40) and (7.42). Shear across, a twentieth of that
+    along, is left out there.
+    """
+    hertz, n, G, nu = ellipse(1.0, 1.0), 8, STEEL.shear_modulus, STEEL.poisson_ratio
+    most = 3 * (2 - nu) * FRICTION * hertz.force / (8 * G)
+    aside = most * (1 - (1 - share) ** (2 / 3))
+    like = pressed(hertz, 1 / n, 1 / n)
+    ball = SteppedPatch(
+        like.grid, surface_of(like.grid), like.wheel, friction=FRICTION, force=hertz.force,
+        creepage=aside * n,
+    )  # fmt: skip
+    contact = ball.solve(flat(ball))
+    assert contact.force[0] == pytest.approx(share * FRICTION * hertz.force, rel=2e-3)
+    stick = np.sqrt(((contact.status == STICK) * contact.grid.area).sum() / np.pi)
+    assert stick == pytest.approx((1 - share) ** (1 / 3), rel=0.02)
 
 
 def test_force_grows_with_creepage_up_to_friction_times_load() -> None:

@@ -5,9 +5,9 @@ pass: at a point at x it is that of the station at x. The load moves on by the d
 then each point must have the state of the next station downstream. Outside the window plastic
 strain is given, as the pass assumes it there.
 
-What is left is the elements' share: elements of 1 mm, of the block that is twice as wide, leave 1.7
-of 35 MPa after one increment without hardening and 2.7 of 69 after two; elements of 2 mm with
-stations of 2 mm 6.3 of 57 and 12.7 of 109.
+What is left is the elements' share: elements of 1 mm, of the block that is twice as wide, leave 5 %
+of the change after one increment without hardening and 4 % after two; elements of 2 mm with
+stations of 2 mm 11 and 12 %.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class Standing:
 def standing(law: Law) -> Standing:
     """Return the first pass of the ellipse, by one increment from station to station."""
     with one_thread():
-        load, before = ellipse(track(), 1360.0), track().virgin(law)
+        load, before = ellipse(track(), 1240.0), track().virgin(law)
         found = passing(track(), law, load, before, parts=1, tolerance=1e-6)
     x, y, z = bricks().points
     apart, row = cKDTree(track().points.T).query(np.stack([z, y]).T)
@@ -128,9 +128,9 @@ def test_bricks_with_the_plastic_strain_of_a_pass_have_its_strain() -> None:
     assert own.size(body.strain(u)[:, own.flows] - strain) < 0.006 * own.size(strain)
 
 
-@pytest.mark.parametrize(("law", "most"), [(PERFECT, 3.0), (HARDENS, 2.5)], ids=["perfect", "hard"])
+@pytest.mark.parametrize(("law", "most"), [(PERFECT, 2.0), (HARDENS, 1.8)], ids=["perfect", "hard"])
 def test_a_pass_is_a_fixed_point_of_increments(law: Law, most: float) -> None:
-    """The first one changes 2 G ep by 32 and 28 MPa, two by 64 and 56."""
+    """The first one changes 2 G ep by 23 and 21 MPa, two by 45 and 40."""
     own, body = standing(law), bricks()
     now, off = own.start, []
     with one_thread():
@@ -142,6 +142,6 @@ def test_a_pass_is_a_fixed_point_of_increments(law: Law, most: float) -> None:
             wanted = own.plastic_strain(moved)[:, own.flows]
             off.append(own.size(now.state.plastic_strain - wanted))
             change = own.size(wanted - own.start.state.plastic_strain)
-            assert change > 25.0 * moved
+            assert change > 20.0 * moved
     assert off[0] < most
     assert off[1] < 0.06 * change

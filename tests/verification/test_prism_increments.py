@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from solver.errors import ModelError, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.prism.given_patch import EllipticPatch
 from solver.prism.patch import RollingPatch
+from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_passing import PatchPassing
 from solver.prism.stepped import LoadAt, SteppedIncrement, SteppedPrism
 from solver.prism.stepped_patch import SteppedPatch
@@ -77,13 +78,21 @@ def test_increments_leave_the_state_of_a_steady_pass() -> None:
     assert np.sqrt(np.average((off**2).sum(axis=0), weights=track().modes.weights)) < 4.0  # MPa
 
 
+class Rested(NamedTuple):
+    """The contact of an increment over a body that stays elastic."""
+
+    contact: PatchContact
+    displacement: Array
+
+
 def by_increments(load: SteppedPatch, advance: int, count: int = 40) -> Array:
     """Tractions of a wheel on the elastic block after so many increments."""
     u = np.zeros((load.grid.stations, len(load.grid.z), 3))
-    contact = load.solve(u)
+    before = [Rested(load.solve(u), u)]
     for _ in range(count):
-        contact = load.following(u, contact, advance).solve(u, contact)
-    return contact.traction
+        contact = load.following(before, advance).solve(u, before[0].contact)
+        before = [Rested(contact, u), before[0]]
+    return before[0].contact.traction
 
 
 GIVEN: dict[str, dict[str, float]] = {

@@ -185,29 +185,24 @@ def test_traction_turns_the_layer_below_the_surface() -> None:
     assert force == pytest.approx([0.75 * 0.3 * 150e3, -150e3, 0.0], rel=1e-3, abs=200.0)
 
 
-def test_a_length_twice_as_long_changes_little() -> None:
-    short, long = (
-        residual(HARDENS, rolled(track, HARDENS, ellipse(track, 1360.0)).after)
-        for track in (block(length=64.0), block(length=128.0))
+def test_the_error_of_the_length_falls_when_it_doubles() -> None:
+    """Largest, of the yield stress: 3.5 and 0.54 % at 64 and 128 mm, 2.1 % at 64 with far field.
+
+    A far field replaces the loads at the distance of a length, not the fading of plastic strain
+    behind the window, which is left.
+    """
+
+    def left(length: float, levels: int = 0) -> Array:
+        track = block(length=length, levels=levels)
+        return residual(PERFECT, rolled(track, PERFECT, ellipse(track, 1360.0)).after) / RE
+
+    endless = left(256.0)
+    short, long, far = (
+        np.abs(left(*each) - endless).max() for each in ((64.0,), (128.0,), (64.0, 2))
     )
-    assert np.abs(short - long).max() < 0.04 * RE
-
-
-def test_passes_shake_down_below_the_limit_and_not_above() -> None:
-    """The limit of a frictionless circle is 4.68 k, 2.70 Re (Ponter, Hearle, Johnson, 1985)."""
-    track = block()
-    added = {}
-    for ratio in (2.3, 3.2):
-        load, state, guess = ellipse(track, ratio * RE), track.virgin(PERFECT), None
-        each = []
-        with one_thread():
-            for _ in range(5):
-                found = passing(track, PERFECT, load, state, guess)
-                each.append(float((found.after.accumulated - state.accumulated).max()))
-                state, guess = found.after, found.strain
-        added[ratio] = each
-    assert added[2.3][-1] < 0.02 * added[2.3][0]
-    assert added[3.2][-1] > 0.1 * added[3.2][0]
+    assert short < 0.04
+    assert long < short / 4
+    assert far < 0.7 * short
 
 
 def test_a_zone_that_is_too_small_is_told() -> None:

@@ -151,7 +151,8 @@ class AuditedPatch:
         rigid = contact.height, contact.creepage, contact.lateral_creepage, contact.spin
         effects = rest + np.tensordot(rigid, motions, 1)
         effects[..., NORMAL] -= moved[..., NORMAL]
-        effects[1:, :, TANGENTS] += np.diff(moved[..., TANGENTS], axis=0)
+        u = moved[..., TANGENTS]
+        effects[2:, :, TANGENTS] += 1.5 * u[2:] - 2.0 * u[1:-1] + 0.5 * u[:-2]
         return np.asarray(effects)
 
     def _wrong_slip(self, bound: Array) -> float:
@@ -159,7 +160,8 @@ class AuditedPatch:
 
         Slip is wrong if the shear is below its bound, or does not oppose it.
         """
-        judged, slip = self._closed, self._effects[..., TANGENTS]
+        slip, judged = self._effects[..., TANGENTS], self._closed.copy()
+        judged[:2] = False  # their slip depends on displacements upstream of the grid
         size, weight = np.linalg.norm(slip, axis=-1), (bound * self._area)[judged]
         should = float(weight @ np.maximum(size[judged], STILL * self.approach))
         if should == 0.0:
