@@ -66,9 +66,14 @@ class SteppedPatch(RollingPatch):
         return other
 
     def _motion(self, of: SteppedContact) -> Array:
-        """Return the motion (n, m, 2) of the surface over the wheel in an increment."""
+        """Return the motion (n + 2, m, 2) of the surface over the wheel in an increment.
+
+        It begins one station before the first, where material is that comes to touch.
+        """
         values, _ = self._known(of.contact)
-        return (self._offset(of.displacement) + self._influence.of(values))[..., TANGENTS]
+        left = self._offset(of.displacement)[..., TANGENTS]
+        around = np.stack([2 * left[0] - left[1], *left, 2 * left[-1] - left[-2]])
+        return np.asarray(around + self._influence.around(values)[..., TANGENTS])
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """See `PatchLoad`."""
@@ -88,9 +93,11 @@ class SteppedPatch(RollingPatch):
 
 
 def _upstream(motion: Array, stations: int) -> Array:
-    """Return the motion (n, m, 2) by station a number of stations further upstream; 0 outside."""
-    out, n = np.zeros_like(motion), len(motion)
-    first, last = max(0, stations), min(n, n + stations)
-    if first < last:
-        out[first:last] = motion[first - stations : last - stations]
-    return out
+    """Return the motion (n, m, 2) by station a number of stations further upstream.
+
+    Beyond what is known (n + 2, m, 2) it goes on as a straight line.
+    """
+    at = np.arange(1, len(motion) - 1) - stations
+    inside = np.clip(at, 0, len(motion) - 1)
+    slope = np.where((at < 0)[:, None, None], motion[1] - motion[0], motion[-1] - motion[-2])
+    return np.asarray(motion[inside] + (at - inside)[:, None, None] * slope)
