@@ -171,10 +171,11 @@ def test_a_ball_that_is_moved_aside_slips_as_cattaneo_and_mindlin_say(share: flo
     like = pressed(hertz, 1 / n, 1 / n)
     ball = SteppedPatch(
         like.grid, surface_of(like.grid), like.wheel, friction=FRICTION, force=hertz.force,
-        creepage=aside * n,
+        drive=share,
     )  # fmt: skip
     contact = ball.solve(flat(ball))
-    assert contact.force[0] == pytest.approx(share * FRICTION * hertz.force, rel=2e-3)
+    assert contact.force[0] == pytest.approx(share * FRICTION * hertz.force, rel=1e-6)
+    assert contact.creepage / n == pytest.approx(aside, rel=2e-3)
     stick = np.sqrt(((contact.status == STICK) * contact.grid.area).sum() / np.pi)
     assert stick == pytest.approx((1 - share) ** (1 / 3), rel=0.02)
 
