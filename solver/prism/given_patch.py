@@ -74,7 +74,7 @@ class EllipticPatch:
             along=np.zeros_like,
         )
 
-    def following(self, u: Array, contact: PatchContact, stations: int) -> EllipticPatch:
+    def following(self, u: Array, contact: PatchContact | None, stations: int) -> EllipticPatch:
         """See `SteppedLoad`; the tractions do not change."""
         return self
 

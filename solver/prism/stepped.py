@@ -84,12 +84,14 @@ class SteppedLoad(Protocol):
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """Return the contact on a surface with displacements (n, m, 3); see `PatchLoad`."""
 
-    def following(self, u: Array, contact: PatchContact, stations: int) -> Self:
+    def following(self, u: Array, contact: PatchContact | None, stations: int) -> Self:
         """Return this load, in an increment in which it advances by so many stations.
 
         Parameters
         ----------
-        u, contact : (n, m, 3) displacements without tractions, and contact, of the last increment
+        u : (n, m, 3) displacements without tractions in the last increment [mm]
+        contact : contact in the last increment; None for a load that is set down, which does not
+            advance
         """
 
 
@@ -177,6 +179,8 @@ class SteppedPrism:
     def along(self, before: SteppedState, path: Iterable[LoadAt]) -> Iterator[SteppedIncrement]:
         """Yield the increments of a path.
 
+        A load that comes after none is set down: it does not roll in its first increment.
+
         Raises
         ------
         ModelError
@@ -186,23 +190,23 @@ class SteppedPrism:
         NotConverged
             if an increment has no equilibrium
         """
-        off = _NoLoad(self._track.grid)
-        last: SteppedIncrement | None = None
+        off, contact = _NoLoad(self._track.grid), None
         state, place, moved, change = before, 0, 0, np.zeros(self._shape)
         for load, behind in path:
             if not 0 <= behind <= self.most_behind:
                 raise ModelError("behind", behind, f"must be in 0 to {self.most_behind} stations")
-            step = place - behind if last else 0
-            now, guess, start = load or off, state.strain, None
-            if last:
-                now, start = now.following(last.displacement, last.contact, step), last.contact
+            step = place - behind if contact else 0
+            if not contact:
+                u = self._surface(self._double_shear * state.plastic_strain, behind)
+            now, guess = (load or off).following(u, contact, step), state.strain
             if load and step and step == moved:
                 # under a load that rolls, the last increment's change comes again
                 guess = guess + np.roll(change, -step, axis=1)
-            last = self._increment(state, now, behind, start, guess)
-            self._check_rim(before, last.state)
-            change, place, moved, state = last.state.strain - state.strain, behind, step, last.state
-            yield last
+            found = self._increment(state, now, behind, contact, guess)
+            self._check_rim(before, found.state)
+            change, place, moved = found.state.strain - state.strain, behind, step
+            state, u, contact = found.state, found.displacement, found.contact if load else None
+            yield found
 
     def _increment(
         self, before: SteppedState, load: SteppedLoad, behind: int, start: PatchContact | None,
@@ -357,6 +361,6 @@ class _NoLoad:
             along=np.zeros_like,
         )
 
-    def following(self, u: Array, contact: PatchContact, stations: int) -> _NoLoad:
+    def following(self, u: Array, contact: PatchContact | None, stations: int) -> _NoLoad:
         """See `SteppedLoad`."""
         return self

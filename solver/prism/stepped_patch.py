@@ -12,7 +12,7 @@ lateral force is given, the motion of the wheel in the increment is unknown, as 
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.prism.patch_contact import PatchContact
-    from solver.prism.profiled_wheel import ProfiledWheel
 
     Array = NDArray[np.float64]
 
@@ -31,26 +30,18 @@ if TYPE_CHECKING:
 class SteppedPatch(RollingPatch):
     """A wheel that rolls by increments, for `SteppedPrism`; parameters are those of `RollingPatch`.
 
-    In its first increment it is set down: it does not advance, and nothing has moved before. The
-    creepages of its contact are motions in the increment over the distance of two stations, which
-    is creepage if it advances by one.
+    The wheel of an increment is what `following` returns. The creepages of its contact are motions
+    in the increment over the distance of two stations, which is creepage if it advances by one.
     """
 
-    def _set_load(self, *given: Any) -> None:
-        super()._set_load(*given)
-        self._creepages, self._given = self._given, np.zeros_like(self._given)
-
-    def _set_wheel(self, wheel: ProfiledWheel) -> None:
-        super()._set_wheel(wheel)
-        self._rest[..., TANGENTS] = 0.0
-
-    def following(self, u: Array, contact: PatchContact, stations: int) -> SteppedPatch:
-        """See `SteppedLoad`."""
-        values, _ = self._known(contact)
-        motion = (self._offset(u) + self._influence.of(values))[..., TANGENTS]
+    def following(self, u: Array, contact: PatchContact | None, stations: int) -> SteppedPatch:
+        """See `SteppedLoad`; of a wheel that is set down, slip counts from the surface as it is."""
+        motion = self._offset(u)[..., TANGENTS]
+        if contact:
+            motion += self._influence.of(self._known(contact)[0])[..., TANGENTS]
         other, n = copy(self), len(motion)
-        other._given = stations * self._creepages
-        other._rest, _ = self.wheel.rolling(self.grid)
+        other._given = stations * self._given
+        other._rest = self._rest.copy()
         other._rest[..., TANGENTS] *= stations
         first, last = max(0, stations), min(n, n + stations)
         if first < last:
