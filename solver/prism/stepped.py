@@ -79,15 +79,28 @@ class SteppedState:
 
 
 class SteppedContact(Protocol):
-    """What an increment leaves of its contact; see `SteppedIncrement`."""
+    """What an increment leaves of its contact.
+
+    Attributes
+    ----------
+    contact : the contact; None before a load is set down
+    displacement : (n, m, 3) displacement of the grid without tractions [mm]
+    """
 
     @property
-    def contact(self) -> PatchContact:
+    def contact(self) -> PatchContact | None:
         """See above."""
 
     @property
     def displacement(self) -> Array:
         """See above."""
+
+
+class Bare(NamedTuple):
+    """The surface before a load is set down; see `SteppedContact`."""
+
+    displacement: Array
+    contact: None = None
 
 
 class SteppedLoad(Protocol):
@@ -102,7 +115,7 @@ class SteppedLoad(Protocol):
         Parameters
         ----------
         before : the last increment; and the one before it, if the load advanced by as many
-            stations in between
+            stations in between. For a load that is set down the surface as it is
         """
 
 
@@ -200,23 +213,25 @@ class SteppedPrism:
             if an increment has no equilibrium
         """
         off = _NoLoad(self._track.grid)
-        last: SteppedIncrement | None = None
-        earlier: list[SteppedIncrement] = []
+        known: list[SteppedContact] = []
         state, place, moved, change = before, 0, 0, np.zeros(self._shape)
         for load, behind in path:
             if not 0 <= behind <= self.most_behind:
                 raise ModelError("behind", behind, f"must be in 0 to {self.most_behind} stations")
-            step = place - behind if last else 0
-            now, guess, start = load or off, state.strain, None
-            if last:
-                again = [last, *earlier] if step and step == moved else [last]
-                now, start, earlier = now.following(again, step), last.contact, [last]
-            if load and step and step == moved:
+            # a load that is set down does not advance
+            step = place - behind if known else 0
+            if not known:
+                known = [Bare(self._surface(self._double_shear * state.plastic_strain, behind))]
+            again = step and step == moved
+            now = (load or off).following(known if again else known[:1], step)
+            guess, start = state.strain, known[0].contact
+            if load and again:
                 # under a load that rolls, the last increment's change comes again
                 guess = guess + np.roll(change, -step, axis=1)
             last = self._increment(state, now, behind, start, guess)
             self._check_rim(before, last.state)
             change, place, moved, state = last.state.strain - state.strain, behind, step, last.state
+            known = [last, *known[:1]] if load else []
             yield last
 
     def _increment(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.prism.patch_contact import PatchContact
-    from solver.prism.profiled_wheel import ProfiledWheel
     from solver.prism.stepped import SteppedContact
 
     Array = NDArray[np.float64]
@@ -39,25 +38,19 @@ if TYPE_CHECKING:
 class SteppedPatch(RollingPatch):
     """A wheel that rolls by increments, for `SteppedPrism`; parameters are those of `RollingPatch`.
 
-    In its first increment it is set down: it does not advance, and nothing has moved before. The
-    creepages of its contact are motions in the increment over the distance of two stations, which
-    is creepage if it advances by one.
+    The wheel of an increment is what `following` returns. The creepages of its contact are motions
+    in the increment over the distance of two stations, which is creepage if it advances by one.
     """
 
-    def _set_load(self, *given: Any) -> None:
-        super()._set_load(*given)
-        self._creepages, self._given = self._given, np.zeros_like(self._given)
-
-    def _set_wheel(self, wheel: ProfiledWheel) -> None:
-        super()._set_wheel(wheel)
-        self._rest[..., TANGENTS], self._weight = 0.0, 1.0
+    _weight = 1.0
+    """Weight of the motion at a station in the slip there."""
 
     def following(self, before: Sequence[SteppedContact], stations: int) -> SteppedPatch:
-        """See `SteppedLoad`."""
+        """See `SteppedLoad`; of a wheel that is set down, slip counts from the surface as it is."""
         other, weights = copy(self), UPSTREAM if len(before) > 1 else (1.0, -1.0)
         other._weight = weights[0]
-        other._given = stations * self._creepages
-        other._rest, other._motions = self.wheel.rolling(self.grid)
+        other._given = stations * self._given
+        other._rest, other._motions = self._rest.copy(), self._motions.copy()
         other._rest[..., TANGENTS] *= stations / weights[0]
         other._motions[..., TANGENTS] /= weights[0]
         for count, (own, weight) in enumerate(zip(before, weights[1:], strict=True), start=1):
@@ -70,10 +63,11 @@ class SteppedPatch(RollingPatch):
 
         It begins one station before the first, where material is that comes to touch.
         """
-        values, _ = self._known(of.contact)
         left = self._offset(of.displacement)[..., TANGENTS]
         around = np.stack([2 * left[0] - left[1], *left, 2 * left[-1] - left[-2]])
-        return np.asarray(around + self._influence.around(values)[..., TANGENTS])
+        if of.contact is not None:
+            around += self._influence.around(self._known(of.contact)[0])[..., TANGENTS]
+        return around
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """See `PatchLoad`."""

@@ -16,6 +16,7 @@ from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_grid import PatchGrid
 from solver.prism.profiled_wheel import ProfiledWheel
+from solver.prism.stepped import Bare
 from solver.prism.stepped_patch import SteppedPatch
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
 
@@ -173,7 +174,7 @@ def test_a_ball_that_is_moved_aside_slips_as_cattaneo_and_mindlin_say(share: flo
         like.grid, surface_of(like.grid), like.wheel, friction=FRICTION, force=hertz.force,
         drive=share,
     )  # fmt: skip
-    contact = ball.solve(flat(ball))
+    contact = ball.following([Bare(flat(ball))], 0).solve(flat(ball))
     assert contact.force[0] == pytest.approx(share * FRICTION * hertz.force, rel=1e-6)
     assert contact.creepage / n == pytest.approx(aside, rel=2e-3)
     stick = np.sqrt(((contact.status == STICK) * contact.grid.area).sum() / np.pi)

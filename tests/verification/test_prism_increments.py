@@ -19,7 +19,7 @@ from solver.prism.given_patch import EllipticPatch
 from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
 from solver.prism.patch_passing import PatchPassing
-from solver.prism.stepped import LoadAt, SteppedIncrement, SteppedPrism
+from solver.prism.stepped import Bare, LoadAt, SteppedIncrement, SteppedPrism
 from solver.prism.stepped_patch import SteppedPatch
 from solver.prism.track import PrismTrack
 from solver.steady.passing import passing
@@ -88,11 +88,12 @@ class Rested(NamedTuple):
 def by_increments(load: SteppedPatch, advance: int, count: int = 40) -> Array:
     """Tractions of a wheel on the elastic block after so many increments."""
     u = np.zeros((load.grid.stations, len(load.grid.z), 3))
-    before = [Rested(load.solve(u), u)]
+    contact = load.following([Bare(u)], 0).solve(u)
+    before = [Rested(contact, u)]
     for _ in range(count):
-        contact = load.following(before, advance).solve(u, before[0].contact)
+        contact = load.following(before, advance).solve(u, contact)
         before = [Rested(contact, u), before[0]]
-    return before[0].contact.traction
+    return contact.traction
 
 
 GIVEN: dict[str, dict[str, float]] = {
@@ -131,6 +132,21 @@ def test_a_wheel_that_stands_changes_nothing() -> None:
         assert np.abs(stands.state.plastic_strain - rolls.state.plastic_strain).max() < 1e-6
     assert not off.contact.traction.any()
     assert np.abs(off.state.strain).max() < 0.5 * np.abs(rolls.state.strain).max()
+
+
+def test_a_wheel_is_set_down_on_the_surface_as_it_is() -> None:
+    """Shear of what rolled there before is no slip; nor does a wheel roll through the air."""
+    path = [LoadAt(wheel(drive=0.7), behind) for behind in (3, 2, 1, 0)]
+    *_, off, again = rolled([*path, LoadAt(None, 0), LoadAt(wheel(creepage=0.002), 2)])
+    moved = off.displacement[..., 0]
+    assert np.ptp(moved) > 0.01  # mm; two stations with this creepage are 0.008
+    assert np.abs(again.contact.shear).max() < 10.0  # MPa; 4, of 360 with full slip
+    assert abs(again.contact.force[0]) < 50.0  # N; 11
+    with one_thread():
+        (begun,) = SteppedPrism(track(), HARDENS).along(
+            off.state, [LoadAt(wheel(creepage=0.002), 2)]
+        )
+    assert begun.contact.traction == pytest.approx(again.contact.traction, abs=1e-6)
 
 
 def test_braking_a_wheel_that_stands_shears_what_lies_under_it() -> None:
