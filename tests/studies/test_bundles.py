@@ -13,6 +13,7 @@ import pytest
 
 from solver.errors import ModelError
 from solver.scenes import SCENES
+from solver.scenes.wheel_rail_contact import _contact_of
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 from studies import Limits, Store, Study, run_study
 from studies.definition.cases import LoadingPath
@@ -140,3 +141,13 @@ def test_a_rail_is_set_up_for_its_geometry_alone() -> None:
     assert first == setup(WheelRailParameters(traction=-0.5, friction=0.3, yield_stress=400.0))
     assert first != setup(WheelRailParameters(cant=0.0))
     assert first != setup(WheelRailParameters(lateral_position=1.0))
+
+
+def test_the_contact_of_a_rail_is_searched_once_for_all_drives_and_materials() -> None:
+    """A search takes a tenth of a second; a study asks for the set-up of each path."""
+    setup: Any = SCENES["wheel_rail"].setup
+    searched = _contact_of.cache_info().misses
+    for traction in (0.1, 0.2, 0.3):
+        for yield_stress in (400.0, 500.0):
+            setup(WheelRailParameters(load=87e3, traction=traction, yield_stress=yield_stress))
+    assert _contact_of.cache_info().misses == searched + 1
