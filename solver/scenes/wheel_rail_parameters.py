@@ -43,7 +43,7 @@ class WheelRailParameters(PrismParameters):
     """Parameters of a wheel on a rail (N, mm, MPa)."""
 
     yield_stress: Stress = described(502.0, "uniaxial yield stress Re of the rail")
-    sequence: tuple[Mapping[str, float | str], ...] = described(
+    sequence: tuple[Mapping[str, float | str | Points], ...] = described(
         (),
         "list of different passes, repeated; each is a table of what differs from the run: "
         f"{', '.join(_OF_A_PASS)}, and `times`",
@@ -182,6 +182,8 @@ class WheelRailParameters(PrismParameters):
         unused = {name: "wheel_profile" for word, name in own.items() if word not in profiles}
         if not self.scattered:
             unused["seed"] = "load_spread"
+        if not self.temperature_change:
+            unused["expansion"] = "temperature_change"
         return {**PrismParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
 
     @property
