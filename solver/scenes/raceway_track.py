@@ -126,6 +126,7 @@ class RolledRaceway:
 
     def __init__(self, parameters: RacewayParameters) -> None:
         self.parameters = parameters
+        self._made: tuple[PrismTrack, PatchLoad] | None = None
 
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
@@ -139,6 +140,12 @@ class RolledRaceway:
         LimitLoad
             if a prescribed shear is above the shear strength of the material
         """
+        del number
+        if self._made is None or self._made[0] is not track:
+            self._made = track, self._load(track)
+        return self._made[1]
+
+    def _load(self, track: PrismTrack) -> PatchLoad:
         p, ellipse = self.parameters, self.parameters.ellipse
         if p.load == "hertz":
             shear = p.traction * p.friction

@@ -13,7 +13,7 @@ _MOST_TIMES = 1000
 
 
 def block_of(
-    parameters: Any, sequence: Sequence[Mapping[str, float | str]], names: Sequence[str]
+    parameters: Any, sequence: Sequence[Mapping[str, Any]], names: Sequence[str]
 ) -> tuple[Any, ...]:
     """Return the parameters of each pass of a sequence; passes of one entry share an object.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from solver.prism.profiled_wheel import ProfiledWheel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.materials import Elasticity
     from solver.mesh.rail import RailSection
     from solver.mesh.wheel_profile import WheelProfile
     from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
@@ -40,6 +41,29 @@ _STEEPEST = math.radians(88.0)
 """Steepest slope of the surface that the wheel may touch [rad]."""
 _HALVINGS = 6
 """Bisections by which the rail's way aside is found, which decides only the size of the zone."""
+
+
+class _Touching(NamedTuple):
+    """What decides where a wheel touches: parameters, and what follows from them."""
+
+    load: float
+    lateral_position: float
+    yaw: float
+    wheel_profile: str | Points
+    wheel_slope: float
+    crown_radius: float
+    wheel_radius: float
+    wheel_elasticity: Elasticity
+    contact_modulus: float
+    rail_profile: str | Points
+    cant: float
+    foundation: float
+    youngs_modulus: float
+
+    @classmethod
+    def of(cls, parameters: WheelRailParameters) -> _Touching:
+        """Return those of a pass."""
+        return cls(*(getattr(parameters, name) for name in cls._fields))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +100,7 @@ def expected_contact(parameters: WheelRailParameters) -> ExpectedContact:
         for ``lateral_position``, if a wheel does not meet the running surface within its ends, or
         if its flange is inside the rail
     """
-    each = list(dict.fromkeys(_contact_of(own) for own in parameters.outermost))
+    each = list(dict.fromkeys(_contact_of(_Touching.of(own)) for own in parameters.outermost))
     if len(each) == 1:
         return each[0]
     (right, left), near = _around([own.ends for own in each]), _around([own.near for own in each])
@@ -100,8 +124,8 @@ def _around(each: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=4096)
-def _contact_of(parameters: WheelRailParameters) -> ExpectedContact:
-    """Return where the wheel of one pass will touch the rail.
+def _contact_of(touching: _Touching) -> ExpectedContact:
+    """Return where the wheel of one pass will touch the rail; it takes a tenth of a second.
 
     Raises
     ------
@@ -109,7 +133,7 @@ def _contact_of(parameters: WheelRailParameters) -> ExpectedContact:
         for ``lateral_position``, if the wheel does not meet the running surface within its ends, or
         if its flange is inside the rail
     """
-    p, section = parameters, rail_of(parameters)
+    p, section = touching, rail_of(touching)
     here = _Gap(p, section)
     here.check(p.lateral_position)
     inside, near = here.within(1.0), here.within(_NEAR)
@@ -143,7 +167,7 @@ class _Gap:
     level : this gap at the edge of contact [mm]
     """
 
-    def __init__(self, p: WheelRailParameters, section: RailSection, aside: float = 0.0) -> None:
+    def __init__(self, p: _Touching, section: RailSection, aside: float = 0.0) -> None:
         outline, wheel = section.outline, wheel_of(p, aside)
         right, left = upper(section)
         self.s = np.arange(left, right, -_STEP)
@@ -160,7 +184,7 @@ class _Gap:
         self.gap = normal / np.cos(self.angle)
         self.level = self._edge(p)
 
-    def _edge(self, p: WheelRailParameters) -> float:
+    def _edge(self, p: _Touching) -> float:
         """Return the gap at the edge of contact: it grows with it, its area's approach falls."""
         level, square = np.sort(self.gap)[1:], np.cos(self.angle) ** 2
         first, last = 0, len(level) - 1
@@ -204,7 +228,7 @@ class _Gap:
             raise ModelError("lateral_position", lateral_position, allowed)
 
 
-def _aside(p: WheelRailParameters, section: RailSection, here: _Gap) -> tuple[float, float]:
+def _aside(p: _Touching, section: RailSection, here: _Gap) -> tuple[float, float]:
     """Return the right and left end of the contact when the rail has moved aside [mm].
 
     The rail is a beam on its foundation under the lateral force that the slope of the contact
@@ -225,7 +249,7 @@ def _aside(p: WheelRailParameters, section: RailSection, here: _Gap) -> tuple[fl
     return float(found.s[inside[-1]]), float(found.s[inside[0]])
 
 
-def wheel_of(parameters: WheelRailParameters, aside: float = 0.0) -> ProfiledWheel:
+def wheel_of(parameters: WheelRailParameters | _Touching, aside: float = 0.0) -> ProfiledWheel:
     """Return the wheel at its lateral position over a rail that has moved along z by ``aside``."""
     p, profile = parameters, wheel_profile(parameters)
     at = p.lateral_position - aside
@@ -238,7 +262,7 @@ def wheel_of(parameters: WheelRailParameters, aside: float = 0.0) -> ProfiledWhe
     )
 
 
-def wheel_profile(parameters: WheelRailParameters) -> WheelProfile:
+def wheel_profile(parameters: WheelRailParameters | _Touching) -> WheelProfile:
     """Return the profile of the wheel, its running circle at z = 0."""
     p = parameters
     if not isinstance(p.wheel_profile, str):
@@ -248,7 +272,7 @@ def wheel_profile(parameters: WheelRailParameters) -> WheelProfile:
     return conical(p.wheel_slope) if p.wheel_profile == "conical" else crowned(p.crown_radius)
 
 
-def rail_of(parameters: WheelRailParameters) -> RailSection:
+def rail_of(parameters: WheelRailParameters | _Touching) -> RailSection:
     """Return the section of the rail."""
     return canted(parameters.rail_profile, parameters.cant)
 

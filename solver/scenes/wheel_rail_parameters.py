@@ -27,7 +27,8 @@ _CLOSEST = 1.0
 Points = tuple[tuple[float, float], ...]
 """Points z, y of a profile, z increasing [mm]."""
 _OF_A_PASS = (
-    "load", "lateral_position", "traction", "friction", "lateral_creepage", "yaw", "spin",
+    "load", "lateral_position", "friction", "traction", "control", "given_creepage",
+    "lateral_creepage", "lateral_control", "given_lateral_force", "yaw", "spin",
     "wheel_profile", "wheel_slope", "crown_radius", "wheel_radius",
 )  # fmt: skip
 """Parameters that may differ from pass to pass."""
@@ -43,25 +44,6 @@ class WheelRailParameters(PrismParameters):
     """Parameters of a wheel on a rail (N, mm, MPa)."""
 
     yield_stress: Stress = described(502.0, "uniaxial yield stress Re of the rail")
-    sequence: tuple[Mapping[str, float | str], ...] = described(
-        (),
-        "list of different passes, repeated; each is a table of what differs from the run: "
-        f"{', '.join(_OF_A_PASS)}, and `times`",
-    )
-    load_spread: Annotated[float, Interval(ge=0.0, le=0.33), Unit("1")] = described(
-        0.0,
-        "standard deviation of the loads of random passes over their mean, `load`; cut off at "
-        f"{CUT:g} of them, as all spreads",
-    )
-    lateral_spread: Annotated[float, Interval(ge=0.0, le=10.0), Unit("mm")] = described(
-        0.0, "standard deviation of the lateral positions of random passes"
-    )
-    traction_spread: Annotated[float, Interval(ge=0.0, le=0.33), Unit("1")] = described(
-        0.0, "standard deviation of the tractions of random passes"
-    )
-    seed: Annotated[int, Interval(ge=0, le=2**32 - 1)] = described(
-        0, "seed of random passes: another one draws other passes"
-    )
     load: Annotated[float, Interval(gt=0.0, le=1e6), Unit("N")] = described(
         150e3, "vertical force on the wheel"
     )
@@ -123,6 +105,25 @@ class WheelRailParameters(PrismParameters):
     expansion: Annotated[float, Interval(ge=0.0, le=1e-3), Unit("1/K")] = described(
         1.15e-5, "coefficient of linear thermal expansion of the rail"
     )
+    sequence: tuple[Mapping[str, float | str | Points], ...] = described(
+        (),
+        "list of different passes, repeated; each is a table of what differs from the run: "
+        f"{', '.join(_OF_A_PASS)}, and `times`",
+    )
+    load_spread: Annotated[float, Interval(ge=0.0, le=0.33), Unit("1")] = described(
+        0.0,
+        "standard deviation of the loads of random passes over `load`; passes beyond "
+        f"{CUT:g} standard deviations of load, position or traction are not drawn",
+    )
+    lateral_spread: Annotated[float, Interval(ge=0.0, le=10.0), Unit("mm")] = described(
+        0.0, "standard deviation of the lateral positions of random passes"
+    )
+    traction_spread: Annotated[float, Interval(ge=0.0, le=0.33), Unit("1")] = described(
+        0.0, "standard deviation of the tractions of random passes"
+    )
+    seed: Annotated[int, Interval(ge=0, le=2**32 - 1)] = described(
+        0, "seed of random passes: another one draws other passes"
+    )
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
@@ -182,6 +183,8 @@ class WheelRailParameters(PrismParameters):
         unused = {name: "wheel_profile" for word, name in own.items() if word not in profiles}
         if not self.scattered:
             unused["seed"] = "load_spread"
+        if not self.temperature_change:
+            unused["expansion"] = "temperature_change"
         return {**PrismParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
 
     @property

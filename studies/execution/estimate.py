@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.errors import ModelError
+from solver.scenes import Effort, Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
@@ -42,7 +44,8 @@ class Estimate:
     unknowns : largest number of displacement unknowns of a run
     increments : number of increments of all paths, if none is cut
     longest : largest number of increments of one path, if all are halved as often as permitted
-    cpu_seconds : processor time, low, likely and high: 16 %, 50 % and 84 % quantiles of past runs
+    cpu_seconds : processor time, low, likely and high: 16 %, 50 % and 84 % quantiles of past runs;
+        half, once and twice what the scene tells, if it tells seconds
     bytes : size on the disk, with the data set
     basis : on which data the estimate is based, as text
 
@@ -136,8 +139,8 @@ def estimate(study: Study, store: Store) -> Estimate:
         to_compute += len(missing)
         paths += 1
         set_up = _PER_SETUP
-        if scene.effort is not None:
-            effort = scene.effort(path.parameters, missing)
+        effort = _effort(scene, path, missing)
+        if effort is not None:
             set_up += effort.set_up
             unknowns = max(unknowns, effort.unknowns)
             increments += effort.increments
@@ -166,6 +169,19 @@ def estimate(study: Study, store: Store) -> Estimate:
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
     )
+
+
+def _effort(scene: Scene, path: LoadingPath, missing: Sequence[Any]) -> Effort | None:
+    """Return the work of a path.
+
+    None if the scene does not tell it, or refuses the parameters: then the runs end at once.
+    """
+    if scene.effort is None:
+        return None
+    try:
+        return scene.effort(path.parameters, missing)
+    except ModelError:
+        return None
 
 
 def _shared(each: list[list[float]]) -> float:

@@ -62,10 +62,11 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """End of a task, with its error if it failed."""
+    """End of a task, with its error if it failed, and the loading path at fault if it is known."""
 
     task: Any
     error: Exception | None = None
+    path: str = ""
 
 
 class Grid:
@@ -235,7 +236,7 @@ class _HandedOut:
             if passed := ticket.overdue(self._limits):
                 _drop(self._tickets.pop(key))
                 self._replace(ticket.worker)
-                yield Finished(ticket.task, RuntimeError(passed))
+                yield Finished(ticket.task, RuntimeError(passed), ticket.path)
         yield from self._watch.look(at_workers, self._tickets, held_up)
 
     def _processing(self) -> dict[str, Any] | None:

@@ -236,8 +236,8 @@ class _Work:
                         self._hear(content)
                     case Finished(_, StoreFull() | StudyError() as error):
                         unwritable.append(error)
-                    case Finished(task, error):
-                        self._close(task, error)
+                    case Finished(task, error, path):
+                        self._close(task, error, path)
         for error in unwritable:  # with the directory as the user gave it, not the worker's path
             directory = str(self.store.directory)
             if isinstance(error, StoreFull):
@@ -286,23 +286,27 @@ class _Work:
     def _tell(self, kind: str, **content: Any) -> None:
         self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
 
-    def _close(self, task: PathTask, error: Exception | None) -> None:
+    def _close(self, task: PathTask, error: Exception | None, at_fault: str = "") -> None:
         """Record the runs of a task without a report.
 
         If it failed, this is the fault of its first path that is not complete: its other runs are
-        recorded as ``error``, and the paths behind it make a new task.
+        recorded as ``error``, and the paths behind it make a new task. If another path is at fault,
+        that one was completed meanwhile, and no run is recorded as ``error``.
         """
         stored = task.stored(self.store)
-        for number, path in enumerate(task.paths, 1):
-            self._walked += self._walking.pop(path.id)[0]
+        for number, path in enumerate(task.paths):
             lacking = [case for case in path.cases if case.id not in self.computed]
             self._keep(path.id, [stored[case.id] for case in lacking if case.id in stored])
             failed = [case for case in lacking if case.id not in stored]
             if failed and error is not None:
-                self._keep(path.id, [self.store.write_run(case, str(error)) for case in failed])
-                if rest := task.paths[number:]:
+                blamed = at_fault in ("", path.id)
+                if blamed:
+                    self._walked += self._walking.pop(path.id)[0]
+                    self._keep(path.id, [self.store.write_run(case, str(error)) for case in failed])
+                if rest := task.paths[number + blamed :]:
                     self._left.append(replace(task, paths=rest))
                 return
+            self._walked += self._walking.pop(path.id)[0]
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""

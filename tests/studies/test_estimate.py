@@ -13,7 +13,7 @@ import pytest
 from residua.cli import main
 from residua.cost import long_run
 from studies import Store, Study, StudyError
-from studies.execution.estimate import Bounds, estimate
+from studies.execution.estimate import Bounds, Estimate, estimate
 from tests.studies.conftest import fake_study
 from tests.studies.test_study import many
 
@@ -121,6 +121,20 @@ def test_a_scene_that_does_not_tell_its_work_is_told_by_its_runs(store: Store) -
     assert found.bytes > 0
     assert found.basis == "fake does not estimate the work of its paths"
     Bounds(unknowns=1, increments=1, cpu_seconds=1.0).check(found)
+
+
+def test_runs_that_the_scene_refuses_cost_no_work_and_hide_no_others(store: Store) -> None:
+    """At 10 mm the flange of the wheel would be inside the rail."""
+
+    def of(*places: float) -> Estimate:
+        content = {"name": "aside", "scene": "wheel_rail", "parameters": {"accuracy": "draft"}}
+        axis = {"lateral_position": list(places)}
+        return estimate(Study.from_dict(content | {"sweep": axis}), store)
+
+    one, both = of(-4.0), of(-4.0, 10.0)
+    assert (both.to_compute, both.increments) == (2, one.increments)
+    assert one.cpu_seconds is not None and both.cpu_seconds is not None
+    assert one.cpu_seconds[1] < both.cpu_seconds[1] < one.cpu_seconds[1] + 2.0
 
 
 def test_kept_fields_count_on_the_disk(store: Store) -> None:

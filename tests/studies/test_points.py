@@ -52,6 +52,20 @@ def test_a_file_of_points_may_be_swept(tmp_path: Path) -> None:
     assert worn.parameters.wheel_profile == tuple(map(tuple, POINTS))
 
 
+def test_a_wheel_of_a_sequence_may_have_a_file_of_points(tmp_path: Path) -> None:
+    text = (
+        'name = "worn"\nscene = "wheel_rail"\n[[parameters.sequence]]\nload = 9e4\n'
+        '[[parameters.sequence]]\nwheel_profile = "wheel.csv"\n'
+    )
+    from_file = Study.from_toml(written(tmp_path, text))
+    given = [{"load": 9e4}, {"wheel_profile": POINTS}]
+    content = {"name": "worn", "scene": "wheel_rail", "parameters": {"sequence": given}}
+    assert from_file.id == Study.from_dict(content).id
+    (case,) = from_file.expansion.cases()
+    new, worn = case.parameters.block
+    assert (new.wheel_profile, worn.wheel_profile) == ("s1002", tuple(map(tuple, POINTS)))
+
+
 def test_a_file_that_cannot_be_read_is_named_with_its_place(tmp_path: Path) -> None:
     path = written(tmp_path, fixed('"other.csv"'))
     with pytest.raises(StudyError, match=r"parameters\.wheel_profile = 'other\.csv': file must be"):

@@ -87,6 +87,12 @@ def test_an_axis_of_seeds_needs_a_spread() -> None:
     study({"seed": [1, 2]}, load_spread=0.1)
 
 
+def test_an_axis_of_expansions_needs_a_change_of_temperature() -> None:
+    with pytest.raises(StudyError, match=r"sweep\.expansion = .*choose another temperature_change"):
+        study({"expansion": [1e-5, 1.2e-5]})
+    study({"expansion": [1e-5, 1.2e-5]}, temperature_change=-20.0)
+
+
 def test_the_schema_has_tables() -> None:
     own = scene_schema("wheel_rail")["properties"]["sequence"]
     assert own["type"] == "array" and own["items"]["type"] == "object"

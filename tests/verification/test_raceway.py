@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from math import sqrt
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from solver.results.shakedown import QUIET, ShakedownState
 from solver.scenes import SCENES
 from solver.scenes.hertz_ellipse import HertzEllipse
 from solver.scenes.raceway_parameters import RacewayParameters
-from solver.scenes.raceway_track import geometry, track_of
+from solver.scenes.raceway_track import RolledRaceway, geometry, track_of
 from solver.steady.passing import passing
 from tests.verification import closed_forms
 
@@ -120,6 +120,15 @@ def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
     strain = float(found.after.accumulated.max())
     assert record.scalars["max_plastic_strain"] == strain > 0.005
     assert record.scalars["longitudinal_force"] == pytest.approx(0.1 * hertz.force, rel=1e-9)
+
+
+@pytest.mark.parametrize("load", ["hertz", "contact"])
+def test_all_passes_have_one_load_so_that_each_begins_with_the_strain_of_the_last(
+    load: Literal["hertz", "contact"],
+) -> None:
+    raceway = RolledRaceway(SCENE.parameters(accuracy="draft", load=load))
+    track = raceway.track(1.0)
+    assert raceway.load(track, 0) is raceway.load(track, 1)
 
 
 def test_a_locked_ball_slips_everywhere_and_drags_the_raceway() -> None:

@@ -114,6 +114,15 @@ def test_wheels_share_the_influences_of_the_rail() -> None:
         first.with_wheel(soft)
 
 
+def test_wheels_in_turn_may_push_with_different_lateral_forces() -> None:
+    pushed = [{"lateral_control": "force", "given_lateral_force": force} for force in (0.0, 5e3)]
+    rail = RolledRail(WheelRailParameters(**USUAL, passes=2, sequence=tuple(pushed)))
+    track = rail.track(1.0)
+    u = np.zeros((track.grid.stations, len(track.grid.z), 3))
+    found = [rail.load(track, number).solve(u).force[2] for number in (0, 1)]
+    np.testing.assert_allclose(found, [0.0, 5e3], atol=1.0)
+
+
 @pytest.mark.parametrize(
     ("sequence", "told"),
     [
