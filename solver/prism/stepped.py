@@ -32,7 +32,7 @@ from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.prism.friction_cone import OPEN
 from solver.prism.patch_contact import PatchContact
 from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
-from solver.steady.passing import deviation, searched
+from solver.steady.passing import TOLERANCE, deviation, searched
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -46,8 +46,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-4
-"""Largest deviatoric strain of the residual, times 2 G / yield stress, after an increment."""
 _FORCING, _KRYLOV = 0.1, 60
 """Relative residual to which GMRES solves Newton's equation, and its most iterations."""
 _STEPS = 30
@@ -224,7 +222,7 @@ class SteppedPrism:
 
         here = at(guess, start)
         for _ in range(_STEPS):
-            if deviation(here.residual) * self._double_shear < _TOLERANCE * self._law.yield_stress:
+            if deviation(here.residual) * self._double_shear < TOLERANCE * self._law.yield_stress:
                 state = SteppedState(here.flow.state, here.strain)
                 return SteppedIncrement(state, here.contact, here.displacement)
             change = self._newton(here, behind)

@@ -133,7 +133,7 @@ def passing(
     material : its law
     load : load that passes along +x
     before : state by depth before the pass
-    guess : strains (n_rows, n_columns, 4) to start from, for instance of a similar pass
+    guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
     parts : number of increments between two points of a row, `usual_parts` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
 
@@ -282,7 +282,7 @@ def _diverged(material: Law, most_added: float) -> NotConverged:
 
 
 def deviation(strain: Array) -> float:
-    """Return the largest norm of the deviators of strains (..., 4)."""
+    """Return the largest norm of the deviators of Mandel strains (..., n_components)."""
     mean = strain[..., :3].mean(axis=-1)
     square = (strain**2).sum(axis=-1) - 3 * mean**2
     return float(np.sqrt(np.maximum(square.max(), 0.0)))
