@@ -143,9 +143,9 @@ class SteppedPrism:
 
     @property
     def virgin(self) -> SteppedState:
-        """The state before any load."""
+        """The state before any load; see `PrismTrack.virgin`."""
         points, stations, _ = self._shape
-        strain = np.broadcast_to(self._initial, self._shape)
+        strain = np.broadcast_to(self._track.virgin(self._law).strain[:, None], self._shape)
         return SteppedState(self._law.initial(points * stations, 6), strain)
 
     @property
