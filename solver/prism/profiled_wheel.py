@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _FAR = 10.0
-"""Largest gap that is told apart [mm]; no contact is so soft that a larger one closes."""
+"""Larger gaps are cut off here [mm]; no contact is so soft that one of them closes."""
 _STEPS, _CLOSE = 40, 1e-13
-"""Newton steps along a normal, and the last one of them over the radius."""
+"""Most Newton steps along a normal, and the length of the last one over the radius."""
 _STEEP = 4.0
 """Largest slope of a profile beside which the lowest line of a yawed wheel is sought."""
 _SAMPLES, _FINE = 33, 1e-3

@@ -11,7 +11,8 @@ S and U give strain and displacement of the surface by an eigenstress, E the str
 where the load is now, t the tractions on a surface with such displacements. What an endless or
 clamped prism adds moves with the load. ep(e) is the plastic strain at the end of the straight way
 from the strain after the last increment to e, in as many parts as a steady pass takes from station
-to station. One part errs by the curvature of the way of stress: it leaves less plastic strain.
+to station. With one part the return does not see that the way of stress is curved, and leaves less
+plastic strain.
 Newton's equation
 
     d = Phi(e) - e + (S + E t' U) 2G ep' d
@@ -127,8 +128,8 @@ class SteppedPrism:
 
     Parameters
     ----------
-    track : the prism; stations are numbered as its own are, round the length. The load of a clamped
-        one is in the middle of the span wherever it is
+    track : the prism; stations are numbered as its own are, round the length. Ends of a clamped one
+        move with the load, which stays in the middle of the span
     law : law of the material
     parts : number of parts of the way of strain in an increment, `usual_parts` if None
     """

@@ -242,21 +242,22 @@ class _At(Generic[S]):
     size: float
 
 
-def searched(at: Callable[[float], Sized], size: float) -> Sized:
+def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORTEST) -> Sized:
     """Return the iterate after a step, or after the largest share of it that lowers the residual.
 
-    The residual has kinks where points begin to yield. If no share lowers it, the whole step is
-    taken to leave the kink, unless the residual grows by more than `_AWAY`.
+    The residual has kinks where points begin to yield, open, close or slip. If no share lowers it,
+    the whole step is taken to leave the kink, unless the residual grows by more than `_AWAY`.
 
     Parameters
     ----------
     at : (share of the step) -> iterate with ``size``, the norm of its residual; it may raise
         `NotConverged`
     size : norm of the residual before the step
+    shortest : smallest share that is tried
     """
     tried = []
     share = 1.0
-    while share >= _SHORTEST:
+    while share >= shortest:
         try:
             there = at(share)
         except NotConverged as error:  # no contact was found for this shape of the surface
