@@ -10,10 +10,9 @@ The spread has the transform ``exp(-t) (1 + t + t^2 / 2)``, t = (k width)^2 / 2:
 of the sixth order in k.
 
 A prism *clamped* at both ends of a span has more: forces and moments on its section beyond the
-ends, with which the section does not move at the ends, in the mean. What loads beyond an end do
-within the span is what the end itself does: both are the same waves that fade away from it. Theory
-of beams is not needed; bending in both planes, torsion, shear and foundation are those of the
-section.
+ends, with which the section does not move at the ends, in the mean. Within the span the field of an
+end is that of loads beyond it: both are made of the waves that fade away from the end. Bending in
+both planes, torsion, shear and foundation are those of the section, not of a theory of beams.
 """
 
 from __future__ import annotations
@@ -209,8 +208,8 @@ def _level_of(length: float, levels: int, span: float) -> tuple[int, float]:
 def _shares(length: float, levels: int, first: int | None = None) -> dict[int, float]:
     """Return the shares of waves in what all levels add, by their numbers on the longest length.
 
-    They add to the load repeated every ``length``; with ``first`` they are all that a load makes
-    far from it, in terms of the levels from the first one on.
+    They are what the levels add to the load repeated every ``length``. With ``first`` they are all
+    that a single load makes far from it, by the levels from that one on.
     """
     shares: dict[int, float] = {}
     for level in range(first or 1, levels + 1):

@@ -25,6 +25,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from solver.errors import NoContact
+from solver.steady.passing import searched
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,8 +45,6 @@ _STEPS = 40
 _SHORTEST = 1 / 256
 """Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
 found by its moment may overshoot a hundredfold."""
-_AWAY = 3.0
-"""Largest growth of the error that a whole step may cause where no share lowers it."""
 _LOST = 1e6
 """Ratio of the largest |q - d w| to the first resultant on one point, a pressure that no contact
 reaches; above it motions grow without bound."""
@@ -116,26 +115,17 @@ def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolutio
         if here.error <= _TOLERANCE * here.values[..., NORMAL].max():
             return ConeSolution(here, tangent, step)
         tangent = _Tangent(here)
-        here = _searched(here, *tangent.step())
+
+        def moved(
+            share: float, here: _Iterate = here, step: tuple[Array, Array] = tangent.step()
+        ) -> _Iterate:
+            change, motion = step
+            return _Iterate(problem, here.values + share * change, here.rigid + share * motion)
+
+        here = searched(moved, here.size, _SHORTEST)
         if not here.pull.max() < most:
             break
     raise NoContact(f"no contact forces were found in {step + 1} steps of Newton's method")
-
-
-def _searched(here: _Iterate, change: Array, rigid: Array) -> _Iterate:
-    """Return the iterate after a step, or after the largest share of it that lowers the error.
-
-    The error has kinks where points open, close, begin to slip. If no share lowers it, the whole
-    step is taken to leave the kink, unless the error grows by more than `_AWAY`.
-    """
-    tried, share = [], 1.0
-    while share >= _SHORTEST:
-        there = _Iterate(here.problem, here.values + share * change, here.rigid + share * rigid)
-        if there.size < (1 - 1e-4 * share) * here.size:
-            return there
-        tried.append(there)
-        share /= 2
-    return tried[0] if tried[0].size < _AWAY * here.size else min(tried, key=lambda a: a.size)
 
 
 class _Iterate:

@@ -24,11 +24,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _FAR = 10.0
-"""Largest gap that is told apart [mm]; no contact is so soft that a larger one closes."""
+"""Larger gaps are cut off here [mm]; no contact is so soft that one of them closes."""
 _STEPS, _CLOSE = 40, 1e-13
-"""Newton steps along a normal, and the last one of them over the radius."""
-_TURNS = 8
-"""Iterations for the lowest line of a yawed wheel; each is better by about the yaw."""
+"""Most Newton steps along a normal, and the length of the last one over the radius."""
+_STEEP = 4.0
+"""Largest slope of a profile beside which the lowest line of a yawed wheel is sought."""
+_SAMPLES, _FINE = 33, 1e-3
+"""Samples of a line along x for its lowest place, and their smallest distance [mm]."""
 _LONGEST, _LEAST = 1.0, 0.1
 """Longest Newton step [mm], and smallest rate at which a gap is taken to close along a normal."""
 _ASIDE = 1e-4
@@ -69,15 +71,17 @@ class ProfiledWheel:
         There a surface along x touches the wheel first: ahead of the axle, or behind it, on the
         slopes of a yawed wheel.
         """
-        sin, cos = np.sin(self.yaw), np.cos(self.yaw)
         x = np.zeros_like(z)
-        if not sin:
-            return x
-        for _ in range(_TURNS):
-            at = self._axial(x, z)
-            slope = (self.profile(at + _ASIDE) - self.profile(at - _ASIDE)) / (2 * _ASIDE)
-            across = (self.radius - self.profile(at)) * slope * sin / cos
-            x = np.where(np.isfinite(across), (sin * (z - self.middle) - across) / cos, 0.0)
+        far = np.abs(z - self.middle).max(initial=0.0) + _STEEP * self.radius
+        half = min(abs(np.tan(self.yaw)) * far, self.radius / 2)
+        while half > _FINE:
+            beside = np.linspace(-half, half, _SAMPLES).reshape(-1, *[1] * z.ndim)
+            # of equal heights, as where there is no wheel, the middle one
+            order = np.argsort(np.abs(beside.ravel()), kind="stable")
+            places = (x + beside)[order]
+            lowest = self.surface(places, z).argmin(axis=0)
+            x = np.take_along_axis(places, lowest[None], axis=0)[0]
+            half *= 2 / (_SAMPLES - 1)
         return x
 
     def surface(self, x: Array, z: Array) -> Array:

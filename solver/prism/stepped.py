@@ -11,7 +11,8 @@ S and U give strain and displacement of the surface by an eigenstress, E the str
 where the load is now, t the tractions on a surface with such displacements. What an endless or
 clamped prism adds moves with the load. ep(e) is the plastic strain at the end of the straight way
 from the strain after the last increment to e, in as many parts as a steady pass takes from station
-to station. One part errs by the curvature of the way of stress: it leaves less plastic strain.
+to station. With one part the return does not see that the way of stress is curved, and leaves less
+plastic strain.
 Newton's equation
 
     d = Phi(e) - e + (S + E t' U) 2G ep' d
@@ -32,7 +33,7 @@ from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.prism.friction_cone import OPEN
 from solver.prism.patch_contact import PatchContact
 from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
-from solver.steady.passing import deviation, searched
+from solver.steady.passing import TOLERANCE, deviation, searched
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -46,8 +47,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-4
-"""Largest deviatoric strain of the residual, times 2 G / yield stress, after an increment."""
 _FORCING, _KRYLOV = 0.1, 60
 """Relative residual to which GMRES solves Newton's equation, and its most iterations."""
 _STEPS = 30
@@ -153,8 +152,8 @@ class SteppedPrism:
 
     Parameters
     ----------
-    track : the prism; stations are numbered as its own are, round the length. The load of a clamped
-        one is in the middle of the span wherever it is
+    track : the prism; stations are numbered as its own are, round the length. Ends of a clamped one
+        move with the load, which stays in the middle of the span
     law : law of the material
     parts : number of parts of the way of strain in an increment, `usual_parts` if None
     """
@@ -169,9 +168,9 @@ class SteppedPrism:
 
     @property
     def virgin(self) -> SteppedState:
-        """The state before any load."""
+        """The state before any load; see `PrismTrack.virgin`."""
         points, stations, _ = self._shape
-        strain = np.broadcast_to(self._initial, self._shape)
+        strain = np.broadcast_to(self._track.virgin(self._law).strain[:, None], self._shape)
         return SteppedState(self._law.initial(points * stations, 6), strain)
 
     @property
@@ -250,7 +249,7 @@ class SteppedPrism:
 
         here = at(guess, start)
         for _ in range(_STEPS):
-            if deviation(here.residual) * self._double_shear < _TOLERANCE * self._law.yield_stress:
+            if deviation(here.residual) * self._double_shear < TOLERANCE * self._law.yield_stress:
                 state = SteppedState(here.flow.state, here.strain)
                 return SteppedIncrement(state, here.contact, here.displacement)
             change = self._newton(here, behind)

@@ -32,7 +32,7 @@ class SettledStress:
 
     Attributes
     ----------
-    given, held : (n, 6) what it was made of, as `StraightPrism.settled` takes it, Mandel [MPa]
+    given, held : (n, 6) arguments of `StraightPrism.settled` that led to it, Mandel [MPa]
     stress : (n, 6) stress, Mandel [MPa]
     strain : (n, 6) elastic strain of it, Mandel
     change : largest component of the difference of the given stress from what equilibrium leaves of

@@ -117,8 +117,8 @@ class PrismTrack:
     def stressed(self, given: Array, held: Array) -> PrismTrack:
         """Return the same prism, its set-up shared, with an initial stress.
 
-        The section is that with its initial stress: it has no displacement from it. For arguments
-        see `StraightPrism.settled`.
+        Displacements count from the section with this stress. For arguments see
+        `StraightPrism.settled`.
         """
         _ = self.compliance  # computed once for both
         other = copy(self)

@@ -20,19 +20,17 @@ if TYPE_CHECKING:
 NO_NODE = -1
 """Fills the rows of faces and cells with fewer nodes than others."""
 
-_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+_QUAD8 = (0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)
+_ENDS = (0, 1, 2, 3, 8, 9, 10, 11), (4, 5, 6, 7, 12, 13, 14, 15)
+"""Nodes of two opposite faces of a hexahedron, as of a quadrilateral; four are between them."""
+_FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {
     3: ((0, 1, 2),),
     4: ((0, 1, 2, 3),),
     6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
-    8: ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
+    8: _QUAD8,
     9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+    20: (*(tuple(end[k] for k in face) for end in _ENDS for face in _QUAD8), (16, 17, 18, 19)),
 }
-_ENDS = (0, 1, 2, 3, 8, 9, 10, 11), (4, 5, 6, 7, 12, 13, 14, 15)
-"""Nodes of two opposite faces of a hexahedron, as of a quadrilateral; four are between them."""
-_FACES[20] = (
-    *(tuple(end[node] for node in face) for end in _ENDS for face in _FACES[8]),
-    (16, 17, 18, 19),
-)
 """Triangles and quadrilaterals that together use all nodes, by number of nodes of an element."""
 
 

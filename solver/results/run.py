@@ -34,7 +34,7 @@ class FinishedRun:
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
     source : source of the values with which the record is compared; None for states of a system
-    beside : returns fields at the nodes of more than the bodies of the system, at the same stages
+    beside : returns fields of further bodies at the same stages, for `mesh_fields`
     """
 
     parameters: Any

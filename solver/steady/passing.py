@@ -133,7 +133,7 @@ def passing(
     material : its law
     load : load that passes along +x
     before : state by depth before the pass
-    guess : strains (n_rows, n_columns, 4) to start from, for instance of a similar pass
+    guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
     parts : number of increments between two points of a row, `usual_parts` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
 
@@ -242,21 +242,22 @@ class _At(Generic[S]):
     size: float
 
 
-def searched(at: Callable[[float], Sized], size: float) -> Sized:
+def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORTEST) -> Sized:
     """Return the iterate after a step, or after the largest share of it that lowers the residual.
 
-    The residual has kinks where points begin to yield. If no share lowers it, the whole step is
-    taken to leave the kink, unless the residual grows by more than `_AWAY`.
+    The residual has kinks where points begin to yield, open, close or slip. If no share lowers it,
+    the whole step is taken to leave the kink, unless the residual grows by more than `_AWAY`.
 
     Parameters
     ----------
     at : (share of the step) -> iterate with ``size``, the norm of its residual; it may raise
         `NotConverged`
     size : norm of the residual before the step
+    shortest : smallest share that is tried
     """
     tried = []
     share = 1.0
-    while share >= _SHORTEST:
+    while share >= shortest:
         try:
             there = at(share)
         except NotConverged as error:  # no contact was found for this shape of the surface
@@ -282,7 +283,7 @@ def _diverged(material: Law, most_added: float) -> NotConverged:
 
 
 def deviation(strain: Array) -> float:
-    """Return the largest norm of the deviators of strains (..., 4)."""
+    """Return the largest norm of the deviators of Mandel strains (..., n_components)."""
     mean = strain[..., :3].mean(axis=-1)
     square = (strain**2).sum(axis=-1) - 3 * mean**2
     return float(np.sqrt(np.maximum(square.max(), 0.0)))

@@ -148,18 +148,6 @@ def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignor
     return accumulated + SQRT23 * grows
 
 
-@njit(cache=True, inline="always")
-def _elastic(strain, plastic, accumulated, law, each):  # type: ignore[no-untyped-def]
-    """Whether a strain is elastic with this plastic strain (n,)."""
-    double_shear, kappa, Hi, _, Re = law
-    mean = (strain[0] + strain[1] + strain[2]) / 3.0
-    square = 0.0
-    for k in range(len(each)):
-        trial = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
-        square += trial * trial
-    return math.sqrt(square) <= SQRT23 * (Re + Hi * accumulated)
-
-
 @njit(cache=True)
 def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-untyped-def]
     """Let material flow along rows.

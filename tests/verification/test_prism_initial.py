@@ -13,7 +13,7 @@ from solver.linear.threads import one_thread
 from solver.mesh import grid
 from solver.mesh.rail import rail_60e1
 from solver.mesh.zone import Zone, rail_mesh
-from solver.prism import PrismTrack, Section
+from solver.prism import PrismTrack, Section, SteppedPrism
 from solver.prism.straight import StraightPrism, straight_motions
 from solver.results.audit.prism import audit_prism
 from solver.scenes.initial_stress import NoStress, OverHeight, RollerStraightened, stressed
@@ -108,8 +108,10 @@ def test_an_initial_stress_that_is_not_in_equilibrium_breaks_the_audit() -> None
 def test_a_stress_beyond_yield_is_refused() -> None:
     track = block()
     stress = OverHeight(stress_over_height=((-10.0, -100.0), (0.0, 700.0)))
-    with pytest.raises(ModelError, match="must not yield: in equilibrium it is 106"):
-        stressed(track, stress, 0.0).virgin(PERFECT)
+    high = stressed(track, stress, 0.0)
+    for body in (high.virgin, lambda law: SteppedPrism(high, law).virgin):
+        with pytest.raises(ModelError, match="must not yield: in equilibrium it is 106"):
+            body(PERFECT)
 
 
 # -- a rail ---------------------------------------------------------------------------------------

@@ -60,7 +60,7 @@ def off(from_start: float) -> tuple[float, float]:
 
 
 def test_increments_leave_what_the_pass_leaves() -> None:
-    """Plastic strain of 0.0019, residual stress of -102 MPa, both in 0.3 % and 0.4 MPa."""
+    """Plastic strain of 0.0019, residual stress of -102 MPa, in 0.3 % and 0.6 MPa."""
     plastic, stress = off(40.0)
     assert both()[0].after.accumulated.max() > 0.0018
     assert plastic < 0.005

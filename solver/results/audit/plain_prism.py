@@ -3,8 +3,8 @@
 Amplitudes are complex, those of a real Fourier transform over the stations downstream, so that a
 derivative along x is a factor i k. The operators of `solver.prism` are not used: strain comes from
 the gradients of the elements, springs and the means under the hats from their edges. Its factors
-only give the displacements that are checked. What lies outside the zone is solved anew, with the
-whole section, for a few waves.
+only give the displacements that are checked, and what lies beyond the length is that of its far
+field. What lies outside the zone is solved anew, with the whole section, for a few waves.
 """
 
 from __future__ import annotations
