@@ -18,8 +18,8 @@ _FIRST, _FACTOR = 1.2, 4.3e-5
 _STILL, _POINT = 0.01, 1.5e-6
 """Seconds of a pass where nothing yields: at least, and per point and station of the window."""
 _YIELDS = 38.0
-"""Passes where nothing yields that take as long as all yielding of a wheel that rolls again and
-again: half of that in the first pass, a quarter in the second."""
+"""Work of all yielding under a wheel that rolls again and again, in passes where nothing yields.
+Half of it is in the first pass, a quarter in the second, and so on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ _LEAST = 4
 
 
 def whole(length: float, size: float) -> float:
-    """Return the least whole number of elements of a size that covers a length, 4 or more [mm]."""
+    """Return the length of the fewest elements that cover ``length``, at least 4 of them [mm]."""
     return size * max(_LEAST, math.ceil(round(length / size, 6)))
 
 

@@ -66,10 +66,11 @@ class Scene:
     trace : (samples, states of a lap) -> data stored for each lap in ``outcome.traces``
     watch : (parameters, samples, converged increment) -> data stored for it in ``outcome.history``
     refinement : (parameters) -> how increments are halved, or None for those of the program
-    effort : (parameters, values of ``branch``) -> work of the loading path, counted without a mesh
-        in microseconds; without it a study is estimated from its runs alone
+    effort : (parameters, values of ``branch``) -> work of the loading path, in microseconds or, if
+        it needs a mesh, once for each `setup`; without it a study is estimated from its runs alone
     setup : (parameters) -> what an expensive set-up depends on, which a process keeps for its next
-        run; a study gives runs with an equal one to the same worker. It must take milliseconds
+        run; a study gives runs with an equal one to the same worker. It must take milliseconds, as
+        it is asked for every path before the first is computed
     warnings : (run) -> texts for the user, added to the message of its record
     advice : status -> what the user can do
     quantities : quantities that only this scene declares

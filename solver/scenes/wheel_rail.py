@@ -48,16 +48,21 @@ SPIN_MOMENT = declare(
     "moment of the contact on the rail about the downward vertical through the running circle",
     "N mm",
 )
+WHEEL_SURFACE = declare(
+    "wheel_surface", "height of the undeformed wheel when it first touches the rail", "mm",
+    dims=("z",),
+)  # fmt: skip
+PASS_LOAD = declare("pass_load", "vertical force on the wheel of a pass", "N", dims=("pass",))
+PASS_LATERAL_POSITION = declare(
+    "pass_lateral_position", "position z of the running circle of a pass", "mm", dims=("pass",)
+)
+PASS_TRACTION = declare(
+    "pass_traction", "ratio of longitudinal force to that of full slip, of a pass", dims=("pass",)
+)
 _HALF_HEAD, _MAPPED, _ALONG = 36.0, 16.0, 20.0
 """Half the width of maps, their depth, and half their length along the rail [mm]."""
 _PIXEL = 0.5
 """Distance of positions of maps across and along [mm]; in depth it is half of that."""
-
-
-WHEEL_SURFACE = declare(
-    "wheel_surface", "height of the wheel's surface where it first touches the rail", "mm",
-    dims=("z",),
-)  # fmt: skip
 
 
 def method(parameters: WheelRailParameters) -> Method:
@@ -88,15 +93,6 @@ def view(parameters: WheelRailParameters) -> View:
         surfaces={"rail": "running"},
         axis=ACROSS_TRACK,
     )
-
-
-PASS_LOAD = declare("pass_load", "vertical force on the wheel of a pass", "N", dims=("pass",))
-PASS_LATERAL_POSITION = declare(
-    "pass_lateral_position", "position z of the running circle of a pass", "mm", dims=("pass",)
-)
-PASS_TRACTION = declare(
-    "pass_traction", "ratio of longitudinal force to that of full slip, of a pass", dims=("pass",)
-)
 
 
 def traffic(run: FinishedRun) -> Values:
