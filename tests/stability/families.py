@@ -25,6 +25,7 @@ from tests.stability.kinds import (
     offsets,
     overlap,
     point,
+    prism,
     punches,
     ratios,
     reopening,
@@ -90,6 +91,7 @@ FAMILIES: dict[str, Family] = {
     "static": Family(static.COUNT, 48, static.scenes),
     "endless": Family(endless.COUNT, 300, endless.scenes),
     "files": Family(files.COUNT, 200, files.scenes),
+    "prism": Family(prism.COUNT, 300, prism.scenes),
 }
 
 FOUND = ["endless-64", "endless-160", "endless-174"]
