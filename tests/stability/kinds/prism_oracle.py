@@ -46,7 +46,7 @@ LIMITS = {
     "initial": 0.02,  # the same against the given stress, where the foundation is soft
     "linear work": 1e-8,  # of residual stress over yield stress times area
     "yield loaded": 5e-4,  # a pass is found within 1.3e-4
-    "yield left": 1e-9,
+    "yield left": 1.3e-4,  # 2 G times what is left over of a deviator, 1e-4 of the yield stress
     "volume": 1e-10,
     "path": 1e-9,
     "grows": 0.0,  # whether plastic strain falls from pass to pass
@@ -281,9 +281,8 @@ def _law(rolled: Rolled) -> dict[str, float]:
         zone = np.isfinite(response.stress).all(axis=0)
         stress, ep = response.stress[:, zone], response.state.plastic_strain[:, zone]
         total = response.state.accumulated[zone]
-        size = max(1.0, p.youngs_modulus * float(np.abs(ep).max()) / p.yield_stress)
         beyond = float(beyond_yield(p, stress, ep, total).max()) / p.yield_stress
-        found[name] = max(0.0, beyond) / (size if name == "yield left" else 1.0)
+        found[name] = max(0.0, beyond)
         largest = max(float(np.abs(ep).max()), 1e-300)
         length = np.sqrt(2 / 3 * (ep**2).sum(axis=0))
         # Tresca's path is that of another work: up to 2/sqrt(3) times as long
