@@ -80,15 +80,17 @@ class PrismFlow(_Swept):
     ----------
     modes : the waves of the prism
     rim : numbers of the points at the edge of the zone, which must not yield
+    virgin : state before any load
     added : (n, window, 6) strain that the pass adds, Mandel
     """
 
     def __init__(
-        self, modes: Modes, rim: NDArray[np.int64], law: Law, before: PrismState, added: Array,
-        parts: int,
+        self, modes: Modes, rim: NDArray[np.int64], law: Law, virgin: PrismState,
+        before: PrismState, added: Array, parts: int,
     ) -> None:  # fmt: skip
         super().__init__(law, before, before, before.strain[:, None] + added, parts)
-        self._modes, self._rim, self._law, self._before = modes, rim, law, before
+        self._modes, self._rim, self._law = modes, rim, law
+        self._virgin, self._before = virgin, before
 
     @property
     def beyond(self) -> str:
@@ -102,11 +104,14 @@ class PrismFlow(_Swept):
         """Return the internal variables at the stations, and the state far behind the load.
 
         At the last station the load still acts a little. On the way to no load and no change along
-        x points may yield once more, which is a pass of one column through the section alone.
+        x points may yield once more, which is a pass of one column through the section alone. The
+        strain there is that of all plastic strain, not of what this pass adds: what is left over
+        of each release would add up from pass to pass.
         """
-        body = _Release(self._modes, self._before)
+        body = _Release(self._modes, self._virgin)
         end = self._last(self._before.displacement)
-        guess, nothing = body.strain(self.force[:, -1:]), body.at_rest
+        had = self._stiff * self._before.plastic_strain[:, None]
+        guess, nothing = body.strain(self.force[:, -1:] + had), body.at_rest
         return self.states, passing(body, self._law, Given(nothing, nothing), end, guess).after
 
 
@@ -115,11 +120,11 @@ class _Release:
 
     Parameters
     ----------
-    before : state that has no eigenstress
+    virgin : state before any load
     """
 
-    def __init__(self, modes: Modes, before: PrismState) -> None:
-        self._modes, self._before = modes, before
+    def __init__(self, modes: Modes, virgin: PrismState) -> None:
+        self._modes, self._virgin = modes, virgin
         self.weights = modes.weights[:, None]
         self.at_rest = np.zeros((len(self.weights), 1, 6))
 
@@ -132,8 +137,8 @@ class _Release:
         return self._modes.constant(eigenstress[:, 0])[0][:, None]
 
     def flow(self, law: Law, end: PrismState, added: Array, parts: int) -> _ReleaseFlow:
-        """Return the flow from a state to the strain before the pass and ``added``."""
-        return _ReleaseFlow(self._modes, law, self._before, end, added, parts)
+        """Return the flow from a state to the strain before any load and ``added``."""
+        return _ReleaseFlow(self._modes, law, self._virgin, end, added, parts)
 
 
 class _ReleaseFlow(_Swept):
@@ -142,12 +147,12 @@ class _ReleaseFlow(_Swept):
     beyond = ""
 
     def __init__(
-        self, modes: Modes, law: Law, before: PrismState, end: PrismState, added: Array, parts: int
+        self, modes: Modes, law: Law, virgin: PrismState, end: PrismState, added: Array, parts: int
     ) -> None:
-        super().__init__(law, end, before, before.strain[:, None] + added, parts)
-        self._modes, self._before = modes, before
+        super().__init__(law, end, virgin, virgin.strain[:, None] + added, parts)
+        self._modes, self._virgin = modes, virgin
 
     def left(self) -> tuple[PlasticState, PrismState]:
         """Return the internal variables, and the state without load."""
         moved = self._modes.constant(self.force[:, 0])[1].reshape(3, -1).T
-        return self.states, self._last(self._before.displacement + moved)
+        return self.states, self._last(self._virgin.displacement + moved)

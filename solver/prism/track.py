@@ -84,7 +84,7 @@ class PrismTrack:
         window = before + round(behind / spacing) + 1
         if window > stations:
             raise ModelError("length", length, f"must be at least {window * spacing:g} mm")
-        near = int(reach / spacing)
+        near = int(round(reach / spacing, 6))
         if 2 * near > min(before, window - 1 - before):
             allowed = "must be at most half of what the window has ahead and behind"
             raise ModelError("reach", reach, allowed)
@@ -139,12 +139,18 @@ class PrismTrack:
         ModelError
             for an initial stress that is beyond the yield stress in the zone
         """
-        n, strain = len(self.weights), self.initial_strain[self.modes.points]
-        state = law.initial(n, 6)
-        beyond = float(law.yield_value(law.stiffness(6) @ strain.T, state).max())
+        virgin = self._virgin(law)
+        stress = law.stiffness(6) @ virgin.strain.T
+        beyond = float(law.yield_value(stress, virgin.state).max())
         if beyond > 0:
             allowed = f"must not yield: in equilibrium it is {beyond:.4g} MPa beyond yield"
             raise ModelError("initial_stress", "this field", allowed)
+        return virgin
+
+    def _virgin(self, law: Law) -> PrismState:
+        """Return the state before any load, which may be beyond the yield stress."""
+        strain = self.initial_strain[self.modes.points]
+        state = law.initial(len(self.weights), 6)
         return PrismState(state, strain, np.zeros((len(self.grid.z), 3)))
 
     # -- what a pass asks for ------------------------------------------------------------------
@@ -156,7 +162,7 @@ class PrismTrack:
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
         """Return the flow of a material along the rows of points."""
-        return PrismFlow(self.modes, self.rim, law, before, added, parts)
+        return PrismFlow(self.modes, self.rim, law, self._virgin(law), before, added, parts)
 
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""

@@ -88,4 +88,5 @@ class PrismWindow:
 
     def _stations(self, ratio: float) -> int:
         """Return the number of stations that cover a ratio of the reach."""
-        return math.ceil(ratio * self.reach / self.spacing)
+        # a whole number is not rounded up, whatever the unit of length makes of its last digit
+        return math.ceil(round(ratio * self.reach / self.spacing, 6))

@@ -25,6 +25,7 @@ from tests.stability.kinds import (
     offsets,
     overlap,
     point,
+    prism,
     punches,
     ratios,
     reopening,
@@ -90,9 +91,10 @@ FAMILIES: dict[str, Family] = {
     "static": Family(static.COUNT, 48, static.scenes),
     "endless": Family(endless.COUNT, 300, endless.scenes),
     "files": Family(files.COUNT, 200, files.scenes),
+    "prism": Family(prism.COUNT, 300, prism.scenes),
 }
 
-FOUND = ["endless-64", "endless-160", "endless-174"]
+FOUND = ["endless-64", "endless-160", "endless-174", "prism-21", "prism-26"]
 """Scenes that were once judged or answered wrongly, beyond the first of their family."""
 NAMES = [f"{family}-{k}" for family, own in FAMILIES.items() for k in range(own.short)] + FOUND
 """The scenes of the test suite."""

@@ -109,6 +109,15 @@ def test_a_raceway_of_another_size_strains_alike() -> None:
     assert large.scalars["max_plastic_strain"] == pytest.approx(strain, rel=2e-3)
 
 
+@pytest.mark.parametrize("radius", [2.523, 7.1, 33.0])
+def test_zone_and_window_do_not_depend_on_the_unit_of_length(radius: float) -> None:
+    sizes = {
+        geometry(RacewayParameters(radius=radius * unit, accuracy="draft")).window.size
+        for unit in (1.0, 10.0, 100.0, 1e3)
+    }
+    assert len(sizes) == 1
+
+
 def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
     given = {"friction": 0.2, "traction": 0.5}
     record = rolled(load="hertz", **given)

@@ -62,12 +62,11 @@ def audit_prism(
         law, loading.load, loading.contact, plain.width, surface,
         strength=float(law.shear_strength(after.state).max()),
     )  # fmt: skip
-    left_strain, left_surface = plain.constant(
-        stiff * (after.plastic_strain - before.plastic_strain)
-    )
+    # behind of all passes, not of this one: what each leaves over must not add up
+    left_strain, left_surface = plain.constant(stiff * after.plastic_strain)
+    left_strain += track.initial_strain[track.modes.points]
     unsteady = deviation(plain.strain(waves) - found.strain)
-    unsteady_behind = deviation(left_strain - (after.strain - before.strain))
-    moved = after.displacement - before.displacement
+    unsteady_behind = deviation(left_strain - after.strain)
     residual = law.stiffness(6) @ (after.strain - after.plastic_strain).T
     flow = AuditedFlow(law, found, before.strain)
     rim = (found.accumulated - before.accumulated[:, None])[track.rim]
@@ -85,7 +84,7 @@ def audit_prism(
         "audit_history": max(
             _lost(track, law, found, previous),
             _unsettled(track, plain) / law.yield_stress,
-            _apart(moved, left_surface, after.displacement),
+            _apart(after.displacement, left_surface),
         ),
         "audit_inflow": max(flow.inflow(), flow.over_most(rim) if rim.size else 0.0),
         "audit_outflow": flow.outflow(),
@@ -158,10 +157,10 @@ def _lost(
     return max(off, _apart(before.displacement, displacement))
 
 
-def _apart(one: Array, other: Array, whole: Array | float = 0.0) -> float:
-    """Return the largest difference of displacements, over the largest of them and of ``whole``."""
+def _apart(one: Array, other: Array) -> float:
+    """Return the largest difference of displacements, over the largest of them."""
     off = float(np.abs(one - other).max())
-    return off / max(float(np.abs(each).max()) for each in (one, other, whole)) if off else 0.0
+    return off / max(float(np.abs(each).max()) for each in (one, other)) if off else 0.0
 
 
 def _far(track: PrismTrack, law: Law, resultants: Array) -> float:
