@@ -10,6 +10,7 @@ from studies.definition.cases import Case
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.execution.run import StudyEvent
+from studies.views.columns import counted
 
 _WIDTH = 28
 _REDRAW = 0.1
@@ -94,4 +95,4 @@ class Progress:
 
 def _place(study: Study, case: Case) -> str:
     place = study.place(case).items()
-    return ", ".join(f"{name} = {value}" for name, value in place) or study.name
+    return ", ".join(f"{name} = {counted(value)}" for name, value in place) or study.name

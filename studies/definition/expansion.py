@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import reprlib
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -91,7 +92,7 @@ class Expansion:
             try:
                 found = getattr(self._parameters(index), "idle", {})
             except ModelError as error:
-                raise self._located(error, index) from error
+                raise self.located(error, index) from error
             idle &= found.keys()
         for name in idle:
             allowed = f"changes nothing in any run of this study: choose another {found[name]}"
@@ -152,13 +153,15 @@ class Expansion:
         ]
         return _SweepAxis(names, self._run.places(names), self._path.places(names), positions)
 
-    def _located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
+    def located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
         """Return the error of the scene, with the field name of the study file.
 
         For a value outside its own range the error gives that range, with its unit. Otherwise it
         names the combination of swept values: another combination may be allowed.
         """
-        field, at, where = f"parameters.{error.field}", [], []
+        known = parameters_of(self._scene)
+        of_scene = error.field.partition("[")[0].partition(".")[0] in known
+        field, at, where = f"parameters.{error.field}" if of_scene else error.field, [], []
         for (name, axis), i in zip(self._axes.items(), index, strict=True):
             if isinstance(axis, dict):
                 label = list(axis)[i]
@@ -166,10 +169,11 @@ class Expansion:
                 if error.field in axis[label]:
                     field = f"sweep.{name}.{label}.{error.field}"
             else:
-                at.append(f"{name} = {axis[i]}")
+                one = axis[i]
+                at.append(f"{name} = {reprlib.repr(one) if isinstance(one, list) else one}")
                 if error.field == name:
                     field = f"sweep.{name}[{i}]"
-        parameter = parameters_of(self._scene).get(error.field)
+        parameter = known.get(error.field)
         if parameter is not None and not parameter.in_range(error.value):
             allowed = parameter.refusal(field, error.value).allowed
         else:

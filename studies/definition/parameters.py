@@ -179,13 +179,16 @@ def _describe(schema: Mapping[str, Any]) -> str:
         return "[" + ", ".join(map(_describe, schema["prefixItems"])) + "]"
     if kind == "array":
         return f"a list of {_describe(schema['items'])}" if "items" in schema else "a list"
+    entry = schema.get("additionalProperties")
+    if kind == "object" and isinstance(entry, Mapping):
+        values = " or ".join(map(_describe, entry.get("anyOf", [entry])))
+        return f"tables, each value {values}"
     words = {
         "number": "a finite number",
         "integer": "an integer",
         "string": "a text",
         "boolean": "true or false",
         "null": "left out",
-        "object": "tables",
     }
     limits = [
         f"{relation} {schema[key]:g}" for key, relation in _RELATIONS.items() if key in schema

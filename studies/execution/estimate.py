@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from solver.errors import ModelError
-from solver.scenes import Effort, Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
@@ -128,19 +127,32 @@ _MEANING = {
 
 
 def estimate(study: Study, store: Store) -> Estimate:
-    """Return the cost of the runs of `study` that `store` lacks; nothing is written."""
+    """Return the cost of the runs of `study` that `store` lacks; nothing is written.
+
+    Runs that the scene cannot set up end at once and cost nothing.
+
+    Raises
+    ------
+    StudyError
+        for the first run, if the store has none and the scene can set up none
+    """
     scene = study.problem
     pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
     set_ups: dict[Hashable, list[float]] = {}
     basis, alone = pace.basis, 0.0
     seconds = [0.0, 0.0, 0.0]
+    refused: list[StudyError] = []
     for path, missing in _missing(study, store):
         to_compute += len(missing)
         paths += 1
         set_up = _PER_SETUP
-        effort = _effort(scene, path, missing)
-        if effort is not None:
+        if scene.effort is not None:
+            try:
+                effort = scene.effort(path.parameters, missing)
+            except ModelError as error:
+                refused.append(study.expansion.located(error, path.cases[0].index))
+                continue
             set_up += effort.set_up
             unknowns = max(unknowns, effort.unknowns)
             increments += effort.increments
@@ -155,6 +167,8 @@ def estimate(study: Study, store: Store) -> Estimate:
             alone += set_up
         else:
             set_ups.setdefault(setup_of(scene, path), []).append(set_up)
+    if refused and len(refused) == paths and to_compute == study.size:
+        raise refused[0]
     fixed = _PER_RUN * to_compute + alone + _shared(list(set_ups.values()))
     low, likely, high = (fixed + each for each in seconds)
     known = scene.effort is not None
@@ -169,19 +183,6 @@ def estimate(study: Study, store: Store) -> Estimate:
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
     )
-
-
-def _effort(scene: Scene, path: LoadingPath, missing: Sequence[Any]) -> Effort | None:
-    """Return the work of a path.
-
-    None if the scene does not tell it, or refuses the parameters: then the runs end at once.
-    """
-    if scene.effort is None:
-        return None
-    try:
-        return scene.effort(path.parameters, missing)
-    except ModelError:
-        return None
 
 
 def _shared(each: list[list[float]]) -> float:

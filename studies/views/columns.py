@@ -17,13 +17,20 @@ _GAP = "  "
 
 
 def value_text(value: Any) -> str:
-    """Return a value as text, numbers with four digits, NaN as "-", points as their number."""
+    """Return a value as text: numbers with four digits, NaN as "-", lists by `counted`."""
     if isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float | np.floating):
         return "-" if np.isnan(value) else f"{value:z.4g}"
-    text = "-" if value is None else str(value)
-    return f"{text.count('[') - 1} points" if text.startswith("[[") else text
+    return "-" if value is None else counted(value)
+
+
+def counted(value: Any) -> str:
+    """Return a list of points or tables, or the JSON of one, as their number; all else as text."""
+    text = str(value)
+    if text.startswith("[["):
+        return f"{text.count('[') - 1} points"
+    return f"{text.count('{')} tables" if text.startswith("[{") else text
 
 
 def stacked(headings: Sequence[str]) -> list[list[str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from studies.definition.vocabulary import OK, STATUSES
 from studies.errors import StudyError
 from studies.storage.frame import FRACTION
 from studies.storage.store import Store
+from studies.views.columns import counted
 from studies.views.reading import find_study, open_netcdf
 
 
@@ -94,7 +95,8 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
     best = max(
         ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
     )
-    return _own_grid(chosen.isel(dict(zip(axes, best, strict=True))))
+    run = chosen.isel(dict(zip(axes, best, strict=True)))
+    return _own_grid(run, [str(name) for name in run.dims])
 
 
 def runs_over(
@@ -113,16 +115,16 @@ def runs_over(
     best = one_run(dataset, selection)
     chosen = select(dataset, selection).sel({name: best[name].item() for name in others})
     chosen = chosen.isel({axis: np.flatnonzero(chosen["status"] == OK)})
-    scaled = [str(name) for name in chosen[field].dims if f"{name}{FRACTION}" in chosen.coords]
-    unlike = [name for name in scaled if not _same(chosen[name], axis)]
+    own = [str(name) for name in chosen[field].dims]
+    own = [name for name in own if name in chosen.coords and name not in chosen.indexes]
+    unlike = [name for name in own if not _same(chosen[name], axis)]
     if unlike:
         allowed = f"changes {', '.join(unlike)}: these runs have no place in common"
         raise StudyError("over", axis, allowed)
-    for name in scaled:
+    for name in own:
         grid = chosen[name].isel({axis: 0}) if axis in chosen[name].dims else chosen[name]
-        own = {name: (name, grid.to_numpy(), grid.attrs)}
-        chosen = chosen.drop_vars(name).assign_coords(own)
-    return _own_grid(chosen) if scaled else chosen
+        chosen = chosen.drop_vars(name).assign_coords({name: (name, grid.to_numpy(), grid.attrs)})
+    return _own_grid(chosen, own)
 
 
 def _same(grid: xr.DataArray, axis: str) -> bool:
@@ -174,16 +176,16 @@ def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
     except ValueError:
         same = np.zeros(len(values), dtype=bool)
     if not same.any():
-        known = ", ".join(dict.fromkeys(str(each) for each in values))
+        known = ", ".join(dict.fromkeys(counted(each) for each in values))
         raise StudyError(str(axis.name), value, f"must be one of {known}")
     return np.flatnonzero(same)
 
 
-def _own_grid(run: xr.Dataset) -> xr.Dataset:
-    """Return a run with its own grid as the index, if the grids of the study's runs differ."""
-    for name in [str(name) for name in run.dims]:
-        if name in run.coords and name not in run.indexes:
-            there = run[name].notnull().to_numpy()
-            run = run.drop_vars(f"{name}{FRACTION}", errors="ignore")
-            run = run.isel({name: there}).set_xindex(name)
-    return run
+def _own_grid(runs: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Return runs with a grid of their own as the index of these dimensions, if grids differ."""
+    for name in names:
+        if name in runs.coords and name not in runs.indexes:
+            there = runs[name].notnull().to_numpy()
+            runs = runs.drop_vars(f"{name}{FRACTION}", errors="ignore")
+            runs = runs.isel({name: there}).set_xindex(name)
+    return runs

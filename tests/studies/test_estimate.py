@@ -241,3 +241,23 @@ def test_a_long_study_is_said_to_be_long(store: Store) -> None:
     assert not long_run(Study.from_dict(short), store)
     told = long_run(Study.from_dict(many(4000)), store)
     assert told.startswith("many: about ") and "hours (" in told and "\n" not in told
+
+
+def test_runs_that_cannot_be_set_up_cost_nothing_and_are_refused_if_all_are(store: Store) -> None:
+    """Where the wheel cannot touch is known only with both profiles; `run` computes the others."""
+
+    def positions(*z: float) -> Study:
+        content = {"scene": "wheel_rail", "parameters": {"accuracy": "draft"}}
+        return Study.from_dict(
+            {"name": "places", **content, "sweep": {"lateral_position": list(z)}}
+        )
+
+    one, both = (estimate(positions(*z), store) for z in ((-4.0,), (-4.0, 5.0)))
+    assert one.cpu_seconds is not None and both.cpu_seconds is not None
+    assert one.cpu_seconds < both.cpu_seconds < tuple(1.0 + each for each in one.cpu_seconds)
+    with pytest.raises(StudyError, match="must leave the flange beside the rail") as caught:
+        estimate(positions(5.0), store)
+    assert caught.value.field == "sweep.lateral_position[0]"
+    tiny = {"name": "tiny", "scene": "raceway", "parameters": {"radius": 1e-300}}
+    with pytest.raises(StudyError, match=r"^mesh = .*is flat"):
+        estimate(Study.from_dict(tiny), store)

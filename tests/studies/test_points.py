@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 from solver.scenes import SCENES
 from studies import Study
 from studies.definition.parameters import parameters_of
 from studies.errors import StudyError
 from studies.views.columns import value_text
+from studies.views.plots.captions import setting
 
 POINTS = [[float(z), z**2 / 600.0] for z in range(-40, 41, 4)]
 
@@ -95,5 +98,25 @@ def test_the_description_says_that_points_are_allowed() -> None:
     assert allowed == "60e1 or a list of [a finite number, a finite number]"
 
 
-def test_tables_count_points() -> None:
+def test_tables_and_pictures_count_points_and_entries() -> None:
+    entries = [{"load": 1e5}] * 300
     assert value_text(POINTS) == f"{len(POINTS)} points"
+    assert value_text(json.dumps(entries)) == "300 tables"
+    given = {"wheel_profile": POINTS, "sequence": entries}
+    run = xr.Dataset(
+        coords={"rail_profile": json.dumps(POINTS)},
+        attrs={"scene": "wheel_rail", "parameters": json.dumps(given)},
+    )
+    assert setting(run).replace("\N{NO-BREAK SPACE}", " ") == (
+        "wheel_rail · rail profile 21 points · wheel profile 21 points · sequence 300 tables"
+    )
+
+
+def test_an_error_at_a_profile_is_short() -> None:
+    content = {
+        "name": "worn", "scene": "wheel_rail", "parameters": {"friction": 0.0, "traction": 0.1},
+        "sweep": {"wheel_profile": [POINTS]},
+    }  # fmt: skip
+    with pytest.raises(StudyError, match="must be 0 without friction") as caught:
+        Study.from_dict(content)
+    assert len(str(caught.value)) < 300

@@ -73,6 +73,7 @@ def test_a_study_of_sequences_is_computed_and_read(store: Store) -> None:
         ([{"load": -1.0}], r"parameters\.sequence\[0\]\.load = -1\.0: must be greater than 0"),
         ([{}, {"gauge": 1}], r"parameters\.sequence\[1\]\.gauge = 1\.0: must be one of load, "),
         ([5], r"parameters\.sequence = \[5\]: must be a list of tables"),
+        ([{"load": None}], "must be a list of tables, each value a finite number or a text"),
         ({"load": 1.0}, r"parameters\.sequence = .*: must be a list of tables"),
     ],
 )

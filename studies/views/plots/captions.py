@@ -12,6 +12,8 @@ import xarray as xr
 from solver.errors import ModelError
 from studies.definition.parameters import defaults, parameters_of, plain
 from studies.scenes.registry import scene_of
+from studies.storage.frame import FRACTION
+from studies.views.columns import counted
 
 _STAY = "\N{NO-BREAK SPACE}"
 
@@ -66,7 +68,7 @@ def setting(run: xr.Dataset) -> str:
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
-        if each.ndim == 0
+        if each.ndim == 0 and not str(name).endswith(FRACTION)
     ]
     others = [
         named(name, value, known[name].unit)
@@ -98,7 +100,7 @@ def wrapped(text: str, width: float, points: int) -> str:
 
 
 def _text(value: Any, unit: str) -> str:
-    number = f"{value:g}" if isinstance(value, int | float) else words(str(value))
+    number = f"{value:g}" if isinstance(value, int | float) else words(counted(value))
     return number if unit in {"", "1"} else f"{number} {unit}"
 
 

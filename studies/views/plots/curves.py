@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError
+from studies.views.columns import counted
 from studies.views.picking import flags, sweep_axes
 from studies.views.plots.captions import (
     capitalised,
@@ -83,7 +84,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
         foot = np.full(len(places), _FOOT)
         kind.draw(axes, np.array(places), foot, axes.get_xaxis_transform())
     if not numeric:
-        names = [str(each) for each in across.to_numpy()]
+        names = [counted(each) for each in across.to_numpy()]
         axes.set_xticks(x, names, rotation=90.0 if len("".join(names)) > _ABREAST else 0.0)
     _scale(axes, dataset[field], values)
     axes.grid(color="0.92")

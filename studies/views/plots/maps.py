@@ -23,7 +23,7 @@ from studies.views.plots.fields import (
     too_close,
     usual_field,
 )
-from studies.views.plots.over import draw_patch, draw_wheel, is_patch, within_patch
+from studies.views.plots.over import BELOW, draw_patch, draw_wheel, is_patch, within_patch
 
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
@@ -119,9 +119,11 @@ def map_figure(
     if "flag_meanings" in values.attrs:
         bar.set_ticks(values.attrs["flag_values"], labels=values.attrs["flag_meanings"].split())
     bar.outline.set_visible(False)
+    above = axes.get_legend() if patch else None
     axes.annotate(
-        wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords="axes fraction",
-        xytext=(0.0, -40.0), textcoords="offset points", va="top", fontsize=8, color="0.3",
+        wrapped(note, max(width, _TEXT), 8), (0.0, 0.0), xycoords=above or "axes fraction",
+        xytext=(0.0, -4.0 if above else BELOW), textcoords="offset points", va="top", fontsize=8,
+        color="0.3",
     )  # fmt: skip
     _fit(sheet, axes)
     return sheet

@@ -6,15 +6,18 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 
 from studies.views.plots.fields import Window, map_axes
 
 _STATUS, _OPEN, _STICK = "patch_status", 0, 1
 _SHEAR, _SLIP = "patch_shear", "patch_slip"
 _ARROWS = 16
-"""Number of arrows over the longer side of the contact."""
-_MARGIN = 3.0
-"""Width of the frame around the contact [mm]."""
+"""Number of arrows over the side of a square as large as what is shown."""
+BELOW = -40.0
+"""Place of words below a map, under the name of its axis [pt]."""
+_MARGIN = 0.2
+"""Width of the frame around the contact, over its longer side."""
 _WHEEL, _UP, _ABOVE = "wheel_surface", "y", 3.0
 """The profile of the wheel, its height, and how far above the body it is shown [mm]."""
 
@@ -31,8 +34,9 @@ def within_patch(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
     if not closed.any():
         return values
     part = closed.where(closed, drop=True)
+    margin = _MARGIN * max(float(np.ptp(part[name].to_numpy())) for name in (across, up))
     ends = {
-        name: slice(float(part[name][0]) - _MARGIN, float(part[name][-1]) + _MARGIN)
+        name: slice(float(part[name][0]) - margin, float(part[name][-1]) + margin)
         for name in (across, up)
     }
     return values.where(closed).sel(ends)
@@ -55,7 +59,7 @@ def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
     arrows = [run[f"{kind}_{axis}"].where(status != _OPEN) for axis in (across, up)]
     longest = float(np.sqrt(sum(each**2 for each in arrows)).max())
     if longest > 0.0:
-        step = max(window[1] - window[0], window[3] - window[2]) / _ARROWS
+        step = np.sqrt((window[1] - window[0]) * (window[3] - window[2])) / _ARROWS
         some = {
             name: slice(None, None, max(1, round(step / float(np.diff(status[name])[0]))))
             for name in (across, up)
@@ -69,8 +73,10 @@ def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
         name = f"{kind.removeprefix('patch_')} on the surface, at most {longest:.3g}"
         label = name if unit == "1" else f"{name} {unit}"
         handles.append(Line2D([], [], color="0.1", marker=r"$\rightarrow$", ls="none", label=label))
-    axes.legend(
-        handles=handles, loc="lower right", framealpha=0.9, edgecolor="none", fontsize=8
+    down = ScaledTranslation(0.0, BELOW / 72.0, axes.figure.dpi_scale_trans)
+    axes.legend(  # not on the map: a contact that is long one way leaves no corner free
+        handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.0, 1.0, 0.0), frameon=False,
+        bbox_transform=axes.transAxes + down, borderpad=0.0, borderaxespad=0.0, fontsize=8,
     )  # fmt: skip
 
 

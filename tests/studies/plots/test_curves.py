@@ -163,11 +163,27 @@ def test_lines_are_laid_over_each_other_where_another_axis_changes_the_grid() ->
     dataset = dataset.assign_coords(
         s_fraction=("s", np.linspace(0.0, 1.0, 5)), s=(("friction", "s"), grids)
     )
+    dataset["map"] = (("load_ratio", "x"), np.ones((3, 2)))  # its grid differs along the axis
+    dataset = dataset.assign_coords(x=(("load_ratio", "x"), np.arange(6.0).reshape(3, 2)))
     figure = picture(dataset, "contact_pressure", over="load_ratio")
     assert len(lines_of(figure)) == 3
     assert max(line.get_xdata().max() for line in lines_of(figure)) == grids[-1, -1]
     with pytest.raises(StudyError, match="changes s"):
         picture(dataset, "contact_pressure", over="friction")
+
+
+def test_lines_over_an_axis_are_selected_on_grids_that_another_one_moves() -> None:
+    dataset = swept(laws=["none"])
+    places = np.array([[-6.0, -0.5, 5.0], [-5.0, 0.0, 5.0]])  # by friction, of no common form
+    moved = [dataset["contact_pressure"] + 100.0 * k for k in range(3)]
+    dataset["profile"] = xr.concat(moved, "station")
+    dataset = dataset.assign_coords(station=(("friction", "station"), places))
+    chosen = {"friction": 0.1, "station": 0.0}
+    figure = picture(dataset, "profile", selection=chosen, over="load_ratio")
+    assert len(lines_of(figure)) == 3
+    first = lines_of(figure)[0].get_ydata()
+    expected = moved[1].isel(load_ratio=0, friction=1, hardening=0).to_numpy()
+    np.testing.assert_array_equal(first, expected)
 
 
 def test_each_value_of_an_axis_has_its_line() -> None:

@@ -342,8 +342,8 @@ def names_of(axes: Axes) -> list[str]:
 def test_a_contact_is_drawn_with_its_edges_and_its_shear() -> None:
     axes, mesh = mesh_of(map_figure(rolled(), "patch_pressure"))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("z [1]", "x [1]")
-    assert axes.get_xlim() == (-5.5, 5.5)
-    assert axes.get_ylim() == (-7.5, 7.5)
+    assert axes.get_xlim() == (-3.5, 3.5)  # a fifth of 8 mm around it
+    assert axes.get_ylim() == (-5.5, 5.5)
     assert np.ma.count(np.ma.masked_invalid(mesh.get_array())) == 9 * 5
     assert names_of(axes) == [
         "edge of contact", "edge of stick", "shear on the surface, at most 224 MPa",
@@ -351,6 +351,34 @@ def test_a_contact_is_drawn_with_its_edges_and_its_shear() -> None:
     (arrows,) = (each for each in axes.collections if isinstance(each, Quiver))
     assert np.ma.array(arrows.V, mask=arrows.Umask).max() < 0.0
     assert mesh.get_clim() == (0.0, 900.0)
+
+
+@pytest.mark.parametrize("size", [1e-2, 1.0, 1e2])
+@pytest.mark.parametrize("longer", [1.0, 20.0])
+def test_a_contact_of_any_size_and_form_is_not_hidden(size: float, longer: float) -> None:
+    x, z = np.linspace(-10.0, 10.0, 201), np.linspace(-12.0, 12.0, 241)
+    run = rolled().sel(x=x, z=z, method="nearest")
+    run = run.assign_coords(x=size * x, z=size * longer * z)
+    run["patch_pressure"][100, 120] = 9e5  # colours end before it, as a note says
+    sheet = map_figure(run, "patch_pressure")
+    axes, _ = mesh_of(sheet)
+    sheet.draw_without_rendering()
+    legend = axes.get_legend()
+    assert legend is not None
+    box = legend.get_window_extent()
+    assert 0.0 <= box.y0
+    assert box.y1 <= axes.xaxis.label.get_window_extent().y0
+    note = next(each for each in axes.texts if "Colours end" in each.get_text())
+    assert note.get_window_extent().y1 <= box.y0
+    (arrows,) = (each for each in axes.collections if isinstance(each, Quiver))
+    for places, length, shown in (
+        (arrows.X, arrows.U, axes.get_xlim()),
+        (arrows.Y, arrows.V, axes.get_ylim()),
+    ):
+        ends = np.ma.masked_invalid(places + np.ma.array(length, mask=arrows.Umask) / arrows.scale)
+        assert shown[0] <= ends.min()
+        assert ends.max() <= shown[1]
+    assert np.ma.count(np.ma.array(arrows.U, mask=arrows.Umask)) >= 10
 
 
 def test_slip_is_drawn_with_arrows_of_slip_and_shear_has_two_signs() -> None:
