@@ -181,7 +181,7 @@ def _profiles(rng: np.random.Generator) -> Given:
         own["wheel_profile"] = tuple(zip(z.tolist(), y.tolist(), strict=True))
     if rng.random() < 0.1:  # a head that is round, its sides steep
         z = np.linspace(-34, 34, 69)
-        y = -(z**2) / (2 * rng.uniform(150, 400)) - np.clip(abs(z) - 22, 0, None) ** 2 / 15
+        y = -(z**2) / (2 * rng.uniform(150, 400)) - np.clip(abs(z) - 22, 0, None) ** 2 / 40
         own["rail_profile"] = tuple(zip(z.tolist(), y.tolist(), strict=True))
     return own
 
