@@ -9,7 +9,8 @@ from typing import Any
 from solver.errors import ModelError
 
 _TIMES = "times"
-_MOST_TIMES = 1000
+_MOST = 1000
+"""Largest number of passes of a sequence, as of a run."""
 
 
 def block_of(
@@ -41,6 +42,8 @@ def block_of(
                 if name not in names:
                     raise ModelError(name, value, f"must be one of {', '.join(names)}, {_TIMES}")
             block += [replace(parameters, sequence=(), **own)] * times
+            if len(block) > _MOST:
+                raise ModelError(_TIMES, times, f"must make at most {_MOST} passes in all")
         except ModelError as error:
             field = f"sequence[{number}].{error.field}"
             raise ModelError(field, error.value, error.allowed) from None
@@ -50,6 +53,6 @@ def block_of(
 def _times(value: Any) -> int:
     """Return the number of passes of an entry."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 1 <= value <= _MOST_TIMES or value != int(value):
-        raise ModelError(_TIMES, value, f"must be an integer from 1 to {_MOST_TIMES}")
+    if not number or not 1 <= value <= _MOST or value != int(value):
+        raise ModelError(_TIMES, value, f"must be an integer from 1 to {_MOST}")
     return int(value)

@@ -32,6 +32,10 @@ _OF_A_PASS = (
     "wheel_profile", "wheel_slope", "crown_radius", "wheel_radius",
 )  # fmt: skip
 """Parameters that may differ from pass to pass."""
+_OF_A_PLACE = (
+    "lateral_position", "yaw", "wheel_profile", "wheel_slope", "crown_radius", "wheel_radius",
+)  # fmt: skip
+"""Those that decide where the wheel touches, for one load."""
 _SPREADS = ("load_spread", "lateral_spread", "traction_spread")
 _POSITIONS = 13
 """Number of lateral positions that stand for those of random traffic, half a standard deviation
@@ -230,9 +234,12 @@ class WheelRailParameters(PrismParameters):
 
     @property
     def outermost(self) -> list[WheelRailParameters]:
-        """Passes whose contacts hold those of all passes: heavy ones, beside each other."""
+        """Passes whose contacts hold those of all passes: the heaviest at each place."""
+        heaviest: dict[tuple[Any, ...], WheelRailParameters] = {}
+        for own in sorted(self.block, key=lambda own: own.load):
+            heaviest[tuple(getattr(own, name) for name in _OF_A_PLACE)] = own
         found = []
-        for own in dict.fromkeys(self.block) if self.sequence else (self,):
+        for own in heaviest.values():
             places = np.linspace(-CUT, CUT, _POSITIONS) if own.lateral_spread else (0.0,)
             found += [own.deviating((CUT, place, 0.0)) for place in places]
         return found

@@ -127,6 +127,8 @@ def test_wheels_in_turn_may_push_with_different_lateral_forces() -> None:
         (({}, {}, {"load": "much"}), r"sequence\[2\]\.load = 'much': must be a number"),
         (({"traction": 0.5, "friction": 0.0},), r"sequence\[0\]\.traction = 0\.5: must be 0"),
         (({"times": 0},), r"sequence\[0\]\.times = 0: must be an integer"),
+        (({},) * 1001, r"sequence\[1000\]\.times = 1: must make at most 1000 passes in all"),
+        (({"times": 600}, {"times": 500}), r"sequence\[1\]\.times = 500: must make at most"),
         ((5.0,), r"sequence\[0\] = 5\.0: must be a table"),
         ("heavy", r"sequence = 'heavy': must be a list of tables"),
     ],
@@ -137,6 +139,19 @@ def test_wrong_entries_are_refused_by_name(sequence: Any, told: str) -> None:
 
 
 # -- the zone -------------------------------------------------------------------------------------
+
+
+def test_of_the_loads_at_a_place_the_heaviest_decides() -> None:
+    """A thousand wheels at two places cost as much as two."""
+    entries = [{"load": 5e4 + 1e3 * (k % 50), "lateral_position": -6.0 + k % 2} for k in range(60)]
+    many = WheelRailParameters(accuracy="draft", sequence=tuple(entries))
+    assert len(many.outermost) == 2
+    whole = expected_contact(many)
+    for entry in entries[::7]:
+        own = expected_contact(WheelRailParameters(accuracy="draft", **entry))  # type: ignore[arg-type]
+        assert whole.ends[0] <= own.ends[0] and own.ends[1] <= whole.ends[1]
+        assert whole.near[0] <= own.near[0] and own.near[1] <= whole.near[1]
+        assert own.along <= whole.along and own.widest <= whole.widest and whole.gap <= own.gap
 
 
 def test_the_zone_holds_the_contacts_of_all_passes() -> None:
