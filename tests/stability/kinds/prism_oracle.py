@@ -116,6 +116,14 @@ def _resultants(rolled: Rolled, own: Any) -> dict[str, float]:
         "cone": float((shear - bound).max()) / peak,
     }
     if own.load == "hertz":
+        # a given pressure is the sum of hats nearest to it, which swings at its edge: not that sum,
+        # but what it does on each hat, is a push; shear is in proportion
+        first = (2 * pressure[:, :-1] + pressure[:, 1:]) * length / 6
+        second = (pressure[:, :-1] + 2 * pressure[:, 1:]) * length / 6
+        pushed = np.pad(first, ((0, 0), (0, 1))) + np.pad(second, ((0, 0), (1, 0)))
+        found["tension"] = -float(pushed.min()) / (peak * float(length.mean()))
+        bound = abs(own.traction) * own.friction * np.abs(pressure)
+        found["cone"] = float(np.abs(shear - bound).max()) / peak
         found["vertical"] = abs(float((pressure @ area).sum()) / load - 1)
         wanted = own.traction * own.friction * load
         found["drive"] = abs(float((traction[..., 0] @ area).sum()) - wanted) / load
