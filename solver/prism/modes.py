@@ -204,7 +204,7 @@ class Modes:
         amplitudes = np.matmul(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
-    def at_station(self, station: int, eigenstress: Array, forces: Array) -> Array:
+    def at_station(self, station: int, eigenstress: Array | None, forces: Array | None) -> Array:
         """Return the displacement (m,) of the zone's unknowns at a station [mm]; see `solve`."""
         flat = self.solved(self._nodal(eigenstress, forces)).reshape(-1, len(self.unknowns)).T
         plain, carrying = (back[:, station] for back in self._back)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -95,7 +95,10 @@ class RollingPatch:
             raise ModelError("compliance", compliance.shape, allowed)
         self.grid, self._axes, self._area = grid, grid.axes, grid.area
         self._set_wheel(wheel)
-        self._set_load(friction, force, drive, lateral_force, (creepage, lateral_creepage, spin))
+        self._set_load(
+            friction=friction, force=force, drive=drive, lateral_force=lateral_force,
+            creepage=creepage, lateral_creepage=lateral_creepage, spin=spin,
+        )  # fmt: skip
         with one_thread():
             self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
@@ -109,13 +112,16 @@ class RollingPatch:
 
     def _set_load(
         self,
+        *,
         friction: float,
         force: float,
-        drive: float | None,
-        lateral_force: float | None,
-        given: tuple[float, float, float],
+        drive: float | None = None,
+        lateral_force: float | None = None,
+        creepage: float = 0.0,
+        lateral_creepage: float = 0.0,
+        spin: float = 0.0,
     ) -> None:
-        """Set friction and load; ``given`` are creepages and spin."""
+        """Set friction and load; parameters are those of the class."""
         if not 0 <= friction <= 1:
             raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
@@ -124,7 +130,7 @@ class RollingPatch:
         self.friction = friction if friction > LEAST_FRICTION else 0.0
         self.drive = drive if self.friction else None
         self.lateral_force = lateral_force if self.friction else None
-        self._given = np.array([0.0, *given])
+        self._given = np.array([0.0, creepage, lateral_creepage, spin])
 
     def with_wheel(self, wheel: ProfiledWheel) -> Self:
         """Return the same load with a wheel of another shape, or beside the place of this one.
@@ -142,20 +148,10 @@ class RollingPatch:
         other._set_wheel(wheel)
         return other
 
-    def with_load(
-        self,
-        *,
-        friction: float,
-        force: float,
-        drive: float | None = None,
-        lateral_force: float | None = None,
-        creepage: float = 0.0,
-        lateral_creepage: float = 0.0,
-        spin: float = 0.0,
-    ) -> Self:
-        """Return the same wheel with another load and friction; see the class."""
+    def with_load(self, **load: Any) -> Self:
+        """Return the same wheel with another load and friction, parameters as of the class."""
         other = copy(self)
-        other._set_load(friction, force, drive, lateral_force, (creepage, lateral_creepage, spin))
+        other._set_load(**load)
         return other
 
     def scaled(self, share: float) -> Self:

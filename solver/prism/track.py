@@ -180,14 +180,11 @@ class PrismTrack:
 
     def beneath(self, field: PrismField) -> Array:
         """Return the displacement (m,) of the zone's unknowns by a field, at x = 0 [mm]."""
-        forces = np.zeros((len(self._width), self.weights.shape[1]))
-        if field.traction is not None:
-            forces = self.on_rows(field.traction)
-        eigenstress = field.eigenstress
-        if eigenstress is None:
-            eigenstress = np.zeros((*self.weights.shape, 6))
-        moved = self.modes.at_station(self.before, eigenstress, forces)
-        return moved if self.far is None else moved + self.far.beneath @ self.far.resultants(forces)
+        forces = None if field.traction is None else self.on_rows(field.traction)
+        moved = self.modes.at_station(self.before, field.eigenstress, forces)
+        if self.far is not None and forces is not None:
+            moved += self.far.beneath @ self.far.resultants(forces)
+        return moved
 
     @cached_property
     def straight(self) -> StraightPrism:

@@ -133,8 +133,8 @@ def patch(run: FinishedRun) -> Values:
         )
         return np.asarray(at((X, Z)))
 
-    slip = np.where((contact.status != 0)[..., None], contact.slip / grid.spacing, np.nan)
-    closed = contact.status != 0
+    closed = contact.status != PatchStatus.OPEN
+    slip = np.where(closed[..., None], contact.slip / grid.spacing, np.nan)
     touched = grid.z[closed.any(axis=0)]
     force = contact.force
     return {

@@ -106,22 +106,6 @@ def traffic(run: FinishedRun) -> Values:
     }
 
 
-def axle(run: FinishedRun) -> Values:
-    """Return the height of the axle over that at which the undeformed bodies touch, and its slip.
-
-    The moment is that about the vertical through the running circle.
-    """
-    from solver.scenes.wheel_rail_contact import expected_contact
-
-    contact = cast("PatchContact", run.outcome.points[run.view.loaded].touching)
-    p = run.parameters.each_pass()[-1]
-    return {
-        AXLE_HEIGHT: contact.height + expected_contact(p).gap,
-        AXLE_LATERAL_CREEPAGE: contact.lateral_creepage,
-        SPIN_MOMENT: contact.spin_moment + p.lateral_position * float(contact.force[0]),
-    }
-
-
 def setup(parameters: WheelRailParameters) -> RailGeometry:
     """Return the geometry of the rail, which decides its set-up."""
     from solver.scenes.wheel_rail_track import geometry
@@ -130,12 +114,22 @@ def setup(parameters: WheelRailParameters) -> RailGeometry:
 
 
 def wheel(run: FinishedRun) -> Values:
-    """Return the profile of the undeformed wheel of the last pass as it touches the rail."""
+    """Return the wheel of the last pass: its profile as it touches the rail, height, and slip.
+
+    The height is that of the axle over the one at which the undeformed bodies touch; the moment is
+    that about the vertical through the running circle.
+    """
     from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
 
+    contact = cast("PatchContact", run.outcome.points[run.view.loaded].touching)
     p, z = run.parameters.each_pass()[-1], run.view.z
-    own = wheel_of(p)
-    return {WHEEL_SURFACE: own.surface(own.lowest(z), z) - expected_contact(p).gap}
+    own, gap = wheel_of(p), expected_contact(p).gap
+    return {
+        AXLE_HEIGHT: contact.height + gap,
+        AXLE_LATERAL_CREEPAGE: contact.lateral_creepage,
+        SPIN_MOMENT: contact.spin_moment + p.lateral_position * float(contact.force[0]),
+        WHEEL_SURFACE: own.surface(own.lowest(z), z) - gap,
+    }
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
@@ -156,17 +150,7 @@ WHEEL_RAIL = Scene(
     branch="passes",
     method=method,
     view=view,
-    outputs=(
-        maps,
-        profiles,
-        residual_extremes,
-        extremes,
-        patch,
-        section,
-        traffic,
-        axle,
-        wheel,
-    ),
+    outputs=(maps, profiles, residual_extremes, extremes, patch, section, traffic, wheel),
     costs=(cost,),
     effort=effort,
     setup=setup,

@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
+from solver.scenes.prism_outputs import PatchStatus
 from studies.views.plots.fields import Window, map_axes
 
-_STATUS, _OPEN, _STICK = "patch_status", 0, 1
+_STATUS = "patch_status"
 _SHEAR, _SLIP = "patch_shear", "patch_slip"
 _ARROWS = 16
 """Number of arrows over the side of a square as large as what is shown."""
@@ -30,7 +31,7 @@ def is_patch(values: xr.DataArray, run: xr.Dataset) -> bool:
 def within_patch(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
     """Return a map of the contact with a frame around it, and NaN where it is open."""
     across, up = map_axes(values)
-    closed = run[_STATUS] != _OPEN
+    closed = run[_STATUS] != PatchStatus.OPEN
     if not closed.any():
         return values
     part = closed.where(closed, drop=True)
@@ -46,7 +47,10 @@ def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
     """Draw the border of the contact, that of stick, and arrows of shear, or of slip over slip."""
     status = run[_STATUS]
     across, up = map_axes(status)
-    lines = [(status != _OPEN, "k", "edge of contact"), (status == _STICK, "b", "edge of stick")]
+    lines = [
+        (status != PatchStatus.OPEN, "k", "edge of contact"),
+        (status == PatchStatus.STICK, "b", "edge of stick"),
+    ]
     handles = []
     for inside, colour, name in lines:
         if inside.any() and not inside.all():
@@ -56,7 +60,7 @@ def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
             )  # fmt: skip
             handles.append(Line2D([], [], color=colour, linewidth=1.2, label=name))
     kind = _SLIP if field.startswith(_SLIP) else _SHEAR
-    arrows = [run[f"{kind}_{axis}"].where(status != _OPEN) for axis in (across, up)]
+    arrows = [run[f"{kind}_{axis}"].where(status != PatchStatus.OPEN) for axis in (across, up)]
     longest = float(np.sqrt(sum(each**2 for each in arrows)).max())
     if longest > 0.0:
         step = np.sqrt((window[1] - window[0]) * (window[3] - window[2])) / _ARROWS
