@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
-from solver.parameters import Fraction, Poisson, described
+from solver.parameters import Fraction, described
 from solver.scenes.material_parameters import MaterialParameters
-from solver.scenes.wheel_parameters import check_control, elasticity_of_wheel
+from solver.scenes.wheel_parameters import (
+    Control,
+    SamePoisson,
+    Stiffness,
+    Traction,
+    check_control,
+    elasticity_of_wheel,
+)
 
 _LOCKED = 1.0
 """Creepage of a wheel that does not turn."""
@@ -24,12 +31,12 @@ class PrismParameters(MaterialParameters):
 
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
     friction: Fraction = described(0.17, "Coulomb friction coefficient")
-    traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
+    traction: Traction = described(
         0.0,
         "ratio of the longitudinal force to that of full slip, friction times load: positive "
         "brakes, negative accelerates, 1 is a locked wheel",
     )
-    control: Literal["moment", "creepage"] = described(
+    control: Control = described(
         "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
     )
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
@@ -39,10 +46,10 @@ class PrismParameters(MaterialParameters):
         0.0,
         "velocity of the axle along z over that along x, as by skew; the yaw of a wheel adds to it",
     )
-    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
+    wheel_stiffness: Stiffness = described(
         1.0, "ratio of Young's modulus of the wheel to that of the body it rolls on"
     )
-    wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
+    wheel_poisson_ratio: SamePoisson = described(
         "same", "Poisson ratio of the wheel; same: that of the body it rolls on"
     )
 

@@ -14,6 +14,15 @@ from solver.materials.material import Material
 from solver.parameters import Friction, Length, Poisson, described
 from solver.scenes.material_parameters import ContactParameters
 
+Traction = Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")]
+"""Ratio of the longitudinal force to that of full slip: positive brakes, 1 is a locked wheel."""
+Control = Literal["moment", "creepage"]
+"""What turns a wheel."""
+Stiffness = Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")]
+"""Ratio of Young's modulus of a wheel to that of the body it rolls on."""
+SamePoisson = Annotated[Poisson | Literal["same"], Unit("1")]
+"""Poisson ratio of a wheel, or that of the body."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelParameters(ContactParameters):
@@ -27,12 +36,12 @@ class WheelParameters(ContactParameters):
         "ratio of the peak pressure of the elastic Hertz contact to the yield stress",
     )
     friction: Friction = described(0.3, "Coulomb friction coefficient")
-    traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
+    traction: Traction = described(
         0.0,
         "ratio of the longitudinal force to that of full slip: positive brakes, negative "
         "accelerates, 1 is a locked wheel",
     )
-    control: Literal["moment", "creepage"] = described(
+    control: Control = described(
         "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
     )
     given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
@@ -40,10 +49,10 @@ class WheelParameters(ContactParameters):
         "creepage 1 + R d(rotation) / d(advance) of a prescribed rotation: positive brakes",
     )
     radius: Length = described(334.92, "radius R of the wheel")
-    wheel_stiffness: Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")] = described(
+    wheel_stiffness: Stiffness = described(
         1.0, "ratio of Young's modulus of the wheel to that of the half-space"
     )
-    wheel_poisson_ratio: Annotated[Poisson | Literal["same"], Unit("1")] = described(
+    wheel_poisson_ratio: SamePoisson = described(
         "same", "Poisson ratio of the wheel; same: that of the half-space"
     )
     wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
