@@ -24,7 +24,7 @@ COARSE = {
         "accuracy": "draft", "hardening": "kinematic", "hardening_ratio": 0.0196, "friction": 0.3,
         "load": 110e3,
     },
-    "sweep": {"passes": [8], "traffic": {"equal": {}, "mixed": MIXED}},
+    "sweep": {"passes": [4], "traffic": {"equal": {}, "mixed": MIXED}},
 }  # fmt: skip
 
 
