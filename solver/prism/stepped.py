@@ -27,9 +27,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
+from solver.linear.krylov import gmres
 from solver.prism.friction_cone import OPEN
 from solver.prism.patch_contact import PatchContact
 from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
@@ -304,9 +304,7 @@ class SteppedPrism:
         def equation(change: Array) -> Array:
             return np.asarray(change - made(change).reshape(-1, 6)[soft].ravel())
 
-        own = residual[soft].ravel()
-        operator = LinearOperator((len(own), len(own)), matvec=equation, dtype=float)
-        change, _ = gmres(operator, own, rtol=_FORCING, restart=_KRYLOV, maxiter=1)
+        change, _ = gmres(equation, residual[soft].ravel(), _FORCING, _KRYLOV)
         return here.residual + made(change)
 
     def _check_rim(self, before: SteppedState, after: SteppedState) -> None:
