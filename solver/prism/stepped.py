@@ -262,7 +262,8 @@ class SteppedPrism:
 
     def _surface(self, eigenstress: Array, behind: int) -> Array:
         """Return the displacement (n, m, 3) of the grid under the load by an eigenstress [mm]."""
-        return self._track.on_grid(np.roll(self._modes.displacement(eigenstress), -behind, axis=1))
+        moved = self._modes.displacement(self._modes.nodal(eigenstress))
+        return self._track.on_grid(np.roll(moved, -behind, axis=1))
 
     def _strain(self, eigenstress: Array, traction: Array, behind: int) -> Array:
         """Return the strain (n, stations, 6) of an eigenstress, and of tractions of the load."""

@@ -210,7 +210,7 @@ def test_the_condensed_prism_is_the_whole_one(monkeypatch: pytest.MonkeyPatch) -
     assert found.strain == pytest.approx(exact.strain[condensed.points], abs=ROUNDING * size)
     size = np.abs(exact.displacement).max()
     assert found.displacement == pytest.approx(exact.displacement, abs=ROUNDING * size)
-    by_columns = condensed.displacement(eigenstress, forces)
+    by_columns = condensed.displacement(condensed.nodal(eigenstress) + condensed.pushed(forces))
     assert by_columns == pytest.approx(exact.displacement, abs=ROUNDING * size)
     monkeypatch.setenv("RESIDUA_LINEAR_SOLVER", "superlu")
     other = Modes(section, zone, 16.0, 8, surface=rows).solve(eigenstress, forces)
