@@ -21,19 +21,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
 
 from solver.errors import ModelError
-from solver.linear import solvers as linear
 from solver.prism.modes import superposed
+from solver.prism.sampled import sampled_answers
 from solver.prism.section import I_AXIS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from solver.prism.modes import Modes
-    from solver.prism.section import Section
 
     Array = NDArray[np.float64]
     Points = NDArray[np.bool_]
@@ -97,23 +95,25 @@ class FarField:
         waves = sorted(shares)
         self._k = 2 * np.pi / (modes.length * _RATIO**levels) * np.array(waves)
         every = forces if span is None else np.hstack([forces, section.mean_motions.T])
-        u, moved = _responses(section, every, self._k, modes.unknowns)
-
+        basis, found = sampled_answers(section, every, self._k)
+        self._basis = basis[modes.unknowns]
         n = len(size)
 
         def own(shares: dict[int, float]) -> _SectionLoad:
-            return _SectionLoad(u[..., :n], moved[..., :n], _listed(shares, waves), _ALONG[:n])
+            return _SectionLoad(found[..., :n], self._k, _listed(shares, waves), _ALONG[:n])
 
         self._sources = [_FarLoad(own(shares), 0.0, np.eye(n))]
         if span is not None:
             first, beyond = _level_of(modes.length, levels, span)
             shares = _shares(modes.length, levels, first)
-            ends = _SectionLoad(u[..., n:], moved[..., n:], _listed(shares, waves), _ALONG)
-            self._sources += _clamped(own(shares), ends, self._k, span / 2, beyond)
+            ends = _SectionLoad(found[..., n:], self._k, _listed(shares, waves), _ALONG)
+            moved = section.mean_motions @ basis
+            self._sources += _clamped(own(shares), ends, moved, span / 2, beyond)
         apart = np.asarray(modes.x - x, dtype=float)
-        self.displacement, self.strain = self._rows_at(apart), self.strain_at(apart)
+        self.displacement = self._summed(modes.rows, modes.along, apart)
+        self.strain = self.strain_at(apart)
         axis = modes.unknowns % 3 == I_AXIS
-        self.beneath = self._summed(lambda u: u, axis, np.zeros(1))[:, 0]
+        self.beneath = self._summed(sparse.eye_array(len(axis)), axis, np.zeros(1))[:, 0]
         only = _shares(modes.length * _RATIO ** (levels - 1), 1)
         self.last = self.strain_at(np.zeros(1), [_FarLoad(own(only), 0.0, np.eye(n))])
 
@@ -124,45 +124,58 @@ class FarField:
     def strain_at(self, apart: Array, sources: list[_FarLoad] | None = None) -> Array:
         """Return ``strain`` (n_points, n, 6, 4) at distances (n,) from the resultants along x."""
         modes = self._modes
-
-        def strain(u: Array) -> Array:
-            flat = u.reshape(len(u), -1)
-            return modes.B0 @ flat + modes.B1 @ (flat * np.repeat(self._k, u.shape[2]))
-
-        return modes.by_point(self._summed(strain, modes.carrying, apart, sources))
-
-    def _rows_at(self, apart: Array) -> Array:
-        """Return the displacement (n_rows, n, 4) at distances (n,) from the resultants along x."""
-        modes = self._modes
-        return self._summed(lambda u: modes.rows @ u.reshape(len(u), -1), modes.along, apart)
+        still = self._summed(modes.B0, modes.carrying, apart, sources)
+        waving = self._summed(modes.B1, modes.carrying, apart, sources, power=1)
+        return modes.by_point(still + waving)
 
     def _summed(
-        self, results: Callable[[Array], Array], carrying: Points, apart: Array,
-        sources: list[_FarLoad] | None = None,
+        self, operator: sparse.csr_array, carrying: Points, apart: Array,
+        sources: list[_FarLoad] | None = None, power: int = 0,
     ) -> Array:  # fmt: skip
-        """Return results (n_results, n, 4) at distances (n,), for amplitudes of the zone's u."""
-        out = np.zeros((len(carrying), len(apart), self._motions.shape[1]))
-        for source in self._sources if sources is None else sources:
-            load = source.load
-            each = results(load.u).reshape(len(carrying), *load.u.shape[1:])
-            phase = np.outer(self._k, apart - source.x)
-            made = superposed(each, phase, load.share, carrying, load.along)
-            out += made.swapaxes(1, 2) @ source.factors
-        return out
+        """Return results (n_results, n, 4) at distances (n,), of k^power times an operator.
+
+        ``carrying`` (n_results,) is whether a result carries i.
+        """
+        each = [
+            source.load.summed(apart - source.x, power) @ source.factors
+            for source in (self._sources if sources is None else sources)
+        ]
+        return _combined(operator @ self._basis, np.sum(each, axis=0), carrying)
+
+
+def _combined(directions: Array, sums: Array, carrying: Points) -> Array:
+    """Return results (n_results, n, q) from directions (n_results, r) and `_SectionLoad.summed`."""
+    out = np.empty((len(carrying), *sums.shape[2:]))
+    for flag in (False, True):
+        some = carrying == flag
+        out[some] = np.tensordot(directions[some], sums[int(flag)], 1)
+    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SectionLoad:
     """Unit loads (q,) at one place, and what they make.
 
-    ``u`` (m, waves, q) amplitudes of the zone, ``moved`` (6, waves, q) of the section in the mean,
-    ``share`` (waves,) of them, ``along`` (q,) whether a load carries i.
+    ``made`` (r, waves, q) shares of directions of the section in the answers, ``k`` (waves,) and
+    ``share`` (waves,) of the waves, ``along`` (q,) whether a load carries i.
     """
 
-    u: Array
-    moved: Array
+    made: Array
+    k: Array
     share: Array
     along: Points
+
+    def summed(self, apart: Array, power: int = 0) -> Array:
+        """Return the directions' shares (2, r, n, q) at distances (n,), times k^power.
+
+        They are those for results that do not carry i, and for results that do.
+        """
+        made, phase = self.made * self.k[:, None] ** power, np.outer(self.k, apart)
+        sums = [
+            superposed(made, phase, self.share, np.full(len(made), carrying), self.along)
+            for carrying in (False, True)
+        ]
+        return np.stack(sums).swapaxes(2, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,15 +188,17 @@ class _FarLoad:
 
 
 def _clamped(
-    own: _SectionLoad, ends: _SectionLoad, k: Array, half: float, beyond: float
+    own: _SectionLoad, ends: _SectionLoad, mean: Array, half: float, beyond: float
 ) -> list[_FarLoad]:
-    """Return the loads beyond both ends +-half with which the section does not move there."""
+    """Return the loads beyond both ends +-half with which the section does not move there.
+
+    ``mean`` (6, r) are the mean motions of the section by its directions.
+    """
     places, at = half * np.array([-1.0, 1.0]), (half + beyond) * np.array([-1.0, 1.0])
 
     def moved(load: _SectionLoad, apart: Array) -> Array:
         """Return mean motions (n, 6, q) at distances (n,) from the load."""
-        found = superposed(load.moved, np.outer(k, apart), load.share, ends.along, load.along)
-        return np.moveaxis(found, 2, 0)
+        return _combined(mean, load.summed(apart), ends.along).swapaxes(0, 1)
 
     by_load = moved(own, places).reshape(-1, len(own.along))
     apart = (places[:, None] - at).ravel()
@@ -228,20 +243,3 @@ def _shares(length: float, levels: int, first: int | None = None) -> dict[int, f
 def _listed(shares: dict[int, float], waves: list[int]) -> Array:
     """Return the shares (n,) of waves by number, 0 where there is none."""
     return np.array([shares.get(j, 0.0) for j in waves])
-
-
-def _responses(
-    section: Section, forces: Array, wavenumbers: Array, unknowns: NDArray[np.int64]
-) -> tuple[Array, Array]:
-    """Return amplitudes (m, waves, q) of some unknowns, and (6, waves, q) of the mean motions."""
-    whole = section.stiffness(section.free)
-    solver = linear.analyse(whole.pattern)
-    at = np.searchsorted(section.free, unknowns)
-    mean = section.mean_motions[:, section.free]
-    u = np.empty((len(at), len(wavenumbers), forces.shape[1]))
-    moved = np.empty((len(mean), *u.shape[1:]))
-    for wave, k in enumerate(wavenumbers):
-        solver.factorise(whole.at(k))
-        found = solver.solve(forces[section.free])
-        u[:, wave], moved[:, wave] = found[at], mean @ found
-    return u, moved

@@ -182,11 +182,13 @@ class Modes:
         forces : (n_rows, window) forces on the surface rows, per length along x [N/mm]
         """
         u = self.solved(self._nodal(eigenstress, forces))
+        rows = self.rows @ u.reshape(-1, len(self.unknowns)).T
+        return ZoneResponse(self.strain(u), self._rows_at_stations(rows))
+
+    def strain(self, u: Array) -> Array:
+        """Return the strain (n_points, window, 6) of amplitudes (waves, 2, m) of the zone."""
         flat = np.ascontiguousarray(u.reshape(-1, len(self.unknowns)).T)
-        strain = self.B0 @ flat + self.B1 @ (flat * self._twice_k)
-        return ZoneResponse(
-            self._strain_at_stations(strain), self._rows_at_stations(self.rows @ flat)
-        )
+        return self._strain_at_stations(self.B0 @ flat + self.B1 @ (flat * self._twice_k))
 
     def solved(self, nodal: Array) -> Array:
         """Return the amplitudes (waves, 2, m) of the zone for nodal forces of that shape [N/mm].
@@ -198,9 +200,13 @@ class Modes:
             u[wave] = self._factors.solve(right.T, wave).T
         return u
 
-    def displacement(self, eigenstress: Array | None = None, forces: Array | None = None) -> Array:
-        """Return the surface displacement (n_rows, window) as `solve` does, by `columns` [mm]."""
-        nodal = self._nodal(eigenstress, forces)
+    def displacement(self, nodal: Array) -> Array:
+        """Return the surface displacement (n_rows, window) by `columns` [mm].
+
+        Parameters
+        ----------
+        nodal : (waves, 2, m) nodal forces, as for `solved` [N/mm]
+        """
         amplitudes = np.matmul(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
@@ -248,15 +254,29 @@ class Modes:
         return superposed(amplitudes, phase, self._share, self.along, self.along)
 
     def _nodal(self, eigenstress: Array | None, forces: Array | None) -> Array:
-        """Return the nodal forces (waves, 2, m), real and imaginary [N/mm]."""
-        nodal = np.zeros((len(self.unknowns), len(self._twice_k)))
+        """Return the nodal forces (waves, 2, m), real and imaginary, of both [N/mm]."""
+        nodal = np.zeros((len(self.wavenumbers), 2, len(self.unknowns)))
         if eigenstress is not None:
-            s = self._amplitudes(eigenstress)
-            nodal += self._force0 @ s
-            nodal += (self._force1 @ s) * self._twice_k
+            nodal += self.nodal(eigenstress)
         if forces is not None:
-            nodal += self.rows.T @ self._of_rows(forces)
-        return nodal.T.reshape(len(self.wavenumbers), 2, -1)
+            nodal += self.pushed(forces)
+        return nodal
+
+    def nodal(self, eigenstress: Array) -> Array:
+        """Return the nodal forces (waves, 2, m) of an eigenstress (n_points, window, 6) [N/mm]."""
+        s = self._amplitudes(eigenstress)
+        nodal = self._force0 @ s
+        nodal += (self._force1 @ s) * self._twice_k
+        return self._by_wave(nodal)
+
+    def pushed(self, forces: Array) -> Array:
+        """Return the nodal forces (waves, 2, m) of forces (n_rows, window) on the rows [N/mm]."""
+        return self._by_wave(self.rows.T @ self._of_rows(forces))
+
+    def _by_wave(self, nodal: Array) -> Array:
+        """Return nodal forces (waves, 2, m) from (m, 2 waves)."""
+        each = nodal.T.reshape(len(self.wavenumbers), 2, -1)
+        return np.ascontiguousarray(each)
 
     def _amplitudes(self, stress: Array) -> Array:
         """Return the amplitudes (6 n_points, 2 waves) of a stress (n_points, window, 6)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from solver.steady.load import AppliedLoad
@@ -52,9 +52,9 @@ class PatchPassing:
         self._last = found = self._load.solve(moved, self._last)
 
         def along(change: PrismField) -> PrismField:
-            return replace(change, traction=found.along(change.displacement))
+            return change.loaded(found.along(change.displacement))
 
-        loaded = replace(u, traction=found.traction)
+        loaded = u.loaded(found.traction)
         return AppliedPatch(found.force, loaded, along, found, self._load)
 
     def scaled(self, share: float) -> PatchPassing:

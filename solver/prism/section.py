@@ -261,3 +261,14 @@ class Stiffness:
         """Return the values of K_k on the pattern [N/mm2]."""
         K0, K1, K2 = self._terms
         return np.asarray(K0 + k * (K1 + k * K2))
+
+    @property
+    def terms(self) -> list[sparse.csr_array]:
+        """The whole matrices K0, K1 and K2."""
+        return [_whole(self.pattern, each) for each in self._terms]
+
+
+def _whole(pattern: sparse.csr_array, data: Array) -> sparse.csr_array:
+    """Return a symmetric matrix from the values of its upper triangle."""
+    upper = sparse.csr_array((data, pattern.indices, pattern.indptr), shape=pattern.shape)
+    return sparse.csr_array(upper + sparse.triu(upper, 1).T)

@@ -27,9 +27,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
+from solver.linear.krylov import gmres
 from solver.prism.friction_cone import OPEN
 from solver.prism.patch_contact import PatchContact
 from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
@@ -262,7 +262,8 @@ class SteppedPrism:
 
     def _surface(self, eigenstress: Array, behind: int) -> Array:
         """Return the displacement (n, m, 3) of the grid under the load by an eigenstress [mm]."""
-        return self._track.on_grid(np.roll(self._modes.displacement(eigenstress), -behind, axis=1))
+        moved = self._modes.displacement(self._modes.nodal(eigenstress))
+        return self._track.on_grid(np.roll(moved, -behind, axis=1))
 
     def _strain(self, eigenstress: Array, traction: Array, behind: int) -> Array:
         """Return the strain (n, stations, 6) of an eigenstress, and of tractions of the load."""
@@ -304,9 +305,7 @@ class SteppedPrism:
         def equation(change: Array) -> Array:
             return np.asarray(change - made(change).reshape(-1, 6)[soft].ravel())
 
-        own = residual[soft].ravel()
-        operator = LinearOperator((len(own), len(own)), matvec=equation, dtype=float)
-        change, _ = gmres(operator, own, rtol=_FORCING, restart=_KRYLOV, maxiter=1)
+        change, _ = gmres(equation, residual[soft].ravel(), _FORCING, _KRYLOV)
         return here.residual + made(change)
 
     def _check_rim(self, before: SteppedState, after: SteppedState) -> None:

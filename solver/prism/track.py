@@ -9,7 +9,7 @@ is constant along x, the state before the pass, is no wave but the section's own
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -172,10 +172,14 @@ class PrismTrack:
         """Return the strain (n_points, window, 6) of a field, Mandel."""
         if field.eigenstress is None and field.traction is None:
             return np.zeros((*self.weights.shape, 6))
-        forces = None if field.traction is None else self.on_rows(field.traction)
-        strain = self.modes.solve(field.eigenstress, forces).strain
-        if self.far is not None and forces is not None:
-            strain += self.far.strain @ self.far.resultants(forces)
+        nodal = field.nodal
+        if field.traction is None:
+            return self.modes.strain(self.modes.solved(nodal))
+        forces = self.on_rows(field.traction)
+        strain = self.modes.strain(self.modes.solved(nodal + self.modes.pushed(forces)))
+        if self.far is not None:
+            far = self.far.strain.reshape(-1, 4) @ self.far.resultants(forces)
+            strain += far.reshape(strain.shape)
         return strain
 
     def beneath(self, field: PrismField) -> Array:
@@ -208,10 +212,6 @@ class PrismTrack:
     def near(self) -> slice:
         """The stations of the window at which the load may act."""
         return slice(self.before - self._near, self.before + self._near + 1)
-
-    def surface_displacement(self, eigenstress: Array) -> Array:
-        """Return the displacement (n, m, 3) of the grid by an eigenstress [mm]."""
-        return self.on_grid(self.modes.displacement(eigenstress))
 
     def on_grid(self, moved: Array) -> Array:
         """Return the displacement (n, m, 3) of the grid from that of the rows (n_rows, window)."""
@@ -254,11 +254,27 @@ class PrismField:
     traction: Array | None = None
 
     @cached_property
+    def nodal(self) -> Array:
+        """Nodal forces of the eigenstress, as of `Modes.nodal` [N/mm]."""
+        modes = self.prism.modes
+        if self.eigenstress is None:
+            return np.zeros((len(modes.wavenumbers), 2, len(modes.unknowns)))
+        return modes.nodal(self.eigenstress)
+
+    @cached_property
     def displacement(self) -> Array:
         """Displacement (n, m, 3) of the grid by the eigenstress alone [mm]."""
         if self.eigenstress is None:
             return np.zeros((self.prism.grid.stations, len(self.prism.grid.z), 3))
-        return self.prism.surface_displacement(self.eigenstress)
+        return self.prism.on_grid(self.prism.modes.displacement(self.nodal))
+
+    def loaded(self, traction: Array) -> PrismField:
+        """Return the field with tractions; what is known of the eigenstress is not made again."""
+        other = replace(self, traction=traction)
+        vars(other).update(
+            {name: value for name, value in vars(self).items() if name != "traction"}
+        )
+        return other
 
 
 def _fading(count: int) -> Array:

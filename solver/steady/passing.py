@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.errors import LimitLoad, NotConverged, WindowTooSmall
+from solver.linear.krylov import gmres
 from solver.steady.body import S
 from solver.steady.flow import usual_parts
 
@@ -196,11 +196,8 @@ def passing(
             made = track.strain(here.loading.along(track.solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())
 
-        n = here.residual.size
-        found, missed = gmres(
-            LinearOperator((n, n), matvec=newton, dtype=float),
-            (scale * here.residual).ravel(), rtol=_FORCING, restart=krylov, maxiter=1,
-        )  # fmt: skip
+        right = (scale * here.residual).ravel()
+        found, solved = gmres(newton, right, _FORCING, krylov)
         change = found.reshape(shape) / scale
 
         def moved(share: float, here: _At[S] = here, change: Array = change) -> _At[S]:
@@ -208,11 +205,11 @@ def passing(
 
         there = searched(moved, here.size)
         most_added = there.flow.most_added
-        stalled = krylov == _MOST_KRYLOV and missed and there.size > _STALLED * here.size
+        stalled = krylov == _MOST_KRYLOV and not solved and there.size > _STALLED * here.size
         unsolved = here.size > _FAR_FROM * start
         if most_added > _RUNS or (stalled and unsolved and most_added > _FLOWS):
             raise _diverged(material, most_added)
-        if missed:
+        if not solved:
             krylov = min(2 * krylov, _MOST_KRYLOV)
         here = there
         sizes.append(here.size)

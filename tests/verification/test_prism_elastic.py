@@ -16,6 +16,7 @@ from solver.materials.elasticity import Elasticity
 from solver.mesh import graded, grid, mapped
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.prism import FarField, Modes, Section
+from solver.prism.sampled import sampled_answers
 from solver.tensors import SQRT2
 from tests.verification.closed_forms import HertzEllipse
 
@@ -209,7 +210,7 @@ def test_the_condensed_prism_is_the_whole_one(monkeypatch: pytest.MonkeyPatch) -
     assert found.strain == pytest.approx(exact.strain[condensed.points], abs=ROUNDING * size)
     size = np.abs(exact.displacement).max()
     assert found.displacement == pytest.approx(exact.displacement, abs=ROUNDING * size)
-    by_columns = condensed.displacement(eigenstress, forces)
+    by_columns = condensed.displacement(condensed.nodal(eigenstress) + condensed.pushed(forces))
     assert by_columns == pytest.approx(exact.displacement, abs=ROUNDING * size)
     monkeypatch.setenv("RESIDUA_LINEAR_SOLVER", "superlu")
     other = Modes(section, zone, 16.0, 8, surface=rows).solve(eigenstress, forces)
@@ -427,6 +428,21 @@ def test_a_bar_on_springs_is_the_endless_beam(length: float) -> None:
     assert stress[some] == pytest.approx(bending[some], abs=0.003 * bending.max())
     if length == 512.0:
         assert -near.displacement[middle, some].min() > 3 * beam.max()
+
+
+def test_answers_at_a_few_wavenumbers_tell_those_at_all() -> None:
+    """The longest waves bend the bar on its springs, the shortest ones end within the section."""
+    section, _ = rail()
+    forces = np.zeros((section.n, 2))
+    forces[3 * on_top(section, 15.0) + 1, 0] = 1.0
+    forces[3 * on_top(section, 5.0), 1] = 1.0
+    k = -np.append(0.0, np.geomspace(1e-5, 0.6, 120))
+    basis, shares = sampled_answers(section, forces, k)
+    assert basis.shape[1] < 4 * 30
+    for wave in (0, 1, 60, 75, 90, 105, 119, 120):
+        exact = np.linalg.solve(full(section, k[wave]), forces)
+        off = np.abs(basis @ shares[:, wave] - exact).max(axis=0)
+        assert (off < 1e-6 * np.abs(exact).max(axis=0)).all()
 
 
 def sunk_and_bent(span: float, foundation: float, force: float) -> Array:
