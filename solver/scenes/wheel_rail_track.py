@@ -17,7 +17,8 @@ from solver.materials import Elasticity
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
-from solver.scenes.initial_stress import stressed
+from solver.prism.straight import check_elastic
+from solver.scenes.initial_stress import settled
 from solver.scenes.prism_window import PrismWindow, whole
 from solver.scenes.wheel_rail_contact import (
     canted,
@@ -31,6 +32,7 @@ from solver.scenes.wheel_rail_contact import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.prism.straight import SettledStress
     from solver.prism.track import PrismTrack
     from solver.scenes.initial_stress import SectionStress
     from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
@@ -195,12 +197,35 @@ def section_of(own: RailGeometry) -> Section:
 
 
 def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
-    """Return the section of a run, or raise `ModelError` for ``lateral_position``."""
+    """Return the section of a run.
+
+    Raises
+    ------
+    ModelError
+        for ``lateral_position``, or for a stress at which the rail yields before the first pass
+    """
     try:
-        return section_of(own)
+        section = section_of(own)
     except ModelError as error:
         allowed = f"leaves no room for the zone of small elements in the head: {error}"
         raise ModelError("lateral_position", _places(parameters), allowed) from None
+    p = parameters
+    initial = settled_in(own, p.rail_stress, p.thermal_strain)
+    if initial is not None:
+        try:
+            check_elastic(p.material(), initial.strain, section.points.reshape(2, -1))
+        except ModelError as error:
+            allowed = f"makes {error.value}, which {error.allowed}"
+            raise ModelError(p.stressed_by, getattr(p, p.stressed_by), allowed) from None
+    return section
+
+
+@lru_cache(maxsize=4)
+def settled_in(
+    own: RailGeometry, rail: SectionStress, thermal_strain: float
+) -> SettledStress | None:
+    """Return the stress of a rail before the first pass in equilibrium, None without."""
+    return settled(section_of(own), rail, thermal_strain)
 
 
 @lru_cache(maxsize=2)
@@ -221,7 +246,8 @@ def track_of(
 @lru_cache(maxsize=2)
 def stressed_track(own: RailGeometry, rail: SectionStress, thermal_strain: float) -> PrismTrack:
     """Return the rail with its stress before the first pass."""
-    return stressed(track_of(own), rail, thermal_strain)
+    track, initial = track_of(own), settled_in(own, rail, thermal_strain)
+    return track if initial is None else track.stressed(initial)
 
 
 class RolledRail:
