@@ -101,6 +101,12 @@ class WheelRailParameters(PrismParameters):
         "modulus of the foundation: force per length of the rail and displacement, along x, y and "
         "z",
     )
+    span: Annotated[
+        Annotated[float, Interval(ge=600.0, le=1e5)] | Literal["endless"], Unit("mm")
+    ] = described(
+        "endless",
+        "length of a rail whose ends neither move nor turn, the wheel in its middle; or endless",
+    )
     initial_stress: str = described(
         "none", "stress of the rail before the first pass; it is brought to equilibrium"
     )

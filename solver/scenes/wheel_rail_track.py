@@ -64,6 +64,8 @@ class RailGeometry:
     Attributes
     ----------
     profile, cant, foundation : of the rail
+    span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
+        endless
     elasticity : Young's modulus and Poisson ratio of the rail
     at, half_width, depth, size : of the zone [mm]
     spacing, reach : distance of stations; half the length where the load may act [mm]
@@ -72,6 +74,7 @@ class RailGeometry:
     profile: str | Points
     cant: float
     foundation: float
+    span: float | None
     elasticity: tuple[float, float]
     at: float
     half_width: float
@@ -139,6 +142,7 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         profile=p.rail_profile,
         cant=p.cant,
         foundation=p.foundation,
+        span=None if p.span == "endless" else float(p.span),
         elasticity=(p.youngs_modulus, p.poisson_ratio),
         at=at,
         half_width=half_width,
@@ -229,18 +233,14 @@ def settled_in(
 
 
 @lru_cache(maxsize=2)
-def track_of(
-    own: RailGeometry, length: float | None = None, span: float | None = None
-) -> PrismTrack:
+def track_of(own: RailGeometry, length: float | None = None) -> PrismTrack:
     """Return the rail, set up once in a process for each geometry.
 
     Parameters
     ----------
     length : after which waves repeat [mm]; by default long enough for a pass
-    span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
-        endless
     """
-    return own.window.track(section_of(own), _LEVELS, length=length, span=span)
+    return own.window.track(section_of(own), _LEVELS, length=length, span=own.span)
 
 
 @lru_cache(maxsize=2)
