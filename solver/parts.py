@@ -128,9 +128,12 @@ class Parts(Generic[T]):
         """Return the names of the parameters of a part."""
         return frozenset(declared(self[word]))
 
-    def unused(self, word: str) -> frozenset[str]:
-        """Return the names of the parameters that only other parts have."""
-        return frozenset(self.parameters()) - self.used(word)
+    def needs(self) -> dict[str, dict[str, tuple[str, ...]]]:
+        """Return what each parameter needs to have an effect: ``kind`` with a word that uses it."""
+        return {
+            name: {self.kind: tuple(word for word in self if name in self.used(word))}
+            for name in self.parameters()
+        }
 
     def made(self, word: str, values: Any) -> T:
         """Return the part of a word with its parameters, attributes of ``values``."""

@@ -356,8 +356,12 @@ class RollingPatch:
         if carried >= 1:
             return
         if self.lateral_force is not None:
-            much = f"the wheel slides off: all of its contact slips at {carried:.2%} of the force"
-            raise LimitLoad(much, carried, 1.0)
+            lateral = float(np.tensordot(self._sums[2], found.values, 3))
+            much = f"with all of its contact slipping the lateral force is {lateral:.0f} N"
+            much += (
+                f", not {self.lateral_force:.0f}: give one that a wheel at this position can have"
+            )
+            raise LimitLoad(f"the wheel slides off: {much}", carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
         raise Spins(much, carried, 1.0)
 

@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.linear.solvers import analyse
 from solver.tensors import SQRT2, to_tensor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.materials.law import Law
     from solver.prism.section import Section
 
     Array = NDArray[np.float64]
@@ -100,6 +102,26 @@ class StraightPrism:
         """Return a stress (n, 6) brought to equilibrium in a prism that stays straight [MPa]."""
         made = self.strain(self.displacement(-stress))
         return stress + made @ self._section.elasticity.stiffness(6)
+
+
+def check_elastic(law: Law, strain: Array, points: Array) -> None:
+    """Raise `ModelError` for an initial stress at which a material yields.
+
+    Parameters
+    ----------
+    strain : (n, 6) elastic strain, Mandel
+    points : (2, n) positions z, y [mm]
+    """
+    virgin = law.initial(len(strain), 6)
+    beyond = law.yield_value(law.stiffness(6) @ strain.T, virgin)
+    most = int(beyond.argmax())
+    if beyond[most] > 0:
+        strength = float(law.flow_stress(virgin)[most])
+        z, y = points[:, most]
+        raise ModelError(
+            "initial_stress", f"{strength + beyond[most]:.4g} MPa at z = {z:.3g}, y = {y:.3g} mm",
+            f"must be below the yield stress of {strength:.4g} MPa before the first pass",
+        )  # fmt: skip
 
 
 def straight_motions(points: Array) -> Array:

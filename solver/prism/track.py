@@ -20,7 +20,7 @@ from solver.prism.far_field import FarField
 from solver.prism.flow import PrismFlow
 from solver.prism.modes import Modes
 from solver.prism.state import PrismState
-from solver.prism.straight import StraightPrism
+from solver.prism.straight import StraightPrism, check_elastic
 from solver.prism.surface import RunningSurface
 
 if TYPE_CHECKING:
@@ -114,15 +114,14 @@ class PrismTrack:
         """Positions (2, n_points) of the rows of points in the section: z, y [mm]."""
         return self.section.points.reshape(2, -1)[:, self.modes.points]
 
-    def stressed(self, given: Array, held: Array) -> PrismTrack:
+    def stressed(self, initial: SettledStress) -> PrismTrack:
         """Return the same prism, its set-up shared, with an initial stress.
 
-        Displacements count from the section with this stress. For arguments see
-        `StraightPrism.settled`.
+        Displacements count from the section with this stress.
         """
         _ = self.compliance  # computed once for both
         other = copy(self)
-        other.initial = self.straight.settled(given, held)
+        other.initial = initial
         return other
 
     @property
@@ -140,11 +139,7 @@ class PrismTrack:
             for an initial stress that is beyond the yield stress in the zone
         """
         virgin = self._virgin(law)
-        stress = law.stiffness(6) @ virgin.strain.T
-        beyond = float(law.yield_value(stress, virgin.state).max())
-        if beyond > 0:
-            allowed = f"must not yield: in equilibrium it is {beyond:.4g} MPa beyond yield"
-            raise ModelError("initial_stress", "this field", allowed)
+        check_elastic(law, virgin.strain, self.points)
         return virgin
 
     def _virgin(self, law: Law) -> PrismState:

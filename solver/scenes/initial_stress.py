@@ -17,7 +17,8 @@ from solver.tensors import to_mandel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.prism.track import PrismTrack
+    from solver.prism.section import Section
+    from solver.prism.straight import SettledStress
 
     Array = NDArray[np.float64]
 
@@ -109,15 +110,16 @@ class OverHeight(SectionStress):
         return stress
 
 
-def stressed(track: PrismTrack, of: SectionStress, thermal_strain: float) -> PrismTrack:
-    """Return a prism with a stress in it, and with that of a thermal strain that is held along x.
+def settled(section: Section, of: SectionStress, thermal_strain: float) -> SettledStress | None:
+    """Return a stress and that of a thermal strain that is held along x, in equilibrium.
 
-    The same prism if there is neither.
+    None if there is neither.
     """
+    from solver.prism.straight import StraightPrism  # loads scipy
+
     if isinstance(of, NoStress) and thermal_strain == 0.0:
-        return track
-    section = track.section
+        return None
     given = to_mandel(of.stress(section.points.reshape(2, -1), section.weights.ravel()))
     expanded = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * thermal_strain
-    held = np.tile(track.elasticity.stiffness(6) @ -expanded, (given.shape[1], 1))
-    return track.stressed(given.T, held)
+    held = np.tile(section.elasticity.stiffness(6) @ -expanded, (given.shape[1], 1))
+    return StraightPrism(section).settled(given.T, held)

@@ -41,12 +41,6 @@ class YieldParameters:
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
 
-    @property
-    def idle(self) -> Mapping[str, str]:
-        """Parameters without effect, each with the parameter whose word has no use for it."""
-        each = ((parts, getattr(self, parts.kind)) for parts in self.PARTS)
-        return {name: parts.kind for parts, word in each for name in parts.unused(word)}
-
     def usual(self) -> Mapping[str, float]:
         """Return the values of the parameters that ``accuracy`` sets."""
         return {}

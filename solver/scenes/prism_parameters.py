@@ -10,7 +10,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
-from solver.parameters import Fraction, described
+from solver.parameters import Fraction, Other, described
 from solver.scenes.material_parameters import MaterialParameters
 from solver.scenes.wheel_parameters import (
     Control,
@@ -40,11 +40,14 @@ class PrismParameters(MaterialParameters):
         "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
     )
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
-        0.0, "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V"
+        0.0,
+        "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V",
+        needs={"friction": Other(0.0)},
     )
     lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
         "velocity of the axle along z over that along x, as by skew; the yaw of a wheel adds to it",
+        needs={"friction": Other(0.0)},
     )
     wheel_stiffness: Stiffness = described(
         1.0, "ratio of Young's modulus of the wheel to that of the body it rolls on"

@@ -104,12 +104,13 @@ def by_passes(
             try:
                 path = _Path(scene, prism, reach)
             except ModelError:
-                break  # a zone of this size does not fit: keep the error of the smaller one
+                break  # a zone of this size does not fit
         for run in path.runs(remaining, monitor):
             remaining.pop(0)
             yield run
         if not isinstance(path.error, WindowTooSmall):
             break
+    path.tell_size()
     yield from map(path.finished, remaining)
 
 
@@ -150,6 +151,13 @@ class _Path:
                     self._elsewhere += time.process_time() - paused
         except NotConverged as failure:
             self.error = failure
+
+    def tell_size(self) -> None:
+        """Add the size of the zone to an error that it is too small: no larger one is tried."""
+        if isinstance(self.error, WindowTooSmall):
+            z, y = self._track.points
+            size = f"{np.ptp(z):.3g} mm wide and {np.ptp(y):.3g} mm deep"
+            self.error = WindowTooSmall(f"{self.error}, in the largest zone, {size}")
 
     def _roll(self) -> None:
         """Compute the next pass.

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.parameters import Fraction, Length, Ratio, Stress, described
+from solver.parameters import Fraction, Length, Other, Ratio, Stress, described
 from solver.scenes.hertz_ellipse import MOST_LONG, HertzEllipse
 from solver.scenes.prism_parameters import PrismParameters
 
@@ -41,12 +41,18 @@ class RacewayParameters(PrismParameters):
         "load_ratio", "the parameter that gives the load"
     )
     load_ratio: Ratio = described(
-        2.5, "ratio of the peak pressure p0 of the elastic Hertz contact to the yield stress"
+        2.5,
+        "ratio of the peak pressure p0 of the elastic Hertz contact to the yield stress",
+        needs={"load_by": ("load_ratio",)},
     )
     force: Annotated[float, Interval(gt=0.0, le=1e9), Unit("N")] = described(
-        2000.0, "vertical force on the ball or roller"
+        2000.0, "vertical force on the ball or roller", needs={"load_by": ("force",)}
     )
-    friction: Fraction = described(0.1, "Coulomb friction coefficient")
+    friction: Fraction = described(
+        0.1,
+        "Coulomb friction coefficient",
+        needs={"load": ("contact",), "traction": Other(0.0)},
+    )
     radius: Length = described(
         10.0, "radius R of the ball or roller in the plane of rolling; the raceway is straight"
     )
@@ -85,13 +91,6 @@ class RacewayParameters(PrismParameters):
             if axis > most:
                 allowed = f"must make a semi-axis {way} of at most {most:.4g} mm, here {axis:.4g}"
                 raise ModelError(self.load_by, getattr(self, self.load_by), allowed)
-
-    @property
-    def idle(self) -> Mapping[str, str]:
-        """Parameters without effect, each with the parameter whose word has no use for it."""
-        unused = "force" if self.load_by == "load_ratio" else "load_ratio"
-        own = PrismParameters.idle.fget(self)  # type: ignore[attr-defined]
-        return {**own, unused: "load_by"}
 
     @property
     def across(self) -> float:

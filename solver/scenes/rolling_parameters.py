@@ -12,7 +12,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import MOST_COLUMNS, window_elements
-from solver.parameters import Accuracy, by_accuracy, described
+from solver.parameters import Accuracy, Other, by_accuracy, described
 from solver.scenes.schedule import Schedule
 from solver.scenes.sequence import block_of
 from solver.scenes.wheel_parameters import WheelParameters
@@ -88,7 +88,8 @@ class RollingParameters(WheelParameters):
         "ratio of neighbouring element sides in depth"
     )
     advance_step: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = by_accuracy(
-        "advance of the axle in an increment, on a track of given length"
+        "advance of the axle in an increment, on a track of given length",
+        needs={"track": Other(ENDLESS)},
     )
     advance_tolerance: Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")] = described(
         0.0,

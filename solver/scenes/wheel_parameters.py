@@ -11,7 +11,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.materials.material import Material
-from solver.parameters import Friction, Length, Poisson, described
+from solver.parameters import Friction, Length, Other, Poisson, described
 from solver.scenes.material_parameters import ContactParameters
 
 Traction = Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")]
@@ -35,7 +35,11 @@ class WheelParameters(ContactParameters):
         1360.0 / 502.0,
         "ratio of the peak pressure of the elastic Hertz contact to the yield stress",
     )
-    friction: Friction = described(0.3, "Coulomb friction coefficient")
+    friction: Friction = described(
+        0.3,
+        "Coulomb friction coefficient",
+        needs={"load": ("contact",), "traction": Other(0.0)},
+    )
     traction: Traction = described(
         0.0,
         "ratio of the longitudinal force to that of full slip: positive brakes, negative "
@@ -56,7 +60,9 @@ class WheelParameters(ContactParameters):
         "same", "Poisson ratio of the wheel; same: that of the half-space"
     )
     wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
-        0.0, "angle by which the wheel is turned before it is set down"
+        0.0,
+        "angle by which the wheel is turned before it is set down",
+        needs={"load": ("contact",)},
     )
 
     def __post_init__(self) -> None:

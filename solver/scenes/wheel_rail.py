@@ -156,6 +156,7 @@ WHEEL_RAIL = Scene(
     setup=setup,
     advice={
         Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
-        Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy or position",
+        Status.NOT_CONVERGED: "choose a finer accuracy, above all at the gauge corner, or another "
+        "position; or lower load or traction",
     },
 )

@@ -11,7 +11,8 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.mesh.points import as_points
-from solver.parameters import Stress, described
+from solver.parameters import Other, Stress, described
+from solver.parts import declared
 from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
 from solver.scenes.prism_parameters import PrismParameters
 from solver.scenes.sequence import block_of
@@ -66,6 +67,7 @@ class WheelRailParameters(PrismParameters):
         0.0,
         "rotation of the wheel about the downward vertical over its velocity, beside the spin that "
         "the slope of the contact makes",
+        needs={"friction": Other(0.0)},
     )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
         -4.0,
@@ -89,15 +91,21 @@ class WheelRailParameters(PrismParameters):
         "points [z, y] in mm, z from the running circle and increasing to the outside of the track",
     )
     wheel_slope: Annotated[float, Interval(ge=-0.2, le=0.2), Unit("1")] = described(
-        0.05, "slope dy/dz of the profile of a conical wheel"
+        0.05, "slope dy/dz of the profile of a conical wheel", needs={"wheel_profile": ("conical",)}
     )
     crown_radius: Annotated[float, Interval(ge=50.0, le=1e5), Unit("mm")] = described(
-        300.0, "radius across the wheel of a crowned one"
+        300.0, "radius across the wheel of a crowned one", needs={"wheel_profile": ("crowned",)}
     )
     foundation: Annotated[float, Interval(ge=0.1, le=1e4), Unit("MPa")] = described(
         21.0,
         "modulus of the foundation: force per length of the rail and displacement, along x, y and "
         "z",
+    )
+    span: Annotated[
+        Annotated[float, Interval(ge=600.0, le=1e5)] | Literal["endless"], Unit("mm")
+    ] = described(
+        "endless",
+        "length of a rail whose ends neither move nor turn, the wheel in its middle; or endless",
     )
     initial_stress: str = described(
         "none", "stress of the rail before the first pass; it is brought to equilibrium"
@@ -107,7 +115,9 @@ class WheelRailParameters(PrismParameters):
         "temperature of the rail above its neutral temperature; the welded rail keeps its length",
     )
     expansion: Annotated[float, Interval(ge=0.0, le=1e-3), Unit("1/K")] = described(
-        1.15e-5, "coefficient of linear thermal expansion of the rail"
+        1.15e-5,
+        "coefficient of linear thermal expansion of the rail",
+        needs={"temperature_change": Other(0.0)},
     )
     sequence: tuple[Mapping[str, float | str | Points], ...] = described(
         (),
@@ -126,7 +136,9 @@ class WheelRailParameters(PrismParameters):
         0.0, "standard deviation of the tractions of random passes"
     )
     seed: Annotated[int, Interval(ge=0, le=2**32 - 1)] = described(
-        0, "seed of random passes: another one draws other passes"
+        0,
+        "seed of random passes: another one draws other passes",
+        needs=dict.fromkeys(_SPREADS, Other(0.0)),
     )
 
     def __post_init__(self) -> None:
@@ -148,6 +160,12 @@ class WheelRailParameters(PrismParameters):
     def rail_stress(self) -> SectionStress:
         """The stress before the first pass, without that of temperature."""
         return INITIAL_STRESS.made(self.initial_stress, self)
+
+    @property
+    def stressed_by(self) -> str:
+        """The parameter that a stress before the first pass is blamed on."""
+        own = next(iter(declared(INITIAL_STRESS[self.initial_stress])), "initial_stress")
+        return "temperature_change" if self.initial_stress == "none" else own
 
     @property
     def thermal_strain(self) -> float:
@@ -178,18 +196,6 @@ class WheelRailParameters(PrismParameters):
         if self.lateral_control == "force" and not self.friction:
             allowed = "must be creepage without friction"
             raise ModelError("lateral_control", self.lateral_control, allowed)
-
-    @property
-    def idle(self) -> Mapping[str, str]:
-        """Parameters without effect, each with the parameter whose word has no use for it."""
-        own = {"conical": "wheel_slope", "crowned": "crown_radius"}
-        profiles = {each.wheel_profile for each in self.block}
-        unused = {name: "wheel_profile" for word, name in own.items() if word not in profiles}
-        if not self.scattered:
-            unused["seed"] = "load_spread"
-        if not self.temperature_change:
-            unused["expansion"] = "temperature_change"
-        return {**PrismParameters.idle.fget(self), **unused}  # type: ignore[attr-defined]
 
     @property
     def scattered(self) -> bool:

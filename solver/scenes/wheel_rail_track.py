@@ -17,7 +17,8 @@ from solver.materials import Elasticity
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
-from solver.scenes.initial_stress import stressed
+from solver.prism.straight import check_elastic
+from solver.scenes.initial_stress import settled
 from solver.scenes.prism_window import PrismWindow, whole
 from solver.scenes.wheel_rail_contact import (
     canted,
@@ -31,6 +32,7 @@ from solver.scenes.wheel_rail_contact import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.prism.straight import SettledStress
     from solver.prism.track import PrismTrack
     from solver.scenes.initial_stress import SectionStress
     from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
@@ -62,6 +64,8 @@ class RailGeometry:
     Attributes
     ----------
     profile, cant, foundation : of the rail
+    span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
+        endless
     elasticity : Young's modulus and Poisson ratio of the rail
     at, half_width, depth, size : of the zone [mm]
     spacing, reach : distance of stations; half the length where the load may act [mm]
@@ -70,6 +74,7 @@ class RailGeometry:
     profile: str | Points
     cant: float
     foundation: float
+    span: float | None
     elasticity: tuple[float, float]
     at: float
     half_width: float
@@ -137,6 +142,7 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         profile=p.rail_profile,
         cant=p.cant,
         foundation=p.foundation,
+        span=None if p.span == "endless" else float(p.span),
         elasticity=(p.youngs_modulus, p.poisson_ratio),
         at=at,
         half_width=half_width,
@@ -195,33 +201,53 @@ def section_of(own: RailGeometry) -> Section:
 
 
 def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
-    """Return the section of a run, or raise `ModelError` for ``lateral_position``."""
+    """Return the section of a run.
+
+    Raises
+    ------
+    ModelError
+        for ``lateral_position``, or for a stress at which the rail yields before the first pass
+    """
     try:
-        return section_of(own)
+        section = section_of(own)
     except ModelError as error:
         allowed = f"leaves no room for the zone of small elements in the head: {error}"
         raise ModelError("lateral_position", _places(parameters), allowed) from None
+    p = parameters
+    initial = settled_in(own, p.rail_stress, p.thermal_strain)
+    if initial is not None:
+        try:
+            check_elastic(p.material(), initial.strain, section.points.reshape(2, -1))
+        except ModelError as error:
+            allowed = f"makes {error.value}, which {error.allowed}"
+            raise ModelError(p.stressed_by, getattr(p, p.stressed_by), allowed) from None
+    return section
+
+
+@lru_cache(maxsize=4)
+def settled_in(
+    own: RailGeometry, rail: SectionStress, thermal_strain: float
+) -> SettledStress | None:
+    """Return the stress of a rail before the first pass in equilibrium, None without."""
+    return settled(section_of(own), rail, thermal_strain)
 
 
 @lru_cache(maxsize=2)
-def track_of(
-    own: RailGeometry, length: float | None = None, span: float | None = None
-) -> PrismTrack:
+def track_of(own: RailGeometry, length: float | None = None) -> PrismTrack:
     """Return the rail, set up once in a process for each geometry.
 
     Parameters
     ----------
     length : after which waves repeat [mm]; by default long enough for a pass
-    span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
-        endless
     """
-    return own.window.track(section_of(own), _LEVELS, length=length, span=span)
+    return own.window.track(section_of(own), _LEVELS, length=length, span=own.span)
 
 
 @lru_cache(maxsize=2)
 def stressed_track(own: RailGeometry, rail: SectionStress, thermal_strain: float) -> PrismTrack:
     """Return the rail with its stress before the first pass."""
-    return stressed(track_of(own), rail, thermal_strain)
+    track, initial = track_of(own), settled_in(own, rail, thermal_strain)
+    return track if initial is None else track.stressed(initial)
 
 
 class RolledRail:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from solver.errors import ModelError
+from solver.parameters import unmet
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import Namer, Places, written
@@ -64,7 +65,7 @@ class Expansion:
     """
 
     def __init__(self, scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> None:
-        self._scene, self._axes = scene, axes
+        self._scene, self._fixed, self._axes = scene, fixed, axes
         known = parameters_of(scene)
         self._values = {name: parameter.default for name, parameter in known.items()}
         self._values |= fixed
@@ -84,19 +85,43 @@ class Expansion:
         Raises
         ------
         StudyError
-            if the scene refuses a combination of parameters, or a swept parameter has no effect
+            if the scene refuses a combination of parameters, or one that is given has no effect
         """
-        idle = {name for name, axis in self._axes.items() if not isinstance(axis, dict)}
-        idle = {name for name in idle if len(self._axes[name]) > 1}
+        given = self._given()
+        idle = dict.fromkeys(given, "")
         for index in self._indices():
             try:
-                found = getattr(self._parameters(index), "idle", {})
+                parameters = self._parameters(index)
             except ModelError as error:
                 raise self.located(error, index) from error
-            idle &= found.keys()
-        for name in idle:
-            allowed = f"changes nothing in any run of this study: choose another {found[name]}"
-            raise StudyError(f"sweep.{name}", self._axes[name], allowed)
+            idle = {name: needs for name in idle if (needs := unmet(parameters, name))}
+        for name, needs in idle.items():
+            raise StudyError(*given[name], f"changes nothing in any run of this study: {needs}")
+
+    def _given(self) -> dict[str, tuple[str, Any]]:
+        """Return the field and the value of each parameter that is given.
+
+        The default is not given, and nor is one zero: it says that something is absent. Of a linked
+        axis it is the first value given.
+        """
+        known = parameters_of(self._scene)
+        found: dict[str, tuple[str, Any]] = {}
+
+        def add(name: str, field: str, value: Any, told: Any) -> None:
+            if value and value != known[name].default:
+                found.setdefault(name, (field, told))
+
+        for name, value in self._fixed.items():
+            add(name, f"parameters.{name}", value, value)
+        for axis, values in self._axes.items():
+            if isinstance(values, dict):
+                for label, settings in values.items():
+                    for name, value in settings.items():
+                        add(name, f"sweep.{axis}.{label}.{name}", value, value)
+            else:
+                for value in values:
+                    add(axis, f"sweep.{axis}", value, values)
+        return found
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, the last axis running fastest."""

@@ -262,12 +262,6 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
     def reduced(self: Any) -> tuple[Any, ...]:
         return _rebuilt, (description, _values(self))
 
-    def idle(self: Any) -> Mapping[str, str]:
-        """Parameters without effect, each with the parameter whose word has no use for it."""
-        every = [parts for parts in ContactParameters.PARTS if parts.kind in names]
-        unused = {name: p.kind for p in every for name in p.unused(getattr(self, p.kind))}
-        return {name: kind for name, kind in unused.items() if name in description.opened}
-
     own: dict[str, tuple[Any, Any]] = {
         name: (
             _annotated_type(each),
@@ -277,8 +271,9 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
         )
         for name, each in declared.items()
     }
+    needs = {name: each for p in ContactParameters.PARTS for name, each in p.needs().items()}
     opened = {
-        name: (hint, described(item.default, item.metadata["description"]))
+        name: (hint, described(item.default, item.metadata["description"], needs=needs.get(name)))
         for name, (hint, item) in description.opened.items()
     }
     first = [name for name in (ACCURACY,) if name in own]
@@ -295,7 +290,6 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
             "__post_init__": checked,
             "__reduce__": reduced,
             "__module__": __name__,
-            "idle": property(idle),
         },
     )
 

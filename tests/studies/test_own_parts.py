@@ -126,13 +126,14 @@ def test_a_yield_surface_of_ones_own_is_swept_in_a_scene_file(tmp_path: Path) ->
 
 SURFACE = """
 from solver import SCENES, ModelError
+from solver.parameters import unmet
 from solver.scenes.punch import PunchParameters
 from solver.scenes.rolling_parameters import RollingParameters
 from studies import Study
 
 print(type(PunchParameters(yield_condition="hosford").material()).__name__)
-print(PunchParameters().idle["hosford_exponent"])
-print("hosford_exponent" in PunchParameters(yield_condition="hosford").idle)
+print(unmet(PunchParameters(), "hosford_exponent"))
+print(bool(unmet(PunchParameters(yield_condition="hosford"), "hosford_exponent")))
 p = RollingParameters(
     element_size=3.0, growth=1.5, load="hertz", passes=2, yield_condition="hosford",
     direction="back_and_forth",
@@ -160,12 +161,21 @@ def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(tmp_path: Path
     done = called(tmp_path, "own_yield_surface.py", "-c", SURFACE)
     assert done.returncode == 0, done.stderr
     *found, word, exponent, rule, idle = done.stdout.splitlines()
-    assert found == ["SmoothMaterial", "yield_condition", "False", "True True", "True", "2"]
+    assert found == [
+        "SmoothMaterial",
+        "needs yield_condition = hosford",
+        "False",
+        "True True",
+        "True",
+        "2",
+    ]
     assert word == "yield_condition = 'round': must be one of mises, tresca, hosford"
     assert exponent == "hosford_exponent = 1.0: must be at least 2 and at most 100"
     rules = "none, isotropic, voce, table where yield_condition is hosford"
     assert rule == f"hardening = 'kinematic': must be one of {rules}"
-    assert idle.endswith("changes nothing in any run of this study: choose another yield_condition")
+    assert idle.endswith(
+        "changes nothing in any run of this study: needs yield_condition = hosford"
+    )
 
 
 @pytest.mark.processes

@@ -401,8 +401,9 @@ def test_a_swept_parameter_that_changes_nothing_is_refused(
     rule: str, name: str, values: list[float]
 ) -> None:
     content: dict[str, Any] = {"name": "idle", "scene": "punch", "sweep": {name: values}}
-    content["parameters"] = {"hardening": rule, "saturation": 100.0}
-    content["parameters"].pop(name, None)
+    content["parameters"] = {"hardening": rule}
+    if rule == "voce":
+        content["parameters"]["saturation"] = 100.0
     with pytest.raises(StudyError, match=f"sweep.{name} = .*changes nothing in any run"):
         Study.from_dict(content)
 
@@ -410,5 +411,43 @@ def test_a_swept_parameter_that_changes_nothing_is_refused(
 def test_a_swept_parameter_that_changes_some_runs_is_taken() -> None:
     sweep = {"hardening": ["none", "isotropic"], "hardening_ratio": [0.01, 0.02]}
     assert Study.from_dict({"name": "some", "scene": "punch", "sweep": sweep}).size == 4
-    one = {"hardening_ratio": [0.05]}
-    assert Study.from_dict({"name": "one", "scene": "punch", "sweep": one}).size == 1
+
+
+@pytest.mark.parametrize(
+    ("scene", "given", "told"),
+    [
+        ("punch", {"hardening_ratio": 0.05}, "hardening_ratio = 0.05: .*hardening = isotropic or"),
+        ("rolling", {"advance_step": 2.0}, "advance_step = 2.0: .*needs track other than endless"),
+        ("rolling", {"load": "hertz"}, "friction = 0.2: .*load = contact or traction other than 0"),
+        ("raceway", {"force": 300.0}, "force = 300.0: .*needs load_by = force"),
+        ("wheel_rail", {"seed": 3}, "seed = 3: .*needs load_spread other than 0 or lateral_spread"),
+        ("wheel_rail", {"crown_radius": 200.0}, "crown_radius = 200.0: .*wheel_profile = crowned"),
+        ("wheel_rail", {"straightening_stress": 90.0}, "_stress = 90.0: .*= roller_straightened"),
+    ],
+)
+def test_a_parameter_that_changes_nothing_is_refused_however_it_is_given(
+    scene: str, given: dict[str, Any], told: str
+) -> None:
+    content: dict[str, Any] = {"name": "idle", "scene": scene, "parameters": given}
+    if "load" in given:
+        given = given | {"friction": 0.2}
+        content["parameters"] = given
+    with pytest.raises(StudyError, match=rf"^parameters\..*{told}"):
+        Study.from_dict(content)
+    *fixed, (name, value) = given.items()
+    content["parameters"] = dict(fixed)
+    with pytest.raises(StudyError, match=rf"^sweep\.{name} = \[{value}\]: changes nothing"):
+        Study.from_dict(content | {"sweep": {name: [value]}})
+    linked = {"sweep": {"set": {"one": {name: value}}}}
+    with pytest.raises(StudyError, match=rf"^sweep\.set\.one\.{name} = {value}: changes nothing"):
+        Study.from_dict(content | linked)
+
+
+def test_a_default_and_a_zero_that_change_nothing_are_taken() -> None:
+    own = {"load": "hertz", "friction": 0.0, "force": 2000.0}
+    Study.from_dict({"name": "usual", "scene": "raceway", "parameters": own})
+
+
+def test_a_parameter_that_one_pass_of_a_sequence_uses_is_taken() -> None:
+    own = {"crown_radius": 200.0, "sequence": [{}, {"wheel_profile": "crowned"}]}
+    Study.from_dict({"name": "one", "scene": "wheel_rail", "parameters": own})

@@ -89,9 +89,29 @@ def test_an_axis_of_seeds_needs_a_spread() -> None:
 
 
 def test_an_axis_of_expansions_needs_a_change_of_temperature() -> None:
-    with pytest.raises(StudyError, match=r"sweep\.expansion = .*choose another temperature_change"):
+    with pytest.raises(
+        StudyError, match=r"sweep\.expansion = .*needs temperature_change other than 0"
+    ):
         study({"expansion": [1e-5, 1.2e-5]})
     study({"expansion": [1e-5, 1.2e-5]}, temperature_change=-20.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (
+            {"initial_stress": "roller_straightened", "straightening_stress": 620.0},
+            r"parameters\.straightening_stress = 620\.0: makes 61\d.* MPa at z = .*, y = -0\.\d+ m",
+        ),
+        ({"temperature_change": 250.0}, r"parameters\.temperature_change = 250\.0: makes 575 MPa"),
+    ],
+)
+def test_a_rail_that_yields_before_the_first_pass_is_refused_before_it_is_computed(
+    store: Store, given: dict[str, Any], told: str
+) -> None:
+    end = "[^(]*, which must be below the yield stress of 502 MPa before the first pass"
+    with pytest.raises(StudyError, match=told + end):
+        estimate(study({"friction": [0.3]}, **given), store)
 
 
 def test_the_schema_has_tables() -> None:

@@ -16,6 +16,7 @@ from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
+from solver.scenes.initial_stress import SectionStress, settled
 
 Array = NDArray[np.float64]
 RE = 502.0
@@ -68,6 +69,13 @@ def block(
         section, zone, "running", length=length, spacing=spacing or h, ahead=AHEAD, behind=24.0,
         reach=10.0, levels=levels,
     )  # fmt: skip
+
+
+def stressed(track: PrismTrack, of: SectionStress) -> PrismTrack:
+    """A prism with a stress before the first pass, in equilibrium."""
+    initial = settled(track.section, of, 0.0)
+    assert initial is not None
+    return track.stressed(initial)
 
 
 def residual(law: Law, state: PrismState) -> Array:

@@ -16,11 +16,11 @@ from solver.prism import EllipticPatch, PatchPassing, PrismTrack, SteppedPrism
 from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
 from solver.results.shakedown import ShakedownState, classify
-from solver.scenes.initial_stress import OverHeight, stressed
+from solver.scenes.initial_stress import OverHeight
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.steady.passing import Pass, passing
 from tests.solver.yield_surfaces import Hosford
-from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual
+from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual, stressed
 
 CURVE = ((0.0, RE), (0.002, 560.0), (0.02, 640.0))
 WORDS: dict[str, dict[str, Any]] = {
@@ -95,7 +95,7 @@ def test_increments_of_any_law_leave_the_state_of_its_pass(name: str) -> None:
 
 
 def test_so_do_increments_over_initial_stress() -> None:
-    own = stressed(track(), OverHeight(stress_over_height=((-30.0, -150.0), (0.0, 200.0))), 0.0)
+    own = stressed(track(), OverHeight(stress_over_height=((-30.0, -150.0), (0.0, 200.0))))
     compared(own, LAWS["chaboche"])
 
 

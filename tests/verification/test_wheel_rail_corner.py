@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from solver import ModelError, Record
+from solver.errors import WindowTooSmall
 from solver.results.record import Status
-from solver.scenes import SCENES
+from solver.scenes import SCENES, prism_passes
 from solver.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import geometry
+from solver.scenes.wheel_rail_track import RolledRail, geometry
 
 SCENE = SCENES["wheel_rail"]
 DRAFT = {"accuracy": "draft", "hardening": "kinematic", "hardening_ratio": 0.0196}
@@ -54,6 +57,36 @@ def test_a_wheel_on_the_corner_alone_presses_along_its_normal() -> None:
     steep, flat = dy / dz
     assert flat < numbers["lateral_force"] / 40e3 < steep
     assert numbers["audit_reactions"] < 1e-6
+
+
+def test_contact_is_found_where_newtons_method_turns_in_a_circle() -> None:
+    """With two contacts of different radii; another ratio of slip and shear leads out of it."""
+    own = SCENE.parameters(**DRAFT | {"lateral_position": 3.0, "friction": 0.3})
+    rolled = RolledRail(own)
+    track = rolled.track(1.0)
+    contact = rolled.load(track, 0).solve(np.zeros((track.grid.stations, len(track.grid.z), 3)))
+    assert contact.force[1] == pytest.approx(-150e3, rel=1e-6)
+    shear = np.hypot(*contact.shear.T).T
+    assert (shear <= 0.3 * contact.pressure + 1e-3).all()
+
+
+def test_a_lateral_force_that_no_contact_at_this_position_has_is_told_with_the_least() -> None:
+    """The corner pushes the rail aside; creepage moves load from top to corner, not the force."""
+    given = {"lateral_position": 2.0, "load": 60e3, "friction": 0.3, "lateral_control": "force"}
+    (record,) = SCENE.path(SCENE.parameters(**DRAFT | given), [1], lambda share: None)
+    assert record.status is Status.LIMIT_LOAD
+    assert re.search(r"slides off: .* lateral force is 49\d\d N, not 0: give one", record.message)
+
+
+def test_the_largest_zone_is_told_if_it_is_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    def beyond(*given: object) -> None:
+        raise WindowTooSmall("the window is too small around for a steady pass")
+
+    monkeypatch.setattr(prism_passes, "passing", beyond)
+    (record,) = SCENE.path(SCENE.parameters(**DRAFT), [1], lambda share: None)
+    assert record.status is Status.NOT_CONVERGED
+    told = r"steady pass, in the largest zone, \d\d.* mm wide and 13.* mm deep; choose a finer acc"
+    assert re.search(told, record.message)
 
 
 @pytest.mark.parametrize("lateral_position", [-10.0, -4.0, 0.0, 2.0, 3.0, 3.6])

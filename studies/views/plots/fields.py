@@ -16,9 +16,9 @@ Window = Sequence[float]
 
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
-"""Dimensions along which lines are drawn; a line has one of them."""
+"""Dimensions along which lines are drawn."""
 DRAWN = (*AXES, *ALONG)
-"""Dimensions within one figure of a run: two axes of a map, or one of `ALONG`."""
+"""Dimensions within one figure of a run: two axes of a map, or one axis or one of `ALONG`."""
 
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
@@ -59,8 +59,19 @@ def map_axes(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> tuple[str,
 
 
 def line_fields(dataset: xr.Dataset) -> list[str]:
-    """Return the variables that are drawn as lines along one of `ALONG`."""
-    return [str(name) for name, each in dataset.data_vars.items() if set(ALONG) & set(each.dims)]
+    """Return the variables that are drawn as lines."""
+    sweep = dataset["status"].dims
+    return [str(name) for name, each in dataset.data_vars.items() if line_axis(each, sweep)]
+
+
+def line_axis(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> str | None:
+    """Return the dimension along which a field is a line, or None: of `ALONG`, or its only axis.
+
+    Axes of the sweep do not count, whatever their names.
+    """
+    axes = map_axes(values, sweep)
+    alone = axes if len(axes) == 1 else ()
+    return next((name for name in (*ALONG, *alone) if name in values.dims), None)
 
 
 def usual_field(dataset: xr.Dataset) -> str:

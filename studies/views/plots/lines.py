@@ -10,14 +10,15 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.views.picking import one_run
 from studies.views.plots.captions import label, value_text, words, wrapped
 from studies.views.plots.fields import (
-    ALONG,
     check_field,
     component_of,
     focus,
+    line_axis,
     line_fields,
     too_close,
 )
@@ -37,7 +38,7 @@ _DECAYED = 0.02
 _EACH = len(STYLES)
 """Largest number of values drawn of a dimension of the field."""
 _SIZE = (8.0, 4.6)
-_LENGTHS = ("s", "depth")
+_LENGTHS = ("s", "depth", *AXES)
 _DISTANCE = "distance"
 
 
@@ -57,7 +58,7 @@ def line_figure(
     Parameters
     ----------
     run : data set of one run, or of one run for each value of ``over``
-    field : variable along one of `ALONG`
+    field : one of `line_fields`
     component : component of a stress tensor; by default the first
     zoom : show only this length on either side of the contact's centre (of its edge, if half of the
         bodies was computed) or below the surface [mm]; by default depth ends where values have
@@ -72,7 +73,8 @@ def line_figure(
     run = run if over else one_run(run)
     check_field(field, line_fields(run))
     values = _placed(component_of(run[field], component), run)
-    along = next(name for name in ALONG if name in values.dims)
+    along = line_axis(values)
+    assert along is not None
     if zoom is not None and along not in _LENGTHS:
         raise StudyError("zoom", zoom, f"{field} lies over {words(along)}, no length: leave it out")
     for name in values.dims:
@@ -84,7 +86,7 @@ def line_figure(
     others = [name for name in values.dims if name != along]
     at = _DISTANCE if _DISTANCE in values.coords else along
     if zoom is not None:
-        middle = focus(run, zoom) if along == "s" else 0.0
+        middle = 0.0 if along == "depth" else focus(run, zoom)
         values = values.where(abs(values[along] - middle) <= zoom, drop=True)
         if values.sizes[along] < 2:
             raise too_close(zoom)

@@ -54,6 +54,20 @@ def test_depth_ends_where_nothing_is_left() -> None:
     assert line_figure(run, "profile").axes[0].get_xlim()[1] == 99.0
 
 
+def test_a_field_over_one_axis_is_a_line_along_it() -> None:
+    """Residual stress at the surface of a rail lies over z."""
+    z = np.linspace(-30.0, 30.0, 61)
+    run = grid_map(np.arange(1.0, 4.0), np.arange(-3.0, 0.0))
+    run = run.assign_coords(z=("z", z, {"units": "mm"}), component=["xx", "zz"])
+    run["running_surface_residual"] = (("component", "z"), np.stack([z, np.cos(z)]))
+    sheet = picture(run, "running_surface_residual", component="zz")
+    (line,) = lines_of(sheet)
+    np.testing.assert_allclose(np.transpose(line.get_xydata()), [z, np.cos(z)])
+    assert sheet.axes[0].get_xlabel().startswith("z")
+    near = picture(run, "running_surface_residual", zoom=10.0)
+    assert near.axes[0].get_xlim() == (-10.0, 10.0)
+
+
 def test_few_passes_are_told_by_colour_and_stations_by_style() -> None:
     sheet = picture(rolled(2), "residual_profile", selection={"case": "long"})
     lines = lines_of(sheet)

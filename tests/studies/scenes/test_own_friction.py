@@ -15,6 +15,7 @@ OWN = ROOT / "examples/own_friction.py"
 BY_ITS_WORD = """
 import numpy as np
 from solver import ModelError
+from solver.parameters import unmet
 from solver.scenes.punch import PunchParameters
 from solver.scenes.rolling_parameters import RollingParameters
 from tests.studies.scenes.conftest import blocks, built
@@ -29,8 +30,8 @@ _, shear = record.fields["contact_shear"]
 _, pressure = record.fields["contact_pressure"]
 print(record.status.name, float(np.abs(shear).max()) <= 8.0 < 0.2 * float(pressure.max()))
 p = PunchParameters(friction_law="saturating", friction=0.4)
-print(p.tau_max, sorted(p.idle.keys() & {"friction", "cohesion", "shear_limit"}))
-print(PunchParameters().idle["tau_max"])
+print(p.tau_max, [each for each in ("cohesion", "friction", "shear_limit") if unmet(p, each)])
+print(unmet(PunchParameters(), "tau_max"))
 for refused in (
     lambda: PunchParameters(friction_law="none"),
     lambda: PunchParameters(tau_max=0.0),
@@ -70,7 +71,7 @@ def test_a_law_of_ones_own_is_known_by_its_word() -> None:
     assert law == "Saturating(friction=0.2, tau_max=8.0)"
     assert record == "OK True"
     assert scene == "50.0 ['cohesion', 'shear_limit']"
-    assert idle == "friction_law"
+    assert idle == "needs friction_law = saturating"
     assert [text.split(":")[0] for text in refused] == [
         "friction_law = 'none'",
         "tau_max = 0.0",
