@@ -21,6 +21,10 @@ COPY residua residua
 COPY data data
 RUN if [ "$(uname -m)" = x86_64 ]; then extra='[mkl]'; else extra=''; fi \
     && pip install --constraint constraints.txt ".$extra"
+# Compiled kernels, which `watched.py` copies to where a container may write, and digests of sources.
+RUN cd / \
+    && NUMBA_CACHE_DIR=/app/kernels python -c "import solver.prism.influence, solver.steady.sweep" \
+    && python -c "from studies.definition.identity import solver_hash; solver_hash()"
 COPY docker/watched.py /usr/local/lib/watched.py
 
 RUN useradd --create-home --uid 1000 residua \

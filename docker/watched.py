@@ -5,21 +5,34 @@
 An engine marks a container as unhealthy, and leaves it as it is. Any answer is a sign of life, also
 503: the service then says what it lacks, still hands out results, and a restart brings no room on a
 disk. The exit status is that of the command, or 1 when it was ended.
+
+First the compiled kernels of the image are copied to where numba looks for them, and may write:
+without them the first run would wait for the compiler.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import os
+import shutil
 import signal
 import subprocess
 import sys
 import urllib.error
 import urllib.request
+from pathlib import Path
 
 ANSWER_SECONDS = 5.0
 GRACE_SECONDS = 20.0
+KERNELS = Path("/app/kernels")
 DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+
+
+def copy_kernels() -> None:
+    """Copy the compiled kernels of the image, if it has any."""
+    if KERNELS.is_dir() and (target := os.environ.get("NUMBA_CACHE_DIR")):
+        shutil.copytree(KERNELS, target, dirs_exist_ok=True)
 
 
 def answers(url: str) -> bool:
@@ -61,4 +74,5 @@ if __name__ == "__main__":
     parser.add_argument("url")
     parser.add_argument("command", nargs=argparse.REMAINDER)
     given = parser.parse_args()
+    copy_kernels()
     sys.exit(watch(given.command, given.url, given.every, given.failures))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
+from solver.contact.lemke import lemke
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -26,9 +28,6 @@ def given_bound(
     and so is as accurate as a normal force, even with tiny friction. Rigid motions are eliminated
     by a principal pivot on as many contact forces as there are motions.
     """
-    # imported only here: importing the compiler is slow, and Lemke's method is rarely needed
-    from solver.contact.lemke import lemke
-
     n, k = problem.n, len(problem.balance)
     # scaled so that forces and gaps are of order one
     force, length = problem.scales

@@ -1,4 +1,4 @@
-"""Lemke's complementary pivoting, compiled.
+"""Lemke's complementary pivoting.
 
 R.W. Cottle, J.-S. Pang, R.E. Stone, The Linear Complementarity Problem (1992), algorithm 4.4.5.
 """
@@ -6,14 +6,12 @@ R.W. Cottle, J.-S. Pang, R.E. Stone, The Linear Complementarity Problem (1992), 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 
-@njit(cache=True)
 def lemke(
     M: NDArray[np.float64], r: NDArray[np.float64], max_pivots: int
-) -> tuple[NDArray[np.float64], bool]:  # pragma: no cover - compiled
+) -> tuple[NDArray[np.float64], bool]:
     """Solve ``w = M z + r, w >= 0, z >= 0, w z = 0``.
 
     Returns
@@ -25,39 +23,37 @@ def lemke(
     if r.min() >= 0:
         return z, True
     # tableau of basic = T @ (w, z, z0, 1); variables 0..n-1 are w, n..2n-1 z, 2n is z0
-    T = np.zeros((n, 2 * n + 2))
-    for i in range(n):
-        T[i, i] = 1.0
-    T[:, n : 2 * n] = -M
-    T[:, 2 * n] = -1.0
-    T[:, 2 * n + 1] = r
+    T = np.hstack([np.eye(n), -M, np.full((n, 1), -1.0), r[:, None]])
+    change = np.empty_like(T)
     basis = np.arange(n)
     row = int(np.argmin(r))
     entering = 2 * n
     for _ in range(max_pivots):
-        pivot = T[row, entering]
-        T[row] /= pivot
-        for i in range(n):
-            if i != row and T[i, entering] != 0.0:
-                T[i] -= T[i, entering] * T[row]
+        T[row] /= T[row, entering]
+        factors = T[:, entering].copy()
+        factors[row] = 0.0
+        T -= np.multiply.outer(factors, T[row], out=change)
         leaving = basis[row]
         basis[row] = entering
         if leaving == 2 * n:
-            for i in range(n):
-                if n <= basis[i] < 2 * n:
-                    z[basis[i] - n] = T[i, 2 * n + 1]
+            found = (n <= basis) & (basis < 2 * n)
+            z[basis[found] - n] = T[found, 2 * n + 1]
             return z, True
         entering = leaving + n if leaving < n else leaving - n
-        scale = np.abs(T[:, entering]).max()
-        best = np.inf
-        row = -1
-        for i in range(n):
-            if T[i, entering] > 1e-11 * scale:
-                ratio = max(T[i, 2 * n + 1], 0.0) / T[i, entering]
-                tie = ratio <= best * (1 + 1e-12) and basis[i] == 2 * n
-                if ratio < best or tie:
-                    best = ratio
-                    row = i
+        row = _leaving(T[:, entering], T[:, 2 * n + 1], basis == 2 * n)
         if row < 0:
             return z, False
     return z, False
+
+
+def _leaving(
+    column: NDArray[np.float64], values: NDArray[np.float64], artificial: NDArray[np.bool_]
+) -> int:
+    """Return the row of the least ratio, of equal ones that of z0; -1 if there is none."""
+    rows = np.flatnonzero(column > 1e-11 * np.abs(column).max())
+    ratios = np.maximum(values[rows], 0.0) / column[rows]
+    best, found = np.inf, -1
+    for i, ratio, z0 in zip(rows.tolist(), ratios.tolist(), artificial[rows].tolist(), strict=True):
+        if ratio < best or (z0 and ratio <= best * (1 + 1e-12)):
+            best, found = ratio, i
+    return found

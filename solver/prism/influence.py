@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
+from numba import float64, int64, njit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,7 +64,9 @@ class Influence:
         return _between(self._blocks, at, rows, by, columns)
 
 
-@njit(cache=True)
+@njit(
+    (float64[:, :, :, :, ::1], int64[::1], float64[:, ::1], int64[::1], float64[:, ::1]), cache=True
+)
 def _between(
     blocks: Array, at: Numbers, rows: Array, by: Numbers, columns: Array
 ) -> Array:  # pragma: no cover - compiled

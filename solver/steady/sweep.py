@@ -7,6 +7,9 @@ with linear isotropic and kinematic hardening, written in deviators.
 Strains have n = 4 components in two dimensions and 6 in three. The kernels take n from the length
 of a tuple, not from the shape of an array: a tuple's length is part of its type, so that loops over
 components are compiled for each n, and unrolled. The return is inlined, which halves the time.
+
+The types of all arguments are fixed, so that importing this module compiles all that is ever used,
+or reads what an earlier import compiled; `make setup` does this.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
+from numba import float64, int64, njit, types
 
 from solver.materials.radial_return import SQRT23
 from solver.materials.state import PlasticState
@@ -29,6 +32,9 @@ if TYPE_CHECKING:
 
 _PLANE = (0, 0, 0, 0)
 """One entry for each component in two dimensions."""
+_LINE, _TABLE = float64[::1], float64[:, ::1]
+_ROWS, _STEPS = float64[:, :, ::1], float64[:, :, :, ::1]
+_EACH = tuple(types.UniTuple(int64, n) for n in (4, 6))
 
 
 class CompiledSweep:
@@ -46,10 +52,11 @@ class CompiledSweep:
             ]
         )
         self._each = (0,) * strain.shape[2]
-        before = np.ascontiguousarray(start.plastic_strain.T), start.accumulated
+        plastic = np.ascontiguousarray(start.plastic_strain.T)
+        accumulated = np.ascontiguousarray(start.accumulated)
         # numpy asks for zeros, and gets memory that costs nothing where nothing is written
         self._path = np.zeros((strain.shape[0], strain.shape[1] - 1, parts, strain.shape[2] + 2))
-        plastic, total = flow(strain, *before, self._law, self._path, self._each)
+        plastic, total = flow(strain, plastic, accumulated, self._law, self._path, self._each)
         self.states = PlasticState(np.moveaxis(plastic, 2, 0), total)
 
     @property
@@ -148,7 +155,7 @@ def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignor
     return accumulated + SQRT23 * grows
 
 
-@njit(cache=True)
+@njit([(_ROWS, _TABLE, _LINE, _LINE, _STEPS, each) for each in _EACH], cache=True)
 def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-untyped-def]
     """Let material flow along rows.
 
@@ -192,7 +199,7 @@ def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-unt
     return flowed, total
 
 
-@njit(cache=True)
+@njit([(_ROWS, _LINE, _STEPS, each) for each in _EACH], cache=True)
 def flow_along(strain, law, steps, each):  # type: ignore[no-untyped-def]
     """Return the changes of the results of `flow` for a change of strain.
 
@@ -228,7 +235,7 @@ def flow_along(strain, law, steps, each):  # type: ignore[no-untyped-def]
     return flowed, total
 
 
-@njit(cache=True)
+@njit((_TABLE, _LINE, _LINE, float64), cache=True)
 def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
     """Return the state of rows behind the load, where no stress acts on planes y = const.
 
@@ -283,7 +290,7 @@ def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
     return flowed, total, steps, inverses
 
 
-@njit(cache=True)
+@njit((_TABLE, _LINE, _LINE, _TABLE, _ROWS), cache=True)
 def close_along(plastic, accumulated, law, steps, inverses):  # type: ignore[no-untyped-def]
     """Return the change of the plastic strain (n_rows, 4) of `close`.
 

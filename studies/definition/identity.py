@@ -9,7 +9,6 @@ id (`studies.definition.meaning`).
 from __future__ import annotations
 
 import ast
-import hashlib
 import json
 import re
 import sys
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import solver
 from solver.parts import own_files
+from studies.definition.meaning import digest, digests_of
 
 if TYPE_CHECKING:
     from solver.scenes import Scene
@@ -41,7 +41,7 @@ def canonical(value: Any) -> str:
 
 def content_id(*parts: Any) -> str:
     """Return 32 hexadecimal digits that depend on `parts` and on the solver's sources."""
-    return _digest(canonical([*parts, solver_hash()]).encode())
+    return digest(canonical([*parts, solver_hash()]).encode())
 
 
 class Namer:
@@ -77,7 +77,7 @@ class Namer:
         for places, entries in changes:
             for k, place in places:
                 texts[place] = entries[k]
-        return _digest(f"{self._before}{','.join(texts)}{self._after}".encode())
+        return digest(f"{self._before}{','.join(texts)}{self._after}".encode())
 
 
 Places = list[tuple[int, int]]
@@ -111,14 +111,12 @@ def solver_hash() -> str:
     its path: moving a file changes the digest. The user's own files with parts count too
     (`solver.parts`), wherever they are.
     """
-    from studies.definition.meaning import meaning  # `residua --help` makes no id
-
     root, here = Path(solver.__file__).parent, Path(__file__).parents[1]
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
     files |= {f"parts/{k}": path for k, path in enumerate(own_files())}
-    digests = {name: _digest(meaning(path.read_bytes()).encode()) for name, path in files.items()}
-    return _digest(json.dumps(digests, sort_keys=True).encode())
+    digests = digests_of([path.read_bytes() for path in files.values()])
+    return digest(json.dumps(dict(zip(files, digests, strict=True)), sort_keys=True).encode())
 
 
 def written(scene: Scene) -> list[list[str]]:
@@ -139,7 +137,14 @@ def _read(scene: Scene) -> list[list[str]]:
     """Return the data that a scene was made from, and the modules that have read it."""
     file = _own_file(type(scene).__module__)
     modules = sorted(file.parent.glob("*.py")) if file else []
-    return [["source", scene.source], *([each.name, _file_digest(each)] for each in modules)]
+    return [["source", scene.source], *map(list, _file_digests(tuple(modules)))]
+
+
+@cache
+def _file_digests(files: tuple[Path, ...]) -> list[tuple[str, str]]:
+    """Return the name of each file, and the digest of its source."""
+    digests = digests_of([each.read_bytes() for each in files])
+    return [(each.name, found) for each, found in zip(files, digests, strict=True)]
 
 
 def sources(scene: Scene) -> list[Path]:
@@ -169,33 +174,20 @@ def _own_file(module: str) -> Path | None:
     return Path(file)
 
 
-@cache
-def _file_digest(file: Path) -> str:
-    from studies.definition.meaning import meaning
-
-    return _digest(meaning(file.read_bytes()).encode())
-
-
 def _module_digest(name: str) -> str:
     """Return the digest of a module's source without comments; empty for one of the solver's."""
     file = _own_file(name)
     if file is None:
         return ""
-    from studies.definition.meaning import meaning
-
     tree = ast.parse(file.read_bytes())
     tree.body = [each for each in tree.body if not only_as_script(each)]
-    return _digest(meaning(ast.unparse(tree)).encode())
+    return digests_of([ast.unparse(tree).encode()])[0]
 
 
 def only_as_script(statement: ast.stmt) -> bool:
     """Whether a statement is ``if __name__ == "__main__":``."""
     names = ast.walk(statement.test) if isinstance(statement, ast.If) else ()
     return any(isinstance(each, ast.Name) and each.id == "__name__" for each in names)
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:32]
 
 
 def _normalised(value: Any) -> Any:

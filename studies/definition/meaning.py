@@ -2,17 +2,67 @@
 
 Everything else counts: numbers, names, operators, their order, annotations, imports, and all texts,
 because a text may be a name, a unit or a choice.
+
+To parse all sources takes half a second, and every process of a study needs their digests. As
+Python keeps its bytecode, they are kept in ``__pycache__``, by the digests of the whole sources.
 """
 
 from __future__ import annotations
 
 import ast
 import gc
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
+from importlib.util import cache_from_source
+from pathlib import Path
 from typing import Any
 
 _NO_MEANING = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
 """Fields of Python's grammar that follow from the position of a node, or come from comments."""
+
+_MOST = 5000
+"""Number of digests above which those of earlier sources are no longer kept."""
+
+
+def digests_of(sources: Sequence[bytes]) -> list[str]:
+    """Return a digest of the `meaning` of each source, from the kept ones where they are known."""
+    maker, whole = digest(Path(__file__).read_bytes()), [digest(each) for each in sources]
+    kept = Path(cache_from_source(__file__)).with_suffix(".json")
+    known = _kept(kept, maker)
+    fresh = {
+        key: digest(meaning(source).encode())
+        for key, source in zip(whole, sources, strict=True)
+        if key not in known
+    }
+    if fresh:
+        _keep(kept, maker, fresh if len(known) > _MOST else {**known, **fresh})
+    return [fresh.get(key) or known[key] for key in whole]
+
+
+def digest(data: bytes) -> str:
+    """Return 32 hexadecimal digits of SHA-256."""
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
+def _kept(path: Path, maker: str) -> Mapping[str, str]:
+    """Return the kept digests, if this module has not changed since; else none."""
+    try:
+        content = json.loads(path.read_bytes())
+        return dict(content["digests"]) if content["maker"] == maker else {}
+    except (OSError, ValueError, TypeError, KeyError):
+        return {}
+
+
+def _keep(path: Path, maker: str, digests: Mapping[str, str]) -> None:
+    part = path.with_suffix(f".{os.getpid()}")
+    with suppress(OSError):  # such as a directory that only its owner may write to
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(json.dumps({"maker": maker, "digests": digests}), encoding="ascii")
+        part.replace(path)
 
 
 def meaning(source: bytes | str) -> str:

@@ -91,6 +91,7 @@ def test_what_answers_no_more_is_ended_and_so_restarted(name: str) -> None:
     assert (watch, script) == ("python", "/usr/local/lib/watched.py")
     assert f"urlopen('{url}'" in SERVICES[name]["healthcheck"]["test"][-1]
     assert f"COPY docker/watched.py {script}\n" in DOCKERFILE
+    assert "NUMBA_CACHE_DIR=/app/kernels python" in DOCKERFILE  # `watched` copies them from there
     assert SERVICES[name]["restart"] == "always"
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import runpy
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import psutil
 import pytest
@@ -68,3 +70,20 @@ def test_what_answers_no_more_is_ended() -> None:
 def test_the_exit_status_is_that_of_the_command() -> None:
     with watched("raise SystemExit(2)") as watch:
         assert watch.wait(timeout=30.0) == 2
+
+
+def test_kernels_of_the_image_are_copied_to_where_the_compiler_looks_for_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = runpy.run_path(str(ROOT / "docker" / "watched.py"))
+    kernels, cache = tmp_path / "kernels", tmp_path / "cache"
+    copy = module["copy_kernels"]
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(cache))
+    monkeypatch.setitem(copy.__globals__, "KERNELS", kernels)
+    copy()
+    assert not cache.exists()
+    (kernels / "sweep").mkdir(parents=True)
+    (kernels / "sweep" / "flow.nbi").write_bytes(b"compiled")
+    for _ in range(2):  # a container that starts again
+        copy()
+        assert (cache / "sweep" / "flow.nbi").read_bytes() == b"compiled"

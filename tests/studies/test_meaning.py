@@ -10,7 +10,8 @@ import pytest
 
 import solver
 import studies.definition.identity
-from studies.definition.meaning import meaning
+from studies.definition import meaning as module
+from studies.definition.meaning import digests_of, meaning
 
 LAW = '''"""Return mapping."""
 
@@ -94,6 +95,32 @@ def test_what_may_change_a_number_or_a_name_is_seen(old: str, new: str) -> None:
 def test_a_text_is_kept() -> None:
     assert meaning("rule = 'none'") != meaning("rule = 'mixed'")
     assert meaning("f(x, 'none')") != meaning("f(x, 'mixed')")
+
+
+@pytest.mark.parametrize("damage", [b"", b"[]", b'{"maker": "another", "digests": {}}', None])
+def test_a_source_is_parsed_once_and_a_damaged_file_of_digests_is_made_again(
+    damage: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept, parsed = tmp_path / "kept" / "meaning.pyc", []
+    monkeypatch.setattr(module, "cache_from_source", lambda file: str(kept))
+    monkeypatch.setattr(module, "meaning", lambda source: parsed.append(source) or meaning(source))
+    sources = [LAW.encode(), f"# the same\n{LAW}".encode(), b"x = 1"]
+    found = digests_of(sources)
+    assert found[0] == found[1] != found[2]
+    if damage is not None:
+        kept.with_suffix(".json").write_bytes(damage)
+    assert digests_of(sources) == found
+    assert len(parsed) == len(sources) * (1 if damage is None else 2)
+    assert digests_of([b"x = 2"]) != found[2:]
+
+
+def test_digests_are_found_where_they_cannot_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    before = digests_of([LAW.encode()])
+    monkeypatch.setattr(module, "cache_from_source", lambda file: str(tmp_path / "file" / "x.pyc"))
+    assert digests_of([LAW.encode()]) == before
 
 
 @pytest.fixture
