@@ -32,7 +32,7 @@ from service.metrics import Metrics
 from service.overview import Details
 from service.pool import Pool
 from service.probe import Probe
-from service.processes import Starter
+from service.processes import Starter, find_modules_at_home
 from service.recovery import open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
@@ -148,6 +148,7 @@ def serve(
     data : directory of runs, studies and the queue
     scheduler : address of a dask scheduler; without one each study starts its own workers
     """
+    find_modules_at_home()
     try:
         settings = chosen(host=host, port=port, data=data, scheduler=scheduler)
     except StudyError as error:

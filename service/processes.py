@@ -18,9 +18,11 @@ import time
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TextIO
 
 from service import logs
+from solver.parts import SETTING, own_files
 
 LONGEST_LINE = 1_000_000
 """Largest size of a message of a process [bytes]."""
@@ -29,6 +31,23 @@ BEAT_SECONDS = 5.0
 """Time between two signs of life [s]; a process counts as frozen only after a longer time."""
 
 STDIN = 0
+
+HOME = Path(__file__).parents[1]
+"""The folder of the packages."""
+
+
+def find_modules_at_home() -> None:
+    """Keep modules of this process and those it starts apart from where the service was started.
+
+    Python looks for modules in the folder of a script, or in the current one, before all others: a
+    file ``random.py`` there would be executed. What is started from now on finds what this process
+    finds without that folder, and the user's own files wherever it works.
+    """
+    if not sys.flags.safe_path and Path(sys.path[0]).resolve() != HOME:
+        del sys.path[0]
+    os.environ["PYTHONSAFEPATH"] = "1"
+    os.environ["PYTHONPATH"] = os.pathsep.join(each or str(HOME) for each in sys.path)
+    os.environ[SETTING] = os.pathsep.join(map(str, own_files()))
 
 
 async def start(module: str, lock: int) -> Process:
@@ -46,6 +65,7 @@ async def start(module: str, lock: int) -> Process:
         stdin=PIPE,
         stdout=PIPE,
         limit=LONGEST_LINE,
+        cwd="/",  # it reads no settings of libraries where the service was started
         pass_fds=(lock,),
         start_new_session=True,  # the service handles an interrupt from a terminal
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import tempfile
 import threading
 import time
@@ -95,6 +96,20 @@ class Access:
 
 
 @contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let processes that are started meanwhile run no file of the current directory.
+
+    Before such a process knows the module path of this one, it looks there for Python's modules.
+    """
+    before = os.environ.get("PYTHONSAFEPATH", "")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        os.environ["PYTHONSAFEPATH"] = before  # empty is as good as none
+
+
+@contextmanager
 def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
     """Start worker processes of one thread each on this machine; they end with the context.
 
@@ -122,6 +137,7 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
 
     security = Security.temporary()
     with (
+        _safe_path(),
         tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True) as scratch,
         dask.config.set({**CONFIGURATION, **_CLOSED}),
     ):
@@ -227,4 +243,5 @@ def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
     from dask.delayed import delayed
 
     later = [delayed(call)() for call in calls]
-    return list(compute(*later, scheduler="processes", num_workers=workers))
+    with _safe_path():
+        return list(compute(*later, scheduler="processes", num_workers=workers))

@@ -93,6 +93,7 @@ class Server:
     home: Path
     workers: int = 1
     settings: dict[str, str] = field(default_factory=dict)
+    command: list[str] | None = None
     port: int = field(default_factory=free_port)
     process: subprocess.Popen[bytes] | None = None
 
@@ -112,9 +113,12 @@ class Server:
     def start(self) -> Server:
         """Start the process, and wait until it answers."""
         self.home.mkdir(exist_ok=True)
+        command = [sys.executable, "-c", PROGRAM, str(self.port), str(self.data)]
+        if self.command:
+            command = [*self.command, "--port", str(self.port), "--data", str(self.data)]
         with (self.home / "service.log").open("ab") as output:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", PROGRAM, str(self.port), str(self.data)],
+                command,
                 cwd=self.home,
                 env=environment(self.log) | {"RESIDUA_WORKERS": str(self.workers)} | self.settings,
                 stdin=subprocess.DEVNULL,
