@@ -31,7 +31,7 @@ BEAT_SECONDS = 5.0
 STDIN = 0
 
 
-async def start(module: str, lock: int) -> Process:
+async def start(module: str, lock: int, *arguments: str) -> Process:
     """Start ``python -m module``; it loads its modules, then waits for its order.
 
     Raises
@@ -43,6 +43,7 @@ async def start(module: str, lock: int) -> Process:
         sys.executable,
         "-m",
         module,
+        *arguments,
         stdin=PIPE,
         stdout=PIPE,
         limit=LONGEST_LINE,
@@ -139,11 +140,12 @@ class Starter:
 
     Attributes
     ----------
-    module, lock : as for `start`
+    module, lock, arguments : as for `start`
     """
 
     module: str
     lock: int
+    arguments: tuple[str, ...] = ()
     _ready: Process | None = None
     _starting: bool = False
 
@@ -152,7 +154,7 @@ class Starter:
         if self._ready is None and not self._starting:
             self._starting = True
             with contextlib.suppress(OSError):
-                self._ready = await start(self.module, self.lock)
+                self._ready = await start(self.module, self.lock, *self.arguments)
             self._starting = False
 
     async def give(self, order: Mapping[str, Any]) -> Process:
@@ -165,7 +167,7 @@ class Starter:
         """
         process, self._ready = self._ready, None
         if process is None or process.returncode is not None:
-            process = await start(self.module, self.lock)
+            process = await start(self.module, self.lock, *self.arguments)
         send(process, order)
         return process
 

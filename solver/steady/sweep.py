@@ -52,7 +52,8 @@ class CompiledSweep:
             ]
         )
         self._each = (0,) * strain.shape[2]
-        before = [np.ascontiguousarray(a) for a in (start.plastic_strain.T, start.accumulated)]
+        plastic = np.ascontiguousarray(start.plastic_strain.T)
+        before = plastic, np.ascontiguousarray(start.accumulated)
         # numpy asks for zeros, and gets memory that costs nothing where nothing is written
         self._path = np.zeros((strain.shape[0], strain.shape[1] - 1, parts, strain.shape[2] + 2))
         plastic, total = flow(strain, *before, self._law, self._path, self._each)
