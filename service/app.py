@@ -75,7 +75,9 @@ def create_app(settings: Settings) -> FastAPI:
     store = open_store(settings.data)
     open_jobs = partial(open_queue, settings.data / "jobs.sqlite", store, settings.max_queue)
     jobs = open_jobs()
-    runner = Runner(settings, jobs, Pool(settings, lock), Starter("service.child", lock), open_jobs)
+    runner = Runner(
+        settings, jobs, Pool.of(settings, lock), Starter("service.child", lock), open_jobs
+    )
     examiner = Examiner(settings)
     keeper = Keeper(jobs, store, runner.computes, settings.keep_days, settings.keep_bytes)
     metrics = Metrics(jobs, store, runner)

@@ -1,7 +1,8 @@
 """The process that owns store and workers while studies are computed: ``python -m service.pool``.
 
-Studies share its workers and its lock of the store. It starts with the first study, and ends after
-some time without one.
+Studies share its workers and its lock of the store. It gets its order, and starts both, with the
+first study, and ends after some time without one. Before its order it loads what workers need, so
+that the first study does not wait for it.
 """
 
 from __future__ import annotations
@@ -10,13 +11,18 @@ import asyncio
 import contextlib
 import json
 import os
+import sys
 from asyncio.subprocess import Process
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 from service import processes
+from service.processes import Starter
 from service.settings import Settings
 from studies.errors import StoreBusy, StoreFull, StudyError
+
+OWN = "own"
+"""Argument of a process that will start workers of its own."""
 
 START_SECONDS = 60.0
 """Longest time for the start of the workers [s]."""
@@ -33,14 +39,26 @@ class Pool:
     Attributes
     ----------
     settings : how many workers, or which scheduler
-    lock : descriptor of the directory's lock, passed on to the process
+    starter : starts the process
     """
 
     settings: Settings
-    lock: int
+    starter: Starter
     _process: Process | None = None
     _access: dict[str, Any] = field(default_factory=dict)
     _one: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    @classmethod
+    def of(cls, settings: Settings, lock: int) -> Self:
+        """Return the pool for these settings; the process inherits the directory's lock."""
+        own = () if settings.outside_access else (OWN,)
+        return cls(settings, Starter("service.pool", lock, own))
+
+    async def prepare(self) -> None:
+        """Start the process that the next study will need, unless there is one."""
+        async with self._one:
+            if self._process is None:
+                await self.starter.prepare()
 
     async def access(self) -> dict[str, Any]:
         """Return the access to the workers; the process is started if there is none.
@@ -56,7 +74,7 @@ class Pool:
             return self._access
 
     async def close(self) -> None:
-        """End the process, if there is one."""
+        """End the process that has an order, if there is one."""
         async with self._one:
             if self._process is not None:
                 await processes.end(self._process, self.settings.grace_seconds)
@@ -71,8 +89,7 @@ class Pool:
             "grace": self.settings.grace_seconds,
         }
         try:
-            self._process = await processes.start("service.pool", self.lock)
-            processes.send(self._process, order)
+            self._process = await self.starter.give(order)
         except OSError as error:
             raise PoolAway(f"the workers cannot be started: {error.strerror}") from error
         said: dict[str, Any] = {}
@@ -90,9 +107,11 @@ class Pool:
 def main() -> None:
     """Lock the store, and run the workers unless there is a scheduler, until the service stops."""
     from studies import Store
-    from studies.execution.cluster import own_workers
+    from studies.execution.cluster import own_workers, prepare_workers
 
     outlet = processes.claim_stdout()
+    if OWN in sys.argv:
+        prepare_workers()
     order = processes.read_order()
     stop = processes.watch_stdin(order["grace"])
     try:

@@ -50,7 +50,7 @@ def find_modules_at_home() -> None:
     os.environ[SETTING] = os.pathsep.join(map(str, own_files()))
 
 
-async def start(module: str, lock: int) -> Process:
+async def start(module: str, lock: int, *arguments: str) -> Process:
     """Start ``python -m module``; it loads its modules, then waits for its order.
 
     Raises
@@ -62,6 +62,7 @@ async def start(module: str, lock: int) -> Process:
         sys.executable,
         "-m",
         module,
+        *arguments,
         stdin=PIPE,
         stdout=PIPE,
         limit=LONGEST_LINE,
@@ -159,11 +160,12 @@ class Starter:
 
     Attributes
     ----------
-    module, lock : as for `start`
+    module, lock, arguments : as for `start`
     """
 
     module: str
     lock: int
+    arguments: tuple[str, ...] = ()
     _ready: Process | None = None
     _starting: bool = False
 
@@ -172,7 +174,7 @@ class Starter:
         if self._ready is None and not self._starting:
             self._starting = True
             with contextlib.suppress(OSError):
-                self._ready = await start(self.module, self.lock)
+                self._ready = await start(self.module, self.lock, *self.arguments)
             self._starting = False
 
     async def give(self, order: Mapping[str, Any]) -> Process:
@@ -185,7 +187,7 @@ class Starter:
         """
         process, self._ready = self._ready, None
         if process is None or process.returncode is not None:
-            process = await start(self.module, self.lock)
+            process = await start(self.module, self.lock, *self.arguments)
         send(process, order)
         return process
 

@@ -31,6 +31,9 @@ SILENCE_SECONDS = 20.0
 SMALL = 100
 """Largest number of runs of a study for which the last place is reserved."""
 
+READY_SECONDS = 2.0
+"""Time without a study after which the processes of the next one are started, to load [s]."""
+
 SILENT = "its process says nothing: it is frozen, or the machine is overloaded"
 
 
@@ -109,7 +112,9 @@ class Runner:
                     continue
                 idle = 0.0 if self._studies else idle + pause
                 if idle >= self.settings.idle_seconds:
-                    await asyncio.gather(self.pool.close(), self.starter.close())
+                    await self.pool.close()
+                if idle >= READY_SECONDS:
+                    await asyncio.gather(self.pool.prepare(), self.starter.prepare())
                 trouble = ""
             except (QueueLost, StoreFull, OSError) as error:
                 if trouble != (trouble := str(error)):  # log it only once
@@ -122,7 +127,8 @@ class Runner:
                 pause *= 10
             await self._pause(pause)
         await asyncio.gather(*self._studies.values(), return_exceptions=True)
-        await asyncio.gather(self.pool.close(), self.starter.close())
+        ending = self.pool.close(), self.pool.starter.close(), self.starter.close()
+        await asyncio.gather(*ending)
 
     async def _next(self) -> bool:
         """Begin the next study; return whether there was one, and a free place for it.

@@ -53,10 +53,10 @@ class CompiledSweep:
         )
         self._each = (0,) * strain.shape[2]
         plastic = np.ascontiguousarray(start.plastic_strain.T)
-        accumulated = np.ascontiguousarray(start.accumulated)
+        before = plastic, np.ascontiguousarray(start.accumulated)
         # numpy asks for zeros, and gets memory that costs nothing where nothing is written
         self._path = np.zeros((strain.shape[0], strain.shape[1] - 1, parts, strain.shape[2] + 2))
-        plastic, total = flow(strain, plastic, accumulated, self._law, self._path, self._each)
+        plastic, total = flow(strain, *before, self._law, self._path, self._each)
         self.states = PlasticState(np.moveaxis(plastic, 2, 0), total)
 
     @property

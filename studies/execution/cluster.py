@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError, Unusable
+from studies.execution.forking import beginning, prepare
 from studies.execution.script import GUARD, check_script
 
 if TYPE_CHECKING:
@@ -24,19 +25,26 @@ _CONNECT = 10.0
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
 
+_FROM_THE_START: Mapping[str, int] = {
+    # Runs share the cores: several threads of one would wait for each other.
+    "OMP_NUM_THREADS": 1,
+    "MKL_NUM_THREADS": 1,
+    "OPENBLAS_NUM_THREADS": 1,
+    # Arrays of some megabytes are allocated and freed in every iteration: with dask's threshold of
+    # 64 kB each would return to the system, and clearing pages would take a quarter of the time.
+    "MALLOC_TRIM_THRESHOLD_": 2**28,
+    "MALLOC_MMAP_THRESHOLD_": 2**26,
+}
+"""Environment variables of a worker, which are read when it starts or loads libraries."""
+
 CONFIGURATION: Mapping[str, Any] = {
     # A task whose worker died is tried once more; after a second death the task is blamed.
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
-    # Arrays of some megabytes are allocated and freed in every iteration: with dask's threshold of
-    # 64 kB each would return to the system, and clearing pages would take a quarter of the time.
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
+    "distributed.nanny.pre-spawn-environ": _FROM_THE_START,
     # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
-    # Ctrl-C reaches every process of the terminal; only the calling process shall react to it.
-    "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
     # dask's pages are closed. Without the statistics for them processes that wait take a quarter of
     # the time: by default each looks at itself 50 times a second, and a worker at its stack 100.
     "distributed.admin.tick.interval": "1s",
@@ -95,6 +103,12 @@ class Access:
         return cls(**content)  # type: ignore[arg-type]
 
 
+def prepare_workers() -> None:
+    """Begin to load what the workers of `own_workers` need, and dask in this process."""
+    prepare(_FROM_THE_START)
+    import distributed  # noqa: F401
+
+
 @contextmanager
 def _safe_path() -> Iterator[None]:
     """Let processes that are started meanwhile run no file of the current directory.
@@ -132,14 +146,21 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
         if the running script would start workers in each worker again
     """
     check_script()
-    import dask  # takes a second to import
+    method = prepare(_FROM_THE_START)
+    import dask  # takes half a second to import, while the workers' process loads the solver
+    import distributed.utils
     from distributed import LocalCluster, Security
 
+    distributed.utils._forkserver_preload_set = True  # or dask would load pandas, here and there
+    started = {
+        "distributed.worker.multiprocessing-method": method,
+        "distributed.worker.preload": [beginning(_FROM_THE_START)],
+    }
     security = Security.temporary()
     with (
         _safe_path(),
         tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True) as scratch,
-        dask.config.set({**CONFIGURATION, **_CLOSED}),
+        dask.config.set({**CONFIGURATION, **_CLOSED, **started}),
     ):
         try:
             cluster = LocalCluster(

@@ -1,10 +1,11 @@
-"""One run as a labelled data set, with names, units and flags by the CF conventions."""
+"""One run as labelled variables, with names, units and flags by the CF conventions."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,10 +18,26 @@ from studies.definition.vocabulary import ERROR, KEEP, LABEL_ATTRIBUTES, SYMMETR
 from studies.storage import ugrid
 from studies.storage.provenance import provenance
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 INTEGER_FILL = -1
+
+
+class Variable(NamedTuple):
+    """Values over named dimensions, with attributes."""
+
+    dims: tuple[str, ...]
+    values: np.ndarray
+    attrs: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class RunContent:
+    """The content of a run's file; ``xr.Dataset(content.variables, attrs=content.attrs)`` has it.
+
+    A worker makes and writes it without xarray, which would take longer to load than a small run.
+    """
+
+    variables: Mapping[str, Variable]
+    attrs: Mapping[str, Any]
 
 
 def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
@@ -47,8 +64,8 @@ def usual_dimensions(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in USUAL_AXES if name in known)
 
 
-def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.Dataset:
-    """Return the data set of a run.
+def run_content(scene: Scene, case: Case, record: Record, keep: str = "") -> RunContent:
+    """Return the content of the file of a run.
 
     It does not depend on the study, except for ``keep``: with it a complete run has the fields at
     the nodes.
@@ -67,29 +84,31 @@ def run_dataset(scene: Scene, case: Case, record: Record, keep: str = "") -> xr.
         variables[name] = (*sweep, *dimensions), array, attributes_of(name, scene)
     for name, number in record.scalars.items():
         variables[name] = sweep, _scalar(name, number).reshape(ones), attributes_of(name, scene)
-    frame = _frame(scene, case, sweep, status, record.message)
+    attrs: dict[str, Any] = {SYMMETRIC: int(record.symmetric)}
     if keep and record.mesh is not None:
         variables |= ugrid.variables(record.mesh())
-        frame = frame.assign_attrs({KEEP: keep})
-    return frame.assign(variables).assign_attrs({SYMMETRIC: int(record.symmetric)})
+        attrs[KEEP] = keep
+    return _content(scene, case, status, record.message, variables, attrs)
 
 
-def broken_dataset(scene: Scene, case: Case, message: str) -> xr.Dataset:
-    """Return the data set of a run without a record: status and message only."""
-    return _frame(scene, case, usual_dimensions(scene), ERROR, message)
+def broken_content(scene: Scene, case: Case, message: str) -> RunContent:
+    """Return the content of the file of a run without a record: status and message only."""
+    return _content(scene, case, ERROR, message, {}, {})
 
 
-def encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """Return how to store each variable: compressed numbers, a fill value for counts."""
-    packed = {"zlib": True, "complevel": 1, "shuffle": True}
-    chosen: dict[str, dict[str, Any]] = {}
-    for name, variable in dataset.variables.items():
-        if variable.dtype.kind == "f":
-            fill = {} if name in dataset.coords else {"_FillValue": np.nan}
-            chosen[str(name)] = {**packed, **fill} if variable.ndim else fill
-        elif variable.dtype.kind == "i":
-            chosen[str(name)] = {"_FillValue": np.int32(INTEGER_FILL)}
-    return chosen
+def storage_of(variable: Variable) -> dict[str, Any]:
+    """Return how netCDF stores a variable: compressed numbers, checksums, a value for absent ones.
+
+    The entries are arguments of `netCDF4.Dataset.createVariable`.
+    """
+    kind = variable.values.dtype
+    if kind.kind == "f":
+        packed = {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}
+        return {"datatype": kind, "fill_value": np.nan, **(packed if variable.dims else {})}
+    if kind.kind == "i":
+        whole = {"datatype": kind, "fill_value": np.int32(INTEGER_FILL)}
+        return {**whole, "fletcher32": bool(variable.dims)}
+    return {"datatype": str}
 
 
 def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -120,22 +139,31 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     }
 
 
-def _frame(
-    scene: Scene, case: Case, sweep: tuple[str, ...], status: str, message: str
-) -> xr.Dataset:
-    """Return a data set without the results of the solver."""
-    import xarray as xr  # takes half a second, and is needed only to make a data set
-
+def _content(
+    scene: Scene,
+    case: Case,
+    status: str,
+    message: str,
+    variables: Mapping[str, tuple[Any, Any, Mapping[str, Any]]],
+    attrs: Mapping[str, Any],
+) -> RunContent:
+    """Return status, message, parameters of the sweep, and the results of the solver."""
+    sweep = usual_dimensions(scene)
     ones = (1,) * len(sweep)
-    outcome, text = (np.full(ones, each, dtype=object) for each in (status, message))
+    every: dict[str, tuple[Any, Any, Mapping[str, Any]]] = {
+        name: (sweep, np.full(ones, text, dtype=object), attributes_of(name))
+        for name, text in (("status", status), ("message", message))
+    }
+    for name in sweep:
+        every[name] = name, [case.values[name]], axis_attributes(scene, name)
     title = f"{scene.name}: {scene.summary}"
-    return xr.Dataset(
+    known = provenance(title, scene, completed(scene, case.values))
+    return RunContent(
         {
-            "status": (sweep, outcome, attributes_of("status")),
-            "message": (sweep, text, attributes_of("message")),
+            name: Variable((dims,) if isinstance(dims, str) else dims, np.asarray(values), words)
+            for name, (dims, values, words) in {**every, **variables}.items()
         },
-        coords={name: (name, [case.values[name]], axis_attributes(scene, name)) for name in sweep},
-        attrs=provenance(title, scene, completed(scene, case.values)) | {"id": case.id},
+        {**known, "id": case.id, **attrs},
     )
 
 

@@ -10,10 +10,14 @@ from __future__ import annotations
 import errno
 import hashlib
 import re
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from studies.errors import RunUnreadable, StoreFull
 from studies.storage import dataset as layout
@@ -21,7 +25,7 @@ from studies.storage import ugrid
 
 if TYPE_CHECKING:
     import h5py
-    import xarray as xr
+    import netCDF4
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of a file that has the line; an older file has neither."""
@@ -36,34 +40,51 @@ _ORDER = "variables"
 """Attribute with the names of the variables in order, except those of the mesh; netCDF loses the
 order in memory."""
 _NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
+_LOCK = Lock()
 
 
-def sealed(run: xr.Dataset) -> bytes:
+def sealed(run: layout.RunContent) -> bytes:
     """Return the content of a run's file: its netCDF, and the last line."""
     begun = _packed(run) + f"\nrun {run.attrs['id']} sha256 ".encode()
     return begun + hashlib.sha256(begun).hexdigest().encode() + b"\n"
 
 
-def _packed(run: xr.Dataset) -> bytes:
+def _packed(run: layout.RunContent) -> bytes:
     """Return a run as netCDF, made in memory: HDF5 does not survive a full disk."""
-    import netCDF4  # takes half a second, and a complete study does not need it
-    from xarray.backends import NetCDF4DataStore
-    from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
+    import netCDF4  # a complete study does not need it
 
-    stored = layout.encoding(run)
-    for name, variable in run.variables.items():
-        if variable.ndim and variable.dtype.kind in "fi":
-            stored.setdefault(str(name), {})["fletcher32"] = True
-    combined = (n for n, each in run.variables.items() if not ugrid.owns(str(n), each.dims))
-    order = {_ORDER: " ".join(map(str, combined))}
-    with NETCDF4_PYTHON_LOCK:
+    order = [str(name) for name, each in run.variables.items() if not ugrid.owns(name, each.dims)]
+    with _one_writer():
         file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
         try:
-            store = NetCDF4DataStore(file, lock=False)
-            run.assign_attrs(SEALED | order).dump_to_store(store, encoding=stored)
+            file.setncatts({**run.attrs, **SEALED, _ORDER: " ".join(order)})
+            for name, variable in run.variables.items():
+                _write(file, str(name), variable)
         finally:
             content = file.close()
         return bytes(content)
+
+
+def _write(file: netCDF4.Dataset, name: str, variable: layout.Variable) -> None:
+    """Write a variable, and the dimensions that the file does not have yet."""
+    values = np.asarray(variable.values)
+    for dimension, length in zip(variable.dims, values.shape, strict=True):
+        if dimension not in file.dimensions:
+            file.createDimension(dimension, length)
+    stored = file.createVariable(name, dimensions=variable.dims, **layout.storage_of(variable))
+    stored.setncatts(variable.attrs)
+    stored.set_auto_maskandscale(False)
+    stored[...] = values.astype(object) if values.dtype.kind in "OU" else values
+
+
+@contextmanager
+def _one_writer() -> Iterator[None]:
+    """Wait for other threads that use the netCDF library, here or through xarray."""
+    with ExitStack() as locks:
+        locks.enter_context(_LOCK)
+        if reader := sys.modules.get("xarray.backends.netCDF4_"):
+            locks.enter_context(reader.NETCDF4_PYTHON_LOCK)
+        yield
 
 
 def verify(path: Path) -> bool:

@@ -27,7 +27,6 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Literal
 
 from solver.results.record import Record
 from solver.scenes import Scene
@@ -42,10 +41,6 @@ from studies.storage.catalogue import Catalogue, Row
 from studies.storage.lock import locked
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
-
-ENGINE: Literal["h5netcdf"] = "h5netcdf"
-"""netCDF backend for reading; safe with several threads."""
-
 
 _BATCH = 500
 """Number of runs that are verified before their rows are written."""
@@ -130,10 +125,10 @@ class Store:
             if the file differs from the record; then there is no file
         """
         if isinstance(outcome, str):
-            run = layout.broken_dataset(case.scene, case, outcome)
+            run = layout.broken_content(case.scene, case, outcome)
         else:
             outcome = outcome.with_one_mesh()
-            run = layout.run_dataset(case.scene, case, outcome, keep)
+            run = layout.run_content(case.scene, case, outcome, keep)
         path = self.run_path(case.id)
         content = runfile.sealed(run)
         with self._writable():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -13,7 +13,11 @@ import xarray as xr
 from studies.definition.study import Study
 from studies.errors import StudyError
 from studies.storage.frame import FRACTION
-from studies.storage.store import ENGINE, Store
+from studies.storage.store import Store
+
+ENGINE: Literal["netcdf4"] = "netcdf4"
+"""netCDF backend of xarray for files: it opens a run ten times as fast as h5netcdf, and its calls
+wait for those of other threads. It does not read a file in memory."""
 
 _WAIT = 60.0
 """Timeout of a request to a service [s]."""
@@ -65,7 +69,7 @@ def _fetched(url: str) -> xr.Dataset:
         answer = httpx.get(whole, timeout=_WAIT, follow_redirects=True)
         if answer.is_error:
             raise ValueError(_refusal(answer))
-        dataset = xr.load_dataset(io.BytesIO(answer.content), engine=ENGINE)
+        dataset = xr.load_dataset(io.BytesIO(answer.content), engine="h5netcdf")
     except (httpx.HTTPError, httpx.InvalidURL, OSError, ValueError) as error:
         raise StudyError("path", url, f"must be a study of a service: {error}") from None
     return _indexed(dataset)

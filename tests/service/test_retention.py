@@ -168,7 +168,9 @@ def test_a_study_deleted_as_its_turn_comes_is_not_begun(place: Place) -> None:
     place.jobs.dismiss(study.id)
     place.keeper().purge(study.id)
     settings = Settings(data=place.store.directory)
-    runner = Scripted(settings, place.jobs, Pool(settings, 0), 0, lambda: place.jobs, script=[[]])
+    runner = Scripted(
+        settings, place.jobs, Pool.of(settings, 0), 0, lambda: place.jobs, script=[[]]
+    )
     asyncio.run(runner._compute(job))
     assert not runner.orders and not place.there(study)
 

@@ -31,7 +31,7 @@ def deaths(server: Server) -> list[Figure]:
                 name = ("service.child", "service.pool")[kind - 1]
                 _kill([each for each in family if name in _command(each)])
             case 3:
-                _kill([each for each in family if "spawn_main" in _command(each)][-1:])
+                _kill([each for each in family if "forkserver" in _command(each)][-1:])
         time.sleep(2.0)
     end = server.finished(study_id, 300.0)
     runs = list((server.data / "runs").glob("*.nc"))

@@ -15,7 +15,7 @@ from solver.results.quantities import QUANTITIES
 from solver.results.record import Record, Status
 from studies import Store, Study, open_netcdf
 from studies.storage import provenance
-from studies.storage.dataset import broken_dataset, run_dataset
+from studies.storage.dataset import broken_content, run_content
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
@@ -96,8 +96,8 @@ def test_the_linear_solver_that_ran_is_told_also_by_a_run_that_broke(
 ) -> None:
     monkeypatch.setenv("RESIDUA_LINEAR_SOLVER", asked)
     case = next(fake_study().cases())
-    assert run_dataset(FAKE, case, record(case.parameters)).attrs["linear_solver"] == told
-    assert broken_dataset(FAKE, case, "lost").attrs["linear_solver"] == told
+    assert run_content(FAKE, case, record(case.parameters)).attrs["linear_solver"] == told
+    assert broken_content(FAKE, case, "lost").attrs["linear_solver"] == told
 
 
 def test_a_library_that_is_not_installed_is_told_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,7 +133,7 @@ def test_a_dimension_without_coordinate_is_refused() -> None:
         fields={"plastic_strain": (("x",), np.ones(3))},
     )
     with pytest.raises(ValueError, match="plastic_strain"):
-        run_dataset(FAKE, case, lost)
+        run_content(FAKE, case, lost)
 
 
 def test_every_quantity_of_the_table_has_a_unit_that_is_si_or_one() -> None:

@@ -41,11 +41,19 @@ def never() -> bool:
     return False
 
 
+def workers() -> list[psutil.Process]:
+    """The worker processes of this process, which has other children too."""
+    return [
+        each
+        for server in psutil.Process().children()
+        if "forkserver" in " ".join(server.cmdline())
+        for each in server.children()
+    ]
+
+
 def listening() -> list[Any]:
     """Ports that this process and its workers listen on."""
-    here = psutil.Process()  # which may be the parent of other tests' services too
-    spawned = [each for each in here.children() if "spawn_main" in " ".join(each.cmdline())]
-    family = [here, *spawned]
+    family = [psutil.Process(), *workers()]
     return [
         each.laddr
         for process in family
@@ -92,6 +100,28 @@ def test_workers_of_our_own_get_the_memory_that_is_set() -> None:
     with own_workers(1, "700MB") as access, connect(access) as client:
         (worker,) = client.scheduler_info()["workers"].values()
     assert worker["memory_limit"] == 700_000_000
+
+
+def test_workers_are_forks_of_one_process_and_have_the_environment_of_their_own_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def environment() -> dict[str, str]:
+        return dict(os.environ)
+
+    found = []
+    for change in ({"RESIDUA_LINEAR_SOLVER": "superlu"}, {}):
+        with monkeypatch.context() as patch:
+            for name, value in change.items():
+                patch.setenv(name, value)
+            expected = {**os.environ, **change}
+            with own_workers(1) as access, connect(access) as client:
+                (worker,) = workers()[-1:]
+                found.append(worker.ppid())
+                (seen,) = client.run(environment).values()
+        assert {name: seen.get(name) for name in expected} == expected
+        assert seen.get("RESIDUA_LINEAR_SOLVER") == change.get("RESIDUA_LINEAR_SOLVER")
+        assert seen["MALLOC_TRIM_THRESHOLD_"] == str(2**28)
+    assert found[0] == found[1] != os.getpid()
 
 
 def test_certificates_that_are_missing_or_bad_are_told(tmp_path: Path) -> None:
@@ -254,11 +284,11 @@ def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
 
     def killer() -> None:
         while not spared.wait(0.05):
-            for child in psutil.Process().children():
-                if "spawn_main" in " ".join(child.cmdline()) and child.pid not in others:
-                    child.kill()
+            for worker in workers():
+                if worker.pid not in others:
+                    worker.kill()
 
-    others = {child.pid for child in psutil.Process().children()}
+    others = {worker.pid for worker in workers()}
     with own_workers(1) as access, Grid(access) as grid:
         thread = threading.Thread(target=killer)
         thread.start()

@@ -5,11 +5,12 @@ They are put into what writes files, one at a time, as those of `mutations` into
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from solver.results.record import Status
@@ -29,12 +30,17 @@ class FileFault:
 
 def written(change: Callable[[xr.Dataset], xr.Dataset]) -> Fault:
     """The data set that is written is changed."""
-    make = layout.run_dataset
+    make = layout.run_content
 
     def fault(patch: Patch) -> None:
-        patch.setattr(layout, "run_dataset", lambda *given: change(make(*given)))
+        patch.setattr(layout, "run_content", lambda *given: change(labelled(make(*given))))
 
     return fault
+
+
+def labelled(run: layout.RunContent) -> xr.Dataset:
+    """The content of a file as a data set, which writes in the same way."""
+    return xr.Dataset(run.variables, attrs=run.attrs)
 
 
 def values(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Fault:
@@ -56,16 +62,30 @@ def attribute(name: str, **changes: Any) -> Fault:
 
 def stored(name: str, **changes: Any) -> Fault:
     """A variable is stored in another way."""
-    encoding = layout.encoding
+    write = runfile._write
 
-    def changed(run: xr.Dataset) -> Mapping[str, Any]:
-        chosen = encoding(run)
-        return chosen | {name: {**chosen.get(name, {}), **changes}}
+    def changed(file: Any, each: str, variable: layout.Variable) -> None:
+        usual = layout.storage_of
+        with pytest.MonkeyPatch.context() as patch:
+            if each == name:
+                patch.setattr(layout, "storage_of", lambda given: {**usual(given), **changes})
+            write(file, each, variable)
 
     def fault(patch: Patch) -> None:
-        patch.setattr(layout, "encoding", changed)
+        patch.setattr(runfile, "_write", changed)
 
     return fault
+
+
+def as_short_integers(name: str, scale: float) -> Fault:
+    """A variable is stored as multiples of a number, as netCDF packs values."""
+
+    def change(run: xr.Dataset) -> xr.Dataset:
+        whole = np.round(np.nan_to_num(run[name].values) / scale).astype("i2")
+        return run.assign({name: (run[name].dims, whole, {**run[name].attrs, **factor})})
+
+    factor = {"scale_factor": scale}
+    return written(change)
 
 
 def in_mesh(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Fault:
@@ -179,16 +199,16 @@ FILE_FAULTS: dict[str, FileFault] = {
         told="its parameters",
     ),
     # how it is stored
-    "single precision": FileFault(fault=stored(MAP, dtype="f4"), told="numbers of 4 bytes"),
+    "single precision": FileFault(fault=stored(MAP, datatype="f4"), told="numbers of 4 bytes"),
     "rounded by compression": FileFault(
         fault=stored(MAP, significant_digits=4), told=f"{MAP} has other values"
     ),
     "packed as short integers": FileFault(
-        fault=stored("plastic_strain", dtype="i2", scale_factor=1e-4, _FillValue=np.int16(-1)),
+        fault=as_short_integers("plastic_strain", 1e-4),
         told="plastic_strain has the scale_factor 0.0001",
     ),
     "zero as what is absent": FileFault(
-        fault=stored("contact_pressure", _FillValue=0.0),
+        fault=stored("contact_pressure", fill_value=0.0),
         told="contact_pressure has the fill value 0.0",
     ),
     "a range of what is valid": FileFault(
@@ -212,7 +232,8 @@ def every_run_is_ok(patch: Patch) -> None:
     """The status word is wrong in each file, that of a broken run too."""
     packed = runfile._packed
 
-    def fault(run: xr.Dataset) -> bytes:
-        return packed(run.assign(status=run["status"].copy(data=np.full((1, 1, 1), "ok"))))
+    def fault(run: layout.RunContent) -> bytes:
+        status = run.variables["status"]._replace(values=np.full((1, 1, 1), "ok"))
+        return packed(replace(run, variables={**run.variables, "status": status}))
 
     patch.setattr(runfile, "_packed", fault)

@@ -1,0 +1,51 @@
+"""What the process of a worker loads: nothing that a run does not need, and all of it once."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from studies.execution.forking import NEEDED
+from tests.architecture.sources import ROOT
+
+NEVER = {"dask.array", "dask.dataframe", "matplotlib", "meshio", "numba", "pandas", "xarray"}
+"""Each takes a tenth of a second to load, or much more, and memory of each worker."""
+
+PROGRAM = f"""
+import importlib, json, sys
+from pathlib import Path
+for name in {NEEDED!r}:
+    importlib.import_module(name)
+before = set(sys.modules)
+from studies import Store, Study
+from studies.definition.identity import solver_hash
+from studies.execution.task import PathTask, walk
+study = Study.from_dict({{
+    "name": "coarse", "scene": "punch",
+    "parameters": {{"smallest_element": 0.05, "growth": 3.0, "load_ratio": 0.3}},
+    "sweep": {{"friction": [0.2]}},
+}})
+out = Path(sys.argv[1])
+Store(out).save_study(study)
+walk(PathTask(study.problem, tuple(study.paths()), out, solver_hash()), print, lambda: False)
+(row,) = Store(out).sound(study.run_ids()).values()
+print(json.dumps([row["status"], sorted(before), sorted(sys.modules)]))
+"""
+
+
+@pytest.mark.processes
+@pytest.mark.solves
+def test_a_worker_loads_what_a_run_needs_before_it_is_forked_and_nothing_else(
+    tmp_path: Path,
+) -> None:
+    command = [sys.executable, "-c", PROGRAM, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    status, before, after = json.loads(done.stdout.splitlines()[-1])
+    assert status == "ok"
+    assert not NEVER & set(after)
+    first, last = ({name.partition(".")[0] for name in names} for names in (before, after))
+    assert last - first <= sys.stdlib_module_names
