@@ -150,11 +150,11 @@ def serve(
     data : directory of runs, studies and the queue
     scheduler : address of a dask scheduler; without one each study starts its own workers
     """
-    find_modules_at_home()
     try:
         settings = chosen(host=host, port=port, data=data, scheduler=scheduler)
     except StudyError as error:
         refuse(str(error))
+    find_modules_at_home()
     logs.configure(settings.log_format)
     try:
         app = create_app(settings)
