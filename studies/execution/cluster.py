@@ -8,7 +8,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
@@ -158,30 +158,32 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
     }
     security = Security.temporary()
     with (
-        _safe_path(),
         tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True) as scratch,
         dask.config.set({**CONFIGURATION, **_CLOSED, **started}),
     ):
         try:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                protocol="tls://",
-                security=security,
-                dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
-                scheduler_kwargs={"dashboard": False},
-                local_directory=scratch,
-                silence_logs=logging.CRITICAL,
-                **({"memory_limit": memory} if memory else {}),
-            )
+            with _safe_path():
+                cluster = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    protocol="tls://",
+                    security=security,
+                    dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
+                    scheduler_kwargs={"dashboard": False},
+                    local_directory=scratch,
+                    silence_logs=logging.CRITICAL,
+                    **({"memory_limit": memory} if memory else {}),
+                )
         except RuntimeError as error:  # as where a thread of the script asks for them
             raise RuntimeError(
                 "worker processes did not start; they import the calling script again, so it must "
                 f"do its work under: {GUARD}"
             ) from error
-        with cluster, _kept(cluster, workers):
+        # A fork has the safe path of its server; what is spawned for a lost worker needs it here.
+        safe = _safe_path() if method == "spawn" else nullcontext()
+        with cluster, _kept(cluster, workers), safe:
             yield Access(
                 cluster.scheduler_address,
                 security.tls_ca_file,
