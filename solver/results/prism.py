@@ -7,6 +7,7 @@ the load they are known in the zone that may yield; elsewhere they are NaN.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from solver.materials.law import Law
     from solver.materials.state import PlasticState
     from solver.prism.patch_contact import PatchContact
+    from solver.prism.section import Section
     from solver.prism.state import PrismState
     from solver.prism.track import PrismTrack
     from solver.steady import Pass
@@ -87,7 +89,7 @@ class PrismBody:
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields at positions (3, n) [mm]; x has no effect."""
         del name
-        return Sampler(self.track.section.plane, X[[2, 1]])  # type: ignore[arg-type]
+        return _sampler(self.track.section, np.ascontiguousarray(X[[2, 1]]).tobytes())
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to nodes."""
@@ -148,6 +150,13 @@ class PrismBody:
         nothing = np.zeros((6, 6, 0)), np.zeros(0, dtype=bool)
         response = Response(stress, nothing[0], plastic, nothing[1])
         return PrismStage(State(time, (u,), (plastic,), ()), response)
+
+
+@lru_cache(maxsize=8)
+def _sampler(section: Section, positions: bytes) -> Sampler:
+    """Return the interpolation at positions (2, n) in a section; runs over a prism share it."""
+    x = np.frombuffer(positions).reshape(2, -1)
+    return Sampler(section.plane, x)  # type: ignore[arg-type]
 
 
 def in_space(plane: Array) -> Array:

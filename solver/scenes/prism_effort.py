@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
     from solver.prism.section import Section
 
-_FIRST, _FACTOR = 1.2, 4.3e-5
+_FIRST, _FACTOR = 0.5, 2.2e-5
 """Seconds of a set-up: at least, and per wave and unknown of the zone."""
 _STILL, _POINT = 0.01, 1.5e-6
 """Seconds of a pass where nothing yields: at least, and per point and station of the window."""
-_YIELDS = 38.0
+_YIELDS = 28.0
 """Work of all yielding under a wheel that rolls again and again, in passes where nothing yields.
 Half of it is in the first pass, a quarter in the second, and so on."""
 

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 _REACHES = (1.0, 1.4, 2.0)
 """Ratios of the size of zone and window to the usual size, tried in turn."""
+_SETTLED = 1
+"""Number of Newton steps of a pass, up to which the next one is taken to be nearly the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,13 +164,16 @@ class _Path:
     def _roll(self) -> None:
         """Compute the next pass.
 
-        It begins with the strain of the last pass if that had the same load, else with the elastic
-        solution of its load on the strain that is left: the strain of another load leads nowhere.
+        It begins with the elastic solution of its load on the strain that is left. Only where pass
+        after pass is nearly the same it begins with the strain of the last one: of passes that
+        still yield, that is farther away, and of another load it leads nowhere.
         """
         found = self._found
         before = self._track.virgin(self._law) if found is None else found.after
         load = self._prism.load(self._track, len(self._traces))
-        guess = found.strain if found is not None and load is self._load else None
+        guess = None
+        if found is not None and load is self._load and found.steps <= _SETTLED:
+            guess = found.strain
         with one_thread():
             contact = None if found is None else contact_of(found)
             moving = PatchPassing(load, before.displacement, contact)
