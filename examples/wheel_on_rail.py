@@ -27,8 +27,9 @@ section = Section(mesh, steel.elasticity, springs={"foot": foundation})
 middle = section.points.mean(axis=2)
 yields = (section.weights.sum(axis=1) < 1.5 * size**2) & (middle[1] > -zone.depth - 2.0)
 track = PrismTrack(
-    section, yields, "running", length=64.0, spacing=spacing, ahead=20.0, behind=24.0, reach=9.0
-)
+    section, yields, "running", length=64.0, spacing=spacing, ahead=20.0, behind=24.0, reach=9.0,
+    levels=3,
+)  # fmt: skip
 
 # The running circle of the wheel is 4 mm beside the axis of the rail; it rolls freely.
 wheel = ProfiledWheel(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.parameters import Pairs, pairs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +47,7 @@ def read_points(path: str | Path) -> Array:
     return checked_points(np.array(points).reshape(-1, 2).T)
 
 
-def as_points(field: str, value: Any) -> tuple[tuple[float, float], ...]:
+def as_points(field: str, value: Any) -> Pairs:
     """Return points as pairs z, y, from pairs or an array (n, 2) [mm].
 
     Raises
@@ -53,28 +55,23 @@ def as_points(field: str, value: Any) -> tuple[tuple[float, float], ...]:
     ModelError
         for ``field``, if they are not at least four pairs of finite numbers, z increasing
     """
-    try:
-        X = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        X = np.zeros(0)
-    if X.ndim != 2 or X.shape[1] != 2 or not np.isfinite(X).all():
-        raise ModelError(field, value, "must be a list of points [z, y]")
-    if len(X) < _FEWEST:
-        raise ModelError(field, X.tolist(), f"must have at least {_FEWEST} points")
-    for k in np.flatnonzero(np.diff(X[:, 0]) <= 0)[:1]:
-        allowed = f"must be points whose z increases; these are number {k} and {k + 1}"
-        raise ModelError(field, X[k : k + 2].tolist(), allowed)
-    return tuple((float(z), float(y)) for z, y in X)
+    with suppress(TypeError, ValueError):
+        value = tuple(map(tuple, np.asarray(value, dtype=float).tolist()))
+    found = pairs(field, value)
+    checked_points(np.array(found).reshape(-1, 2).T, field)
+    return found
 
 
-def checked_points(points: Array) -> Array:
-    """Return points (2, n) of a curve from left to right, or raise `ModelError` for ``points``.
+def checked_points(points: Array, field: str = "points") -> Array:
+    """Return points (2, n) of a curve from left to right, or raise `ModelError` for ``field``.
 
     They must be at least four finite points, the first coordinate increasing.
     """
     X = np.asarray(points, dtype=float)
     if X.ndim != 2 or len(X) != 2 or X.shape[1] < _FEWEST or not np.isfinite(X).all():
-        raise ModelError("points", X.shape, "must be two rows of at least four finite numbers")
+        allowed = f"must have at least {_FEWEST} points of finite numbers"
+        raise ModelError(field, X.T.tolist(), allowed)
     for k in np.flatnonzero(np.diff(X[0]) <= 0)[:1]:
-        raise ModelError("points", X[:, k + 1].tolist(), f"must lie to the right of {X[0, k]:g}")
+        allowed = f"must be points whose z increases; these are number {k} and {k + 1}"
+        raise ModelError(field, X[:, k : k + 2].T.tolist(), allowed)
     return X

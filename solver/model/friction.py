@@ -12,6 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
@@ -26,6 +27,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Value = float | NDArray[np.float64]
+
+
+class PatchStatus(IntEnum):
+    """The state of a place in a contact."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
 
 LEAST_FRICTION = 1e-10
 """A coefficient of friction up to this value counts as zero. Its forces are below the tolerance of

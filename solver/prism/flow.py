@@ -12,6 +12,8 @@ from solver.steady.load import Given
 from solver.steady.passing import passing
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from solver.materials.law import Law
@@ -80,12 +82,12 @@ class PrismFlow(_Swept):
     ----------
     modes : the waves of the prism
     rim : numbers of the points at the edge of the zone, which must not yield
-    virgin : state before any load
+    virgin : returns the state before any load
     added : (n, window, 6) strain that the pass adds, Mandel
     """
 
     def __init__(
-        self, modes: Modes, rim: NDArray[np.int64], law: Law, virgin: PrismState,
+        self, modes: Modes, rim: NDArray[np.int64], law: Law, virgin: Callable[[], PrismState],
         before: PrismState, added: Array, parts: int,
     ) -> None:  # fmt: skip
         super().__init__(law, before, before, before.strain[:, None] + added, parts)
@@ -108,7 +110,7 @@ class PrismFlow(_Swept):
         strain there is that of all plastic strain, not of what this pass adds: what is left over
         of each release would add up from pass to pass.
         """
-        body = _Release(self._modes, self._virgin)
+        body = _Release(self._modes, self._virgin())
         end = self._last(self._before.displacement)
         had = self._stiff * self._before.plastic_strain[:, None]
         guess, nothing = body.strain(self.force[:, -1:] + had), body.at_rest

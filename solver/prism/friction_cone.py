@@ -25,6 +25,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from solver.errors import NoContact
+from solver.model.friction import PatchStatus
 from solver.steady.passing import searched
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-OPEN, STICK, SLIP = 0, 1, 2
+OPEN, STICK, SLIP = map(int, PatchStatus)
 """Status of a point."""
 NORMAL, TANGENTS = 1, (0, 2)
 """Places of the normal and of the tangents among local axes (x, normal, tangent across)."""

@@ -55,6 +55,8 @@ _SLIDES = 1.0
 class RollingPatch:
     """A wheel pressed on the surface of a prism; see `PatchLoad`.
 
+    Friction and load, the parameters after ``wheel``, are given by name.
+
     Parameters
     ----------
     grid : stations and vertices of the surface
@@ -80,14 +82,7 @@ class RollingPatch:
         grid: PatchGrid,
         compliance: Array,
         wheel: ProfiledWheel,
-        *,
-        friction: float,
-        force: float,
-        drive: float | None = None,
-        lateral_force: float | None = None,
-        creepage: float = 0.0,
-        lateral_creepage: float = 0.0,
-        spin: float = 0.0,
+        **load: Any,
     ) -> None:
         n, m = grid.stations, len(grid.z)
         if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
@@ -95,10 +90,7 @@ class RollingPatch:
             raise ModelError("compliance", compliance.shape, allowed)
         self.grid, self._axes, self._area = grid, grid.axes, grid.area
         self._set_wheel(wheel)
-        self._set_load(
-            friction=friction, force=force, drive=drive, lateral_force=lateral_force,
-            creepage=creepage, lateral_creepage=lateral_creepage, spin=spin,
-        )  # fmt: skip
+        self._set_load(**load)
         with one_thread():
             self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
         if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,7 +46,7 @@ class PrismTrack:
     spacing : distance h of stations [mm]; L is an even number of them
     ahead, behind : the window extends from x = ahead to x = -behind [mm]
     reach : half the length of the surface where the load may act [mm]
-    levels : levels of the far field; without any the prism repeats itself
+    levels : levels of the far field; with 0 the prism repeats itself
     span : length of a prism that is clamped at both ends, the load in its middle [mm]; None if it
         is endless
 
@@ -77,7 +77,7 @@ class PrismTrack:
         ahead: float,
         behind: float,
         reach: float,
-        levels: int = 3,
+        levels: int,
         span: float | None = None,
     ) -> None:
         stations, before = round(length / spacing), round(ahead / spacing)
@@ -157,7 +157,9 @@ class PrismTrack:
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
         """Return the flow of a material along the rows of points."""
-        return PrismFlow(self.modes, self.rim, law, self._virgin(law), before, added, parts)
+        return PrismFlow(
+            self.modes, self.rim, law, partial(self._virgin, law), before, added, parts
+        )
 
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""

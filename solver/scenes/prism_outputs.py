@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.model.friction import PatchStatus
 from solver.results.quantities import declare
 from solver.results.shakedown import Shakedown, ShakedownState, classify
 from solver.scenes.passes import (
@@ -34,14 +34,6 @@ if TYPE_CHECKING:
     from solver.scenes.prism_passes import PassTrace
 
     Array = NDArray[np.float64]
-
-
-class PatchStatus(IntEnum):
-    """The state of a place in the contact, as `solver.prism.friction_cone` numbers it."""
-
-    OPEN = 0
-    STICK = 1
-    SLIP = 2
 
 
 _PATCH = ("x", "z")

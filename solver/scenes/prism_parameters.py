@@ -13,6 +13,10 @@ from solver.materials.elasticity import Elasticity
 from solver.parameters import Fraction, Other, described
 from solver.scenes.material_parameters import MaterialParameters
 from solver.scenes.wheel_parameters import (
+    CONTROL,
+    POISSON,
+    STIFFNESS,
+    TRACTION,
     Control,
     SamePoisson,
     Stiffness,
@@ -31,14 +35,8 @@ class PrismParameters(MaterialParameters):
 
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
     friction: Fraction = described(0.17, "Coulomb friction coefficient")
-    traction: Traction = described(
-        0.0,
-        "ratio of the longitudinal force to that of full slip, friction times load: positive "
-        "brakes, negative accelerates, 1 is a locked wheel",
-    )
-    control: Control = described(
-        "moment", "whether the moment of `traction` turns the wheel, or its creepage is prescribed"
-    )
+    traction: Traction = described(0.0, TRACTION)
+    control: Control = described("moment", CONTROL)
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
         "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V",
@@ -49,12 +47,8 @@ class PrismParameters(MaterialParameters):
         "velocity of the axle along z over that along x, as by skew; the yaw of a wheel adds to it",
         needs={"friction": Other(0.0)},
     )
-    wheel_stiffness: Stiffness = described(
-        1.0, "ratio of Young's modulus of the wheel to that of the body it rolls on"
-    )
-    wheel_poisson_ratio: SamePoisson = described(
-        "same", "Poisson ratio of the wheel; same: that of the body it rolls on"
-    )
+    wheel_stiffness: Stiffness = described(1.0, STIFFNESS)
+    wheel_poisson_ratio: SamePoisson = described("same", POISSON)
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes

@@ -23,6 +23,15 @@ Stiffness = Annotated[float, Interval(ge=1e-3, le=1e3), Unit("1")]
 SamePoisson = Annotated[Poisson | Literal["same"], Unit("1")]
 """Poisson ratio of a wheel, or that of the body."""
 
+TRACTION = (
+    "ratio of the longitudinal force to that of full slip, friction times load: positive brakes, "
+    "negative accelerates, 1 is a locked wheel"
+)
+CONTROL = "whether the moment of `traction` turns the wheel, or `given_creepage` is prescribed"
+STIFFNESS = "ratio of Young's modulus of the wheel to that of the body it rolls on"
+POISSON = "Poisson ratio of the wheel; same: that of the body it rolls on"
+"""Descriptions of parameters of all wheels."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelParameters(ContactParameters):
@@ -40,25 +49,15 @@ class WheelParameters(ContactParameters):
         "Coulomb friction coefficient",
         needs={"load": ("contact",), "traction": Other(0.0)},
     )
-    traction: Traction = described(
-        0.0,
-        "ratio of the longitudinal force to that of full slip: positive brakes, negative "
-        "accelerates, 1 is a locked wheel",
-    )
-    control: Control = described(
-        "moment", "whether the moment of `traction` turns the wheel, or its rotation is prescribed"
-    )
+    traction: Traction = described(0.0, TRACTION)
+    control: Control = described("moment", CONTROL)
     given_creepage: Annotated[float, Interval(ge=-0.1, le=1.0), Unit("1")] = described(
         0.0,
         "creepage 1 + R d(rotation) / d(advance) of a prescribed rotation: positive brakes",
     )
     radius: Length = described(334.92, "radius R of the wheel")
-    wheel_stiffness: Stiffness = described(
-        1.0, "ratio of Young's modulus of the wheel to that of the half-space"
-    )
-    wheel_poisson_ratio: SamePoisson = described(
-        "same", "Poisson ratio of the wheel; same: that of the half-space"
-    )
+    wheel_stiffness: Stiffness = described(1.0, STIFFNESS)
+    wheel_poisson_ratio: SamePoisson = described("same", POISSON)
     wheel_turned: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = described(
         0.0,
         "angle by which the wheel is turned before it is set down",

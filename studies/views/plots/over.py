@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
-from solver.scenes.prism_outputs import PatchStatus
+from solver.model.friction import PatchStatus
 from studies.views.plots.fields import Window, map_axes
 
 _STATUS = "patch_status"

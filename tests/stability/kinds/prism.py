@@ -56,7 +56,8 @@ given_up = tells(
 )
 _GEOMETRY = tells(
     "^(sequence.*)?(lateral_position|lateral_spread|wheel_profile|rail_profile|crown_radius"
-    "|groove_radius|load_ratio|force|initial_stress|traction_spread) = "
+    "|groove_radius|load_ratio|force|straightening_stress|stress_over_height|temperature_change"
+    "|traction_spread) = "
 )
 
 
