@@ -25,7 +25,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.linear import solvers as linear
 from solver.prism.modes import superposed
-from solver.prism.section import I_AXIS
+from solver.prism.section import I_AXIS, Carried
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -240,8 +240,11 @@ def _responses(
     mean = section.mean_motions[:, section.free]
     u = np.empty((len(at), len(wavenumbers), forces.shape[1]))
     moved = np.empty((len(mean), *u.shape[1:]))
+    motions = section.loose[section.free]
+    carried = Carried(motions, section.sprung(section.loose)[section.free])
     for wave, k in enumerate(wavenumbers):
         solver.factorise(whole.at(k))
-        found = solver.solve(forces[section.free])
+        own = forces[section.free]
+        found = solver.solve(own) if k else carried.solved(solver.solve, own)
         u[:, wave], moved[:, wave] = found[at], mean @ found
     return u, moved
