@@ -118,6 +118,24 @@ def test_zone_and_window_do_not_depend_on_the_unit_of_length(radius: float) -> N
     assert len(sizes) == 1
 
 
+@pytest.mark.parametrize(
+    ("accuracy", "given", "split"),
+    [
+        ("standard", {}, 3),
+        ("fine", {}, 4),
+        ("draft", {}, 0),
+        ("standard", {"hardening": "kinematic", "hardening_ratio": 0.005}, 3),
+        ("standard", {"hardening": "kinematic", "hardening_ratio": 0.05}, 0),
+    ],
+)
+def test_rows_are_divided_where_hardening_is_weak(
+    accuracy: Literal["draft", "standard", "fine"], given: dict[str, Any], split: int
+) -> None:
+    own = geometry(SCENE.parameters(accuracy=accuracy, load_by="force", **given))
+    assert own.window.zone.split == split
+    assert own.window.size.rows == round(own.depth / own.layer) + split  # the estimate's
+
+
 def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
     given = {"friction": 0.2, "traction": 0.5}
     record = rolled(load="hertz", **given)
