@@ -169,9 +169,9 @@ def test_a_locked_ball_slips_everywhere_and_drags_the_raceway() -> None:
     assert locked["highest_mises"] == pytest.approx(hertz["highest_mises"], rel=0.03)
 
 
-@pytest.mark.parametrize(("load_ratio", "yields"), [(1.55, False), (1.7, True)])
+@pytest.mark.parametrize(("load_ratio", "yields"), [(1.59, False), (1.64, True)])
 def test_it_yields_where_hertz_says(load_ratio: float, yields: bool) -> None:
-    """First yield at p0 = Re / 0.62 = 1.61 Re; with these elements it is 1.64."""
+    """First yield at p0 = Re / 0.62 = 1.613 Re; with these elements it is 1.612."""
     state = rolled(load="hertz", load_ratio=load_ratio).scalars["shakedown_state"]
     assert (state != ShakedownState.ELASTIC) == yields
 
