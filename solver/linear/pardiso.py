@@ -129,8 +129,10 @@ class Pardiso:
 
         Its values on the kept unknowns are the right-hand side of the Schur complement.
         """
+        b = np.asfortranarray(b)
         half = np.zeros_like(b)
-        self._call(_FORWARD, b, half)
+        if b.size:
+            self._call(_FORWARD, b, half)
         return half
 
     def on_kept(self, right: NDArray[np.float64]) -> NDArray[np.float64]:

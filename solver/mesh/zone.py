@@ -53,11 +53,13 @@ class Zone:
     depth : its depth [mm]
     size : side of the elements [mm]; width and depth are divided into whole numbers of elements
     layer : their side in depth, ``size`` if None [mm]
+    split : number of the uppermost rows that are divided into two
 
     Raises
     ------
     ModelError
-        if a length is not positive, or a side exceeds half of the width or the depth
+        if a length is not positive, a side exceeds half of the width or the depth, or more rows
+        are to be divided than there are
     """
 
     at: float
@@ -65,6 +67,7 @@ class Zone:
     depth: float
     size: float
     layer: float | None = None
+    split: int = 0
 
     def __post_init__(self) -> None:
         lengths = ["half_width", "depth", "size"] + ["layer"] * (self.layer is not None)
@@ -75,6 +78,8 @@ class Zone:
         for name in lengths[2:]:
             if getattr(self, name) > most:
                 raise ModelError(name, getattr(self, name), f"must be at most {most:g} [mm]")
+        if not 0 <= self.split <= self._whole:
+            raise ModelError("split", self.split, f"must be in 0 to {self._whole}, the rows")
 
     @property
     def columns(self) -> int:
@@ -82,9 +87,21 @@ class Zone:
         return round(2 * self.half_width / self.size)
 
     @property
+    def _whole(self) -> int:
+        """Number of elements in depth before some are divided."""
+        return round(self.depth / (self.layer or self.size))
+
+    @property
     def rows(self) -> int:
         """Number of elements in depth."""
-        return round(self.depth / (self.layer or self.size))
+        return self._whole + self.split
+
+    @property
+    def shares(self) -> Array:
+        """Depths (rows + 1,) of the lines between elements, from 0 to 1 of the zone's depth."""
+        whole = np.linspace(0.0, 1.0, self._whole + 1)
+        upper = halved(whole[: self.split + 1])
+        return np.concatenate([upper, whole[self.split + 1 :]])
 
 
 def rail_mesh(section: RailSection, zone: Zone) -> MeshQuad2:
@@ -179,7 +196,8 @@ def _head(
         np.concatenate([side[:, :-1], block[:, end]], axis=1)
         for side, end in zip(sides, (0, -1), strict=True)
     ]
-    rows = np.concatenate([below, height + zone.depth * np.linspace(0, 1, zone.rows + 1)[1:]])
+    up = 1 - zone.shares[::-1]
+    rows = np.concatenate([below, height + zone.depth * up[1:]])
     share = halved(rows / rows[-1])
     fishing = [
         _flattened(outline.at(start + (end - start) * share), -1)
@@ -272,7 +290,7 @@ def raceway_mesh(
         shoulder = edge + _beyond(half - edge, z[-1] - z[-2], half)[1:]
         z = np.concatenate([-shoulder[::-1], z, shoulder])
     below = zone.depth + _beyond(height - zone.depth, zone.layer or zone.size, height)[1:]
-    depths = np.concatenate([np.linspace(0, zone.depth, zone.rows + 1), below])
+    depths = np.concatenate([zone.depth * zone.shares, below])
     lines = halved(z)
     deep = halved(depths)[::-1]
     fade = np.minimum(1.0, (height - deep) / (height - zone.depth))
@@ -299,7 +317,7 @@ def _columns(surface: Array, direction: Array, zone: Zone) -> Array:
     step = np.hypot(*np.diff(surface)).min()
     most = abs(np.diff(turned)).max() * zone.depth / step
     angle = middle + min(_TURN, _TURN / most if most else _TURN) * turned
-    depth = zone.depth * (1 - even(zone.rows))
+    depth = zone.depth * halved(zone.shares)[::-1]
     return surface[:, :, None] + np.stack([np.sin(angle), -np.cos(angle)])[:, :, None] * depth
 
 

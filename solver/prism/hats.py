@@ -46,16 +46,24 @@ class Hats:
         weights[edges + 1, edges] = half * SHARES
         return weights.reshape(m, -1) / self.width[:, None]
 
-    @property
-    def nearest(self) -> Array:
-        """Weights (m, 2m - 2): the sum of hats nearest to a function, of its values at the points.
+    def nearest(self, shares: Array, weights: Array) -> Array:
+        """Weights (m, n (m - 1)): the sum of hats nearest to a function, of its values at points.
 
         Nearest means least squares. The integral over all hats is that of the function, and so is
         its product with every hat: forces on the vertices of a mesh are those of the function.
+
+        Parameters
+        ----------
+        shares, weights : (n,) positions of the points of an edge, over its length, and the weights
+            by which values there make the mean over the edge
         """
-        mean = self.mean
-        hats = np.stack([self.along(each[:-1], each[1:]) for each in np.eye(len(self.s))], axis=1)
-        return np.asarray(np.linalg.solve(mean @ hats, mean))
+        edges, m = np.arange(len(self.s) - 1), len(self.s)
+        length = np.diff(self.s)[:, None]
+        products = np.zeros((m, m - 1, len(shares)))
+        products[edges, edges] = length * weights * (1 - shares)
+        products[edges + 1, edges] = length * weights * shares
+        hats = np.diag(4 * self.width) + np.diag(length[:, 0], 1) + np.diag(length[:, 0], -1)
+        return np.asarray(np.linalg.solve(hats / 6, products.reshape(m, -1)))
 
     @staticmethod
     def along(first: Array, last: Array) -> Array:

@@ -27,7 +27,7 @@ from scipy import sparse
 from solver.errors import ModelError
 from solver.linear import solvers as linear
 from solver.linear.schur import Elimination, with_block
-from solver.prism.section import I_AXIS, I_COMPONENTS
+from solver.prism.section import I_AXIS, I_COMPONENTS, Carried
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -124,7 +124,9 @@ class Modes:
         self._set_rows(surface, zone)
         self.behind = np.asarray(behind, dtype=float)
         self._set_transforms(window, self.behind)
-        self._factors = _factorised(section, self.unknowns, self.wavenumbers.tolist())
+        self._factors, self._carried = _factorised(
+            section, self.unknowns, self.wavenumbers.tolist()
+        )
 
     @cached_property
     def everywhere(self) -> Modes:
@@ -197,8 +199,14 @@ class Modes:
         """
         u = np.empty_like(nodal)
         for wave, right in enumerate(nodal):
-            u[wave] = self._factors.solve(right.T, wave).T
+            u[wave] = self._solve(right.T, wave).T
         return u
+
+    def _solve(self, forces: Array, wave: int) -> Array:
+        """Return the amplitudes (m, ...) of the zone for nodal forces (m, ...) of a wave."""
+        if wave:
+            return self._factors.solve(forces, wave)
+        return self._carried.solved(lambda left: self._factors.solve(left, 0), forces)
 
     def displacement(self, nodal: Array) -> Array:
         """Return the surface displacement (n_rows, window) by `columns` [mm].
@@ -224,7 +232,7 @@ class Modes:
         eigenstress : (n_points, 6) at all stations [MPa]
         """
         flat = eigenstress.T[list(_ORDER)].ravel()
-        u = self._factors.solve(self._force0 @ flat, 0)
+        u = self._solve(self._force0 @ flat, 0)
         strain = np.empty((6, len(self.points)))
         strain[list(_ORDER)] = (self.B0 @ u).reshape(6, -1)
         return strain.T, np.asarray(self.rows @ u)
@@ -234,7 +242,7 @@ class Modes:
         """Displacements (waves, m, n_rows) of the zone for unit forces on the rows [mm2/N]."""
         each = self.rows.T.toarray()
         waves = range(len(self.wavenumbers))
-        return np.stack([self._factors.solve(each, wave) for wave in waves])
+        return np.stack([self._solve(each, wave) for wave in waves])
 
     @cached_property
     def compliance(self) -> Array:
@@ -369,8 +377,10 @@ def _check(
         raise ModelError("behind", len(behind), f"must have {stations - window} factors, or none")
 
 
-def _factorised(section: Section, zone: Numbers, wavenumbers: Sequence[float]) -> Factors:
-    """Return the factors of the stiffness of each wave on some unknowns, the others condensed."""
+def _factorised(
+    section: Section, zone: Numbers, wavenumbers: Sequence[float]
+) -> tuple[Factors, Carried]:
+    """Return the factors of each wave on some unknowns, the others condensed; the first k is 0."""
     rest = np.setdiff1d(section.free, zone)
     coupled = np.isin(section.dofs, rest).any(axis=1)
     rim = np.intersect1d(section.dofs[coupled], zone)
@@ -386,4 +396,10 @@ def _factorised(section: Section, zone: Numbers, wavenumbers: Sequence[float]) -
         data[sparse_slot] = own.at(k)
         data[dense_slot] -= elimination.taken(outside.at(k))[first, second]
         factors.factorise(data, wave)
-    return factors
+        if wave == 0:
+            sprung = section.sprung(section.loose)
+            reactions = sprung[zone]
+            condensed = elimination.forward(sprung[np.concatenate([rest, rim])])
+            reactions[place] = condensed[len(rest) :]
+            carried = Carried(section.loose[zone], reactions)
+    return factors, carried

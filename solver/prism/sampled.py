@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from solver.linear import solvers as linear
-from solver.prism.section import I_AXIS
+from solver.prism.section import I_AXIS, Carried
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,14 +57,16 @@ def sampled_answers(section: Section, forces: Array, wavenumbers: Array) -> Samp
     free, f = section.free, forces[section.free]
     stiffness = section.stiffness(free)
     solver = linear.analyse(stiffness.pattern)
+    carried = Carried(section.loose[free], section.sprung(section.loose)[free])
     terms = stiffness.terms
     stiffest = np.abs(terms[0].data).max()
     answers: dict[int, Array] = {}
     more = _spread(np.abs(wavenumbers), np.ptp(section.plane.X, axis=1).max())
     while more:
         for wave in more:
-            solver.factorise(stiffness.at(wavenumbers[wave]))
-            answers[wave] = solver.solve(f)
+            k = wavenumbers[wave]
+            solver.factorise(stiffness.at(k))
+            answers[wave] = solver.solve(f) if k else carried.solved(solver.solve, f)
         basis = _split(np.hstack(list(answers.values())), free % 3 == I_AXIS)
         on_basis = [term @ basis for term in terms]
         K0, K1, K2 = (basis.T @ each for each in on_basis)

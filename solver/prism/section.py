@@ -17,11 +17,13 @@ semi-analytical finite elements.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import null_space
 
 from solver.errors import ModelError
 from solver.fem.assembly import Assembly
@@ -33,7 +35,7 @@ from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.body import Body
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
     from skfem import Mesh
@@ -159,6 +161,22 @@ class Section:
         return motions.reshape(self.n, 4)
 
     @cached_property
+    def loose(self) -> Array:
+        """Motions (n, q) of `rigid`, and sums of them, that no support holds: springs alone do."""
+        motions = self.rigid / np.abs(self.rigid).max(axis=0)
+        held = np.setdiff1d(np.arange(self.n), self.free)
+        return np.asarray(motions @ null_space(np.vstack([motions[held], np.zeros(4)])))
+
+    def sprung(self, u: Array) -> Array:
+        """Return the forces (n, q) of the springs under displacements (n, q), per length [N/mm]."""
+        each = np.zeros((*self.dofs.shape, self.dofs.shape[1]))
+        for boundary, along in self.springs.items():
+            self._add_springs(each, boundary, along)
+        forces = np.zeros_like(u)
+        np.add.at(forces, self.dofs, each @ u[self.dofs])
+        return forces
+
+    @cached_property
     def mean_motions(self) -> Array:
         """Mean motions (6, n) of the section by its displacements, weighted with the area.
 
@@ -193,7 +211,7 @@ class Section:
         return K0, K1 + K1.swapaxes(1, 2), K2
 
     def _add_springs(self, K0: Array, boundary: str, along: Array) -> None:
-        """Add the springs of a boundary to the matrices of the elements there."""
+        """Add the springs of a boundary to the matrices (n_elements, 24, 24) of the elements."""
         plane = self.plane
         elements = plane.body.mesh.f2t[0, plane.body.facets(boundary)]
         edges = edges_of(plane, boundary)
@@ -244,6 +262,34 @@ class Section:
             return own
 
         return matrix(self.B0), matrix(self.B1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """Motions of the whole section that only springs hold, taken out of a solve for k = 0.
+
+    On soft springs a section that is loaded every short length turns by radians. If the material is
+    nearly incompressible, rounding of its stiffness times that motion are forces that count. So the
+    reactions of the springs balance the forces first: ``K u = f`` is solved with K R = G as
+
+        u = R a + v,    R' G a = R' f,    K v = f - G a,    G' v = 0
+
+    Attributes
+    ----------
+    motions : R (m, q), on the unknowns of the solve; see `Section.loose`
+    reactions : G (m, q), forces of the springs under them, condensed to these unknowns [N/mm]
+    """
+
+    motions: Array
+    reactions: Array
+
+    def solved(self, solve: Callable[[Array], Array], forces: Array) -> Array:
+        """Return u (m, ...) for forces (m, ...), by the solve with K."""
+        stiffness = self.motions.T @ self.reactions
+        by = np.linalg.solve(stiffness, self.motions.T @ forces)
+        left = solve(forces - self.reactions @ by)
+        by -= np.linalg.solve(stiffness, self.reactions.T @ left)  # by rounding alone
+        return np.asarray(left + self.motions @ by)
 
 
 class Stiffness:

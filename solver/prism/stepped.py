@@ -258,7 +258,10 @@ class SteppedPrism:
                 return at(here.strain + share * change, here.contact)
 
             here = searched(after, here.size)
-        raise NotConverged("no equilibrium was found in an increment of a rolling load")
+        raise NotConverged(
+            f"no equilibrium was found in {_STEPS} steps of Newton's method with the load {behind} "
+            "stations behind x = 0; try a lower load or a material that hardens"
+        )
 
     def _surface(self, eigenstress: Array, behind: int) -> Array:
         """Return the displacement (n, m, 3) of the grid under the load by an eigenstress [mm]."""

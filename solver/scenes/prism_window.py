@@ -10,21 +10,60 @@ import numpy as np
 
 from solver.prism.track import PrismTrack
 from solver.scenes.prism_effort import PrismSize
+from solver.tensors import SQRT2
 
 if TYPE_CHECKING:
+    from solver.materials.law import Law
     from solver.mesh.zone import Zone
     from solver.prism.section import Section
+    from solver.scenes.prism_parameters import PrismParameters
 
 _AHEAD, _BEHIND, _LENGTH = 2.2, 2.6, 7.0
 """The window ahead and behind, and the length after which waves repeat, over half the length where
 the load may act."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
+_UPPER = 0.35
+"""Depth of the rows of elements that are divided, over the mean semi-axis of the contact."""
+_XY = 3
+_WEAK, _SHEARED, _PARTS = 0.05, 0.01, 20
+"""Rise of the shear stress over its value at first yield below which hardening is weak, the
+equivalent plastic strain at which it is taken, and the increments to there."""
 
 
 def whole(length: float, size: float) -> float:
     """Return the length of the fewest elements that cover ``length``, at least 4 of them [mm]."""
     return size * max(_LEAST, math.ceil(round(length / size, 6)))
+
+
+def split_rows(parameters: PrismParameters, mean: float, layer: float) -> int:
+    """Return the number of uppermost rows of elements that are divided into two.
+
+    Where hardening is weak the plastic zone ends steeply above, at a depth of about a fifth of the
+    contact's mean semi-axis: rows as thick as the others are too coarse for residual stress there.
+
+    Parameters
+    ----------
+    mean : root of the product of the semi-axes [mm]
+    layer : thickness of a row [mm]
+    """
+    if parameters.accuracy == "draft" or not _weak(parameters.material()):
+        return 0
+    return math.ceil(round(_UPPER * mean / layer, 6))
+
+
+def _weak(law: Law) -> bool:
+    """Return whether a material hardens little in shear."""
+    if law.elastic:
+        return False
+    first = SQRT2 * law.shear_yield_stress
+    start = first / (2 * law.elasticity.shear_modulus)
+    strain, state = np.zeros((6, 1)), law.initial(1, 6)
+    for part in range(_PARTS + 1):
+        strain[_XY] = start + part / _PARTS * math.sqrt(1.5) * _SHEARED
+        response = law.respond(strain.copy(), state)
+        state = response.state
+    return float(response.stress[_XY, 0]) < (1 + _WEAK) * first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,8 +16,8 @@ from solver.scenes.prism_parameters import PrismParameters
 
 ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
 """Elements per semi-axis of the elastic Hertz contact: across, along, and in depth for the shorter
-one. The largest shear under a circle, which decides shakedown without friction, is 6, 2 and 1 %
-too small with them."""
+one. The largest shear under a circle, which decides shakedown without friction, is 3 % too small
+with 4 of them, 0.3 % with 6."""
 BESIDE = 1.5
 """Half the width of the zone that may yield, along the surface, over b."""
 _STEEPEST = math.radians(60.0)

@@ -19,7 +19,7 @@ from solver.prism.given_patch import EllipticPatch
 from solver.prism.patch import RollingPatch
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
-from solver.scenes.prism_window import PrismWindow, whole
+from solver.scenes.prism_window import PrismWindow, split_rows, whole
 from solver.scenes.raceway_parameters import BESIDE
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class RacewayGeometry:
     elasticity : Young's modulus and Poisson ratio
     block : its depth, and half its width [mm]
     groove : radius of the groove, and half its width [mm]; None for a flat block
-    half_width, depth, size, layer : of the zone [mm]
+    half_width, depth, size, layer, split : of the zone, see `Zone`
     spacing, reach : distance of stations; half the length where the load may act [mm]
     """
 
@@ -59,6 +59,7 @@ class RacewayGeometry:
     depth: float
     size: float
     layer: float
+    split: int
     spacing: float
     reach: float
 
@@ -66,8 +67,9 @@ class RacewayGeometry:
     def window(self) -> PrismWindow:
         """Where the raceway may yield."""
         zone = Zone(
-            at=0.0, half_width=self.half_width, depth=self.depth, size=self.size, layer=self.layer
-        )
+            at=0.0, half_width=self.half_width, depth=self.depth, size=self.size,
+            layer=self.layer, split=self.split,
+        )  # fmt: skip
         return PrismWindow(zone=zone, spacing=self.spacing, reach=self.reach)
 
 
@@ -99,6 +101,7 @@ def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeomet
         depth=whole(reach * _DEPTH * math.sqrt(a * b), layer),
         size=size,
         layer=layer,
+        split=split_rows(p, math.sqrt(a * b), layer),
         spacing=spacing,
         reach=whole(reach * _REACH * a, spacing),
     )

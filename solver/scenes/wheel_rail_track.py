@@ -19,7 +19,7 @@ from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
 from solver.prism.straight import check_elastic
 from solver.scenes.initial_stress import settled
-from solver.scenes.prism_window import PrismWindow, whole
+from solver.scenes.prism_window import PrismWindow, split_rows, whole
 from solver.scenes.wheel_rail_contact import (
     canted,
     expected_contact,
@@ -67,7 +67,7 @@ class RailGeometry:
     span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
         endless
     elasticity : Young's modulus and Poisson ratio of the rail
-    at, half_width, depth, size : of the zone [mm]
+    at, half_width, depth, size, split : of the zone, see `Zone`
     spacing, reach : distance of stations; half the length where the load may act [mm]
     """
 
@@ -80,13 +80,17 @@ class RailGeometry:
     half_width: float
     depth: float
     size: float
+    split: int
     spacing: float
     reach: float
 
     @property
     def window(self) -> PrismWindow:
         """Where the rail may yield."""
-        zone = Zone(at=self.at, half_width=self.half_width, depth=self.depth, size=self.size)
+        zone = Zone(
+            at=self.at, half_width=self.half_width, depth=self.depth, size=self.size,
+            split=self.split,
+        )  # fmt: skip
         return PrismWindow(zone=zone, spacing=self.spacing, reach=self.reach)
 
 
@@ -148,6 +152,7 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         half_width=half_width,
         depth=min(whole(reach * _DEPTH * mean, h), max(deepest, 2 * h)),
         size=h,
+        split=split_rows(p, mean, h),
         spacing=p.spacing,
         reach=whole(reach * (_REACH * contact.along + contact.ahead), p.spacing),
     )

@@ -43,7 +43,7 @@ from tests.verification.prism_blocks import (
 Array = NDArray[np.float64]
 Found = tuple[PrismTrack, Pass[PrismState]]
 LAWS: Mapping[str, Material] = {"ellipse": PERFECT, "wheel": HARDENS}
-SERIES = ("section", "stations", "length", "length alone", "window")
+SERIES = ("section", "divided rows", "stations", "length", "length alone", "window")
 MEASURES = {
     "largest": "largest error of residual stress from 1 mm down / Re",
     "mean": "root of the mean square error of residual stress / Re",
@@ -57,7 +57,10 @@ _MIDDLE = {"ellipse": 0.0, "wheel": -2.0}
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A setting of a series: elements, stations, length, levels of far field, window [mm]."""
+    """A setting of a series: elements, stations, length, levels of far field, window [mm].
+
+    ``split`` is the number of the uppermost rows of elements that are divided into two.
+    """
 
     series: str
     setting: str
@@ -67,6 +70,7 @@ class Case:
     levels: int = 4
     ahead: float = 20.0
     behind: float = 24.0
+    split: int = 0
     size: float = float("nan")
 
 
@@ -78,6 +82,10 @@ def plan(quick: bool) -> Iterator[tuple[Case, tuple[Case, ...]]]:
         return
     yield Case("section", "", h=0.5), tuple(
         Case("section", f"{h:g} mm", h=h, size=h) for h in (2.0, 1.0)
+    )  # fmt: skip
+    yield Case("divided rows", "", h=0.5, split=6), tuple(
+        Case("divided rows", f"{h:g} mm, {split}", h=h, split=split, size=h)
+        for h, split in ((1.0, 0), (1.0, 3), (0.5, 0))
     )  # fmt: skip
     yield Case("stations", "", spacing=0.25), tuple(
         Case("stations", f"{d:g} mm", spacing=d, size=d) for d in (2.0, 1.0, 0.5)
@@ -135,19 +143,19 @@ class _Rolled:
 
 def _block(case: Case) -> PrismTrack:
     """Return a block with a zone of 20 by 14 mm."""
-    section, zone = half_space_section(case.h, far=300.0, growth=1.4)
+    section, zone = half_space_section(case.h, far=300.0, growth=1.4, split=case.split)
     return _track(case, section, zone, 10.0)
 
 
 def _rail(case: Case) -> PrismTrack:
     """Return the rail with a zone of 28 by 12 mm under the contact."""
     half, depth, spring = 14.0, 12.0, 21.0 / 150.0
-    zone = Zone(at=_MIDDLE["wheel"], half_width=half, depth=depth, size=case.h)
+    zone = Zone(at=_MIDDLE["wheel"], half_width=half, depth=depth, size=case.h, split=case.split)
     section = Section(
         rail_mesh(rail_60e1().canted(1 / 40), zone), HARDENS.elasticity,
         springs={"foot": (spring, spring, spring)},
     )  # fmt: skip
-    elements = round(2 * half / case.h) * round(depth / case.h)  # those of the zone come first
+    elements = zone.columns * zone.rows  # those of the zone come first
     return _track(case, section, np.arange(len(section.weights)) < elements, 9.0)
 
 

@@ -195,3 +195,17 @@ def test_zones_outside_of_a_block_are_refused(groove, zone, said):
     given = {"at": 0.0, "half_width": 2.0, "depth": 3.0, "size": 0.5} | zone
     with pytest.raises(ModelError, match=said):
         raceway_mesh(120.0, 60.0, Zone(**given), groove)
+
+
+@pytest.mark.parametrize("made", ["rail", "raceway"])
+def test_the_uppermost_rows_are_divided_into_two(made: str) -> None:
+    zone = Zone(at=0.0, half_width=5.0, depth=6.0, size=1.0, split=2)
+    mesh = rail_mesh(RAIL, zone) if made == "rail" else raceway_mesh(120.0, 60.0, zone)
+    assert zone.rows == 8
+    inside = mesh.p[:, mesh.t[:, : zone.rows * zone.columns]]
+    thick = np.ptp(inside[1], axis=0)  # of nearly flat rows
+    assert np.unique(np.round(2 * thick)).tolist() == [1.0, 2.0]
+    assert (np.round(2 * thick) == 1.0).sum() == 4 * zone.columns
+    assert inside[1][:, thick < 0.75].min() > -2.1
+    with pytest.raises(ModelError, match="split"):
+        Zone(at=0.0, half_width=5.0, depth=6.0, size=1.0, split=7)

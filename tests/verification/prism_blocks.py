@@ -41,12 +41,20 @@ def lines(fine: float, h: float, far: float, growth: float) -> Array:
     return np.array(at)
 
 
-def half_space_section(h: float, far: float, growth: float) -> tuple[Section, NDArray[np.bool_]]:
+def divided(positions: Array, split: int) -> Array:
+    """Positions of lines with another one in the middle of each of the first ``split`` elements."""
+    return np.union1d(positions, (positions[1 : split + 1] + positions[:split]) / 2)
+
+
+def half_space_section(
+    h: float, far: float, growth: float, split: int = 0
+) -> tuple[Section, NDArray[np.bool_]]:
     """A section as deep as half its width ``far``, held at its bottom, and its small elements.
 
-    Elements of h in 20 by 14 mm, growing beside and below.
+    Elements of h in 20 by 14 mm, growing beside and below; ``split`` uppermost rows are divided.
     """
     half, down = (lines(fine, h, far, growth) for fine in (10.0, 14.0))
+    down = divided(down, split)
     z, y = np.concatenate([-half[:0:-1], half]), -down[::-1]
     mesh = within(grid(z, y), "running", ["top"], x=(-10.001, 10.001))
     section = Section(mesh, PERFECT.elasticity, supports={"bottom": "xyz"})

@@ -7,7 +7,7 @@ import pytest
 
 from solver.materials import Elasticity
 from solver.prism.half_space import half_space
-from solver.prism.hats import Hats
+from solver.prism.hats import SHARES, Hats
 
 NU = 0.3
 STEEL = Elasticity(youngs_modulus=2e5, poisson_ratio=NU)
@@ -98,8 +98,9 @@ def test_the_nearest_hats_work_on_every_hat_as_the_function_does() -> None:
     """And are it where it is linear between vertices; products are those at the points."""
     hats = Hats(S)
     values = np.cos(hats.points)
-    nearest = hats.nearest @ values
+    to_points = hats.nearest(SHARES, np.array([0.5, 0.5]))
+    nearest = to_points @ values
     assert hats.mean @ hats.along(nearest[:-1], nearest[1:]) == pytest.approx(hats.mean @ values)
     assert nearest @ hats.width == pytest.approx(hats.mean @ values @ hats.width)
     linear = np.sin(S)
-    assert hats.nearest @ hats.along(linear[:-1], linear[1:]) == pytest.approx(linear)
+    assert to_points @ hats.along(linear[:-1], linear[1:]) == pytest.approx(linear)

@@ -28,18 +28,18 @@ def stress(track: PrismTrack, ellipse: HertzEllipse) -> Array:
 
 
 def test_stress_half_an_element_down_is_that_of_the_half_space() -> None:
-    """Over the largest pressure p0, from the axis to beyond the leading edge.
+    """Over the largest pressure p0, from the middle to beyond the edge.
 
     Half an element down the middle errs by 0.7 % of p0. Under the edge, where the pressure falls
-    with the root of the distance, elements of 2, 1, 0.5 mm err by 2.9, 1.8, 1.3 %, 0.8 of an
-    element down; at the depth of 1.6 mm by 2.9, 0.8, 0.2 %. Stations twice as close change the
-    latter by 0.3 %, those above by less.
+    with the root of the distance, the error is 1.5 % at 0.8 of an element, 1.0 % at 1.2, 0.3 % at
+    1.8. The section makes it there, not the load: forces that work on all of its quadratic shape
+    functions, and those of all waves that stations carry, leave 1.4, 1.0, 0.3 %.
     """
     track, ellipse = body(), HertzEllipse(a=A, b=B, peak_pressure=1360.0)
     found = stress(track, ellipse)
     z, y = track.points
     rows = np.flatnonzero((z > 0) & (z < 8.5) & (y > -4.0) & (y < -0.5))
-    stations = track.before - np.array([0, 4, 7, 8, 9])
+    stations = track.before - np.arange(12)
     some = found[np.ix_(rows, stations)]
     x = track.modes.x[stations] - track.modes.x[track.before]
     place = [each.ravel() for each in np.broadcast_arrays(x, -y[rows, None], z[rows, None])]
@@ -48,8 +48,9 @@ def test_stress_half_an_element_down_is_that_of_the_half_space() -> None:
     at, deep, across = place
     inside = (at / A) ** 2 + (across / B) ** 2 < 0.7**2
     assert error[inside].max() < 0.01
-    assert error[deep > 1.5].max() < 0.01
-    assert error.max() < 0.02
+    assert error.max() < 0.016
+    assert error[deep > 1.0].max() < 0.0105
+    assert error[deep > 1.5].max() < 0.004
 
 
 def test_a_circle_yields_first_at_1613_of_the_yield_stress_half_a_radius_down() -> None:

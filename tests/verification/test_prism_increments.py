@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.errors import ModelError, WindowTooSmall
+from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.threads import one_thread
+from solver.prism import stepped
 from solver.prism.given_patch import EllipticPatch
 from solver.prism.patch import RollingPatch
 from solver.prism.patch_contact import PatchContact
@@ -213,3 +214,12 @@ def test_a_zone_that_is_too_small_is_told() -> None:
     load = EllipticPatch(grid=small.grid, force=150e3, a=A, b=B)
     with pytest.raises(WindowTooSmall, match="rim"), one_thread():
         body.rolled(body.virgin, load, 2)
+
+
+def test_an_increment_without_equilibrium_tells_where_the_load_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(stepped, "_STEPS", 1)
+    body = SteppedPrism(track(), PERFECT)
+    with one_thread(), pytest.raises(NotConverged, match="with the load 3 stations"):
+        next(body.along(body.virgin, [LoadAt(ellipse(), 3)]))

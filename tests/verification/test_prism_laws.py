@@ -106,14 +106,17 @@ def test_every_word_is_here() -> None:
 @pytest.mark.parametrize(
     ("word", "peak", "b", "state"),
     [
-        ("kinematic", 1900.0, 3.5, ShakedownState.PLASTIC_SHAKEDOWN),
-        ("mixed", 2100.0, 3.0, ShakedownState.ELASTIC_SHAKEDOWN),
+        ("kinematic", 2100.0, 3.5, ShakedownState.PLASTIC_SHAKEDOWN),
+        ("mixed", 1600.0, 3.0, ShakedownState.ELASTIC_SHAKEDOWN),
     ],
 )
 def test_a_surface_that_grows_without_bound_ends_the_flow(
     word: str, peak: float, b: float, state: int
 ) -> None:
-    """Where it only moves, every pass of a high load shears the material to and fro."""
+    """Where it only moves, every pass of a high load shears the material to and fro.
+
+    The largest pressures fit the coarse block: nothing may yield at the rim of its zone.
+    """
     own, material, load = track(), LAWS[word], PatchPassing(pressure(peak, 5.0, b))
     found: Pass[Any] | None = None
     accumulated, plastic = [], []

@@ -34,6 +34,7 @@ from tests.verification.prism_blocks import (
     RE,
     block,
     crowned,
+    divided,
     ellipse,
     lines,
     residual,
@@ -88,10 +89,14 @@ class Line:
         )
 
 
-def strip(length: float) -> PrismTrack:
-    """A strip held across and at its bottom, 400 mm deep; elements and stations of 2 mm."""
+def strip(length: float, h: float = 2.0, split: int = 0) -> PrismTrack:
+    """A strip held across and at its bottom, 400 mm deep; stations of 2 mm.
+
+    Elements are h thick, those of the uppermost ``split`` rows h / 2.
+    """
+    down = divided(lines(14.0, h, 400.0, 1.3), split)
     section = Section(
-        grid(np.array([0.0, 1.0, 2.0]), -lines(14.0, 2.0, 400.0, 1.3)[::-1]),
+        grid(np.array([0.0, 1.0, 2.0]), -down[::-1]),
         PERFECT.elasticity,
         supports={"bottom": "xyz", "left": "z", "right": "z"},
     )
@@ -121,6 +126,27 @@ def test_a_strip_held_across_has_the_pass_of_plane_strain() -> None:
     exact = [np.interp(depths, plane.depth, own[:, k]) for k in (0, 2)]
     assert np.abs(endless - exact).max() < 0.025 * RE
     assert left.accumulated.max() == pytest.approx(plane.accumulated.max(), rel=0.03)
+
+
+def test_divided_rows_above_halve_the_elements_where_plastic_strain_is_steep() -> None:
+    """Of the yield stress, from 1 mm down: 3.6 % with elements of 1 mm, 0.7 with divided rows.
+
+    Elements of half a millimetre everywhere have 0.7 % too.
+    """
+    depths = np.linspace(1.0, 12.0, 45)
+
+    def left(h: float, split: int) -> Array:
+        track = strip(256.0, h, split)
+        load = PatchPassing(Line(track, 8.29, 1360.0, 0.0))  # type: ignore[arg-type]
+        stress = residual(PERFECT, rolled(track, PERFECT, load).after)
+        down = np.argsort(-track.points[1])
+        own = -track.points[1][down]
+        return np.array([np.interp(depths, own, stress[k][down]) for k in (0, 2)]) / RE
+
+    exact = left(0.5, 6)
+    whole, divided = (np.abs(left(1.0, split) - exact).max() for split in (0, 3))
+    assert whole > 0.03
+    assert divided < 0.01
 
 
 # -- what must hold -------------------------------------------------------------------------------

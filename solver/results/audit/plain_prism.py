@@ -232,7 +232,12 @@ class PlainPrism:
         own[self._own] = True
         square = (np.abs(lacking[own]) ** 2).sum(axis=0)
         for wave, (K, _) in self._whole.items():
-            whole = found.pulled[:, wave] + found.pushed[:, wave] - K @ found.u[:, wave]
+            u, moved = found.u[:, wave], np.zeros(self._n, dtype=complex)
+            if wave == 0:  # on soft springs the section moves far, against them alone
+                rigid = self.track.section.rigid
+                moved = rigid @ np.linalg.lstsq(rigid, u)[0]
+            carried = K @ (u - moved) + self._springs @ moved
+            whole = found.pulled[:, wave] + found.pushed[:, wave] - carried
             square[wave] = (np.abs(whole[free]) ** 2).sum()
         stations = self.track.modes.stations
         twice = np.full(len(square), 2.0)
@@ -278,12 +283,16 @@ class PlainPrism:
 
     def _solved(self, wave: int, force: Complex) -> Complex:
         """Return the displacement (n,) of the whole section for forces (n,) in a sampled wave."""
-        free = self.track.section.free
-        turned = (force / self._turn)[free]
+        free, u = self.track.section.free, np.zeros(self._n, dtype=complex)
+        # motions of the whole section, against the springs alone, are found without its stiffness
+        loose = self.track.section.loose if wave == 0 else np.zeros((self._n, 0))
+        sprung = self._springs @ loose
+        moved = np.linalg.solve(loose.T @ sprung, loose.T @ force)
+        turned = ((force - sprung @ moved) / self._turn)[free]
         both = self._whole[wave][1].solve(np.stack([turned.real, turned.imag], axis=1))
-        u = np.zeros(self._n, dtype=complex)
-        u[free] = both[:, 0] + 1j * both[:, 1]
-        return np.asarray(u * self._turn)
+        u[free] = (both[:, 0] + 1j * both[:, 1]) * self._turn[free]
+        moved -= np.linalg.solve(loose.T @ sprung, sprung.T @ u)
+        return np.asarray(u + loose @ moved)
 
     # -- the surface ---------------------------------------------------------------------------
 
