@@ -220,11 +220,11 @@ def _compared(
     text = expected.values.dtype.kind in "OUS"
     stored = variable.asstr()[...] if variable.dtype.kind == "O" else variable[...]
     stored = np.asarray(stored)
-    own = variable.id in scales
-    dims = (name,) if own else tuple(scales[axis[0].id] for axis in variable.dims)
+    dims = (name,) if variable.id in scales else _dimensions(variable, scales)
     if dims != expected.dims:
         found.append(f"{name} has the dimensions {dims}, not {expected.dims}")
-    attributes = {key: _plain(variable.attrs[key]) for key in variable.attrs if not _internal(key)}
+    words = variable.attrs  # made anew each time
+    attributes = {key: _plain(words[key]) for key in words if not _internal(key)}
     for key, value in (dict.fromkeys(_DECODED) | {**expected.attributes}).items():
         if attributes.get(key) != _plain(value):
             found.append(f"{name} has the {key} {attributes.get(key)!r}, not {value!r}")
@@ -240,6 +240,16 @@ def _compared(
     elif not _same(seen, expected.values, text):
         found.append(f"{name} has other values")
     return stored, found
+
+
+def _dimensions(variable: h5py.Dataset, scales: Mapping[Any, str]) -> tuple[str, ...]:
+    """Return the names of the dimensions of a variable, each by its only scale."""
+    from h5py import h5ds
+
+    found: list[Any] = []
+    for axis in range(variable.ndim):
+        h5ds.iterate(variable.id, axis, found.append)
+    return tuple(scales[each] for each in found)
 
 
 def _same(seen: np.ndarray, expected: np.ndarray, text: bool) -> bool:

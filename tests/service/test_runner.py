@@ -152,6 +152,30 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     assert jobs.get("good").state is StudyState.RUNNING
 
 
+def test_the_processes_of_the_next_study_load_while_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.runner.READY_SECONDS", 0.1)
+    jobs = Jobs(tmp_path / "jobs.sqlite")
+    settings = Settings(data=tmp_path, poll_seconds=0.02)
+    starters = Starter("this", 0), Starter("this", 0)
+    pool = Pool(settings, starters[0])
+    runner = Runner(settings, jobs, pool, starters[1], lambda _: jobs)
+
+    async def work() -> list[Process]:
+        async with asyncio.timeout(30.0), runner.working():
+            while not all(each._ready for each in starters):
+                await asyncio.sleep(0.02)
+            ready = [each._ready for each in starters if each._ready]
+            await asyncio.sleep(0.2)
+            assert [each._ready for each in starters] == ready, "one of each is enough"
+        return ready
+
+    ready = asyncio.run(work())
+    assert len(ready) == 2
+    assert all(process.returncode is not None for process in ready)
+
+
 def test_a_process_is_ready_before_it_is_needed() -> None:
     async def work() -> None:
         starter = Starter("this", 0)
