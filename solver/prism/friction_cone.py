@@ -43,9 +43,6 @@ NORMAL, TANGENTS = 1, (0, 2)
 _TOLERANCE = 1e-9
 """Largest error of a condition over the largest pressure, or over friction times it for shear."""
 _STEPS = 60
-_EASES = (1.0, 0.25)
-"""Ratios of d to the stiffness of a point against shear, tried in turn. Newton's method may turn in
-a circle about a kink of the conditions, which lie elsewhere with another d; solutions do not."""
 _SHORTEST = 1 / 256
 """Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
 found by its moment may overshoot a hundredfold."""
@@ -113,17 +110,7 @@ def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolutio
     NoContact
         if none was found
     """
-    for ease in _EASES[: len(_EASES) if problem.friction else 1]:
-        try:
-            return _solved(problem, values, rigid, ease)
-        except NoContact as error:
-            failure = error
-    raise failure
-
-
-def _solved(problem: ConeProblem, values: Array, rigid: Array, ease: float) -> ConeSolution:
-    """Return the solution with a ratio of `_EASES`, or raise `NoContact`."""
-    here, tangent = _Iterate(problem, values, rigid, ease), None
+    here, tangent = _Iterate(problem, values, rigid), None
     most = _LOST * abs(problem.resultants[0]) / np.abs(problem.weights[0]).max()
     for step in range(_STEPS):
         if here.error <= _TOLERANCE * here.values[..., NORMAL].max():
@@ -134,8 +121,7 @@ def _solved(problem: ConeProblem, values: Array, rigid: Array, ease: float) -> C
             share: float, here: _Iterate = here, step: tuple[Array, Array] = tangent.step()
         ) -> _Iterate:
             change, motion = step
-            values, rigid = here.values + share * change, here.rigid + share * motion
-            return _Iterate(problem, values, rigid, ease)
+            return _Iterate(problem, here.values + share * change, here.rigid + share * motion)
 
         here = searched(moved, here.size, _SHORTEST)
         if not here.pull.max() < most:
@@ -146,13 +132,13 @@ def _solved(problem: ConeProblem, values: Array, rigid: Array, ease: float) -> C
 class _Iterate:
     """Values and rigid motions, and by how much they miss the conditions."""
 
-    def __init__(self, problem: ConeProblem, values: Array, rigid: Array, ease: float) -> None:
+    def __init__(self, problem: ConeProblem, values: Array, rigid: Array) -> None:
         self.problem, self.values, self.rigid = problem, values, rigid
         moved = np.tensordot(rigid, problem.motions, 1)
         self.effects = problem.offset + problem.influence.of(values) + moved
         own = problem.influence.own()
         self.stiffness = 1 / own[:, NORMAL, NORMAL].mean()
-        self.grip = 2 * ease / sum(own[:, a, a].mean() for a in TANGENTS)
+        self.grip = 2 / sum(own[:, a, a].mean() for a in TANGENTS)
         p, q = values[..., NORMAL], values[..., TANGENTS]
         pushed = p - self.stiffness * self.effects[..., NORMAL]
         self.closed = pushed > 0

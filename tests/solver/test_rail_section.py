@@ -134,8 +134,11 @@ def test_a_worn_rail_loses_area_and_keeps_its_top_at_zero(tmp_path):
 @pytest.mark.parametrize(
     ("points", "said"),
     [
-        (np.zeros((2, 3)), "at least four"),
-        (np.array([[0.0, 1.0, 1.0, 2.0], [0.0] * 4]), "right of 1"),
+        (np.zeros((2, 3)), "at least 4 points"),
+        (
+            np.array([[0.0, 1.0, 1.0, 2.0], [0.0] * 4]),
+            "whose z increases; these are number 1 and 2",
+        ),
         (np.array([[0.0, 1.0, np.nan, 2.0], [0.0] * 4]), "finite"),
     ],
 )
