@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import OrderedDict, deque
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ from solver.fem.fields import Sampler, recovery
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
+from solver.fem.window import Region, Windowed
 from solver.model.friction import ContactPlaces, lines_of
 
 if TYPE_CHECKING:
@@ -49,6 +51,8 @@ _TOUCHING = 1e-9
 """Ratio of the gap to the length of the longest contact surface; below it vertices touch."""
 _SET_DOWN = 1e-9
 """Ratio of the gap to the radius of a wheel that is set down; below it vertices touch."""
+_WINDOWS = 4
+"""Number of windows of bodies that are kept in memory."""
 _EXPANDED = 8
 """Number of displacement fields of condensed bodies that are kept for results and audit."""
 
@@ -73,6 +77,7 @@ class System:
     model : the model; slave and master of a pair are exchanged where that is better
     names : names of the meshed bodies
     all_names : these names, then those of the rigid bodies, in the order of ``parts``
+    surfaces : for each part, its contact surfaces in the numbering of the whole body
     """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
@@ -84,7 +89,7 @@ class System:
         surfaces = surfaces_of(model, wholes)
         self.model = model = with_slaves(model, surfaces)
         own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
-        self._own, self._linear_solver = own, linear_solver
+        self.surfaces, self._linear_solver = own, linear_solver
         self.names = [body.name for body in model.bodies]
         self.all_names = list(wholes)
         self.parts: tuple[Part, ...] = tuple(
@@ -96,6 +101,7 @@ class System:
             for contact in model.contacts
         )
 
+        self._windows: OrderedDict[tuple[int, bytes], Windowed] = OrderedDict()
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._at_vertices: dict[int, csr_array] = {}
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
@@ -160,8 +166,34 @@ class System:
         """The inverses of the stiffness of each part."""
         return tuple(
             part.operators(chains, self._linear_solver)
-            for part, chains in zip(self.parts, self._own, strict=True)
+            for part, chains in zip(self.parts, self.surfaces, strict=True)
         )
+
+    def window(self, number: int, region: Region) -> Windowed:
+        """Return a meshed body of which only a region may yield and touch."""
+        key = number, region.key
+        if key not in self._windows:
+            part, elastic = self.parts[number], self.operators[number].elastic
+            assert isinstance(part, Discretisation)
+            self._windows[key] = Windowed(part, region, elastic, self._linear_solver)
+            while len(self._windows) > _WINDOWS:
+                self._windows.popitem(last=False)
+        self._windows.move_to_end(key)
+        return self._windows[key]
+
+    def within(self, parts: tuple[Part, ...]) -> System:
+        """Return the system with windows in the place of some of its parts."""
+        small = copy(self)
+        small.parts = parts
+        small.operators = tuple(
+            part.inverses if isinstance(part, Windowed) else known
+            for part, known in zip(parts, self.operators, strict=True)
+        )
+        small.interfaces = tuple(
+            replace(interface, parts=(parts[interface.slave], parts[interface.master]))
+            for interface in self.interfaces
+        )
+        return small
 
     @property
     def n_unknowns(self) -> int:
@@ -241,7 +273,7 @@ class System:
     def plastic_strain(self, pair: int, state: State) -> Array:
         """Return the accumulated plastic strain (n,) at the vertices of a slave."""
         interface = self.interfaces[pair]
-        number, chain = interface.slave, interface.slave_surface
+        number, chain = interface.slave, self.chain(*interface.declared.slave)
         if not self.parts[number].meshed:
             return np.zeros(len(chain.vertices))
         if pair not in self._at_vertices:
