@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
+from collections import deque
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -51,8 +51,6 @@ _TOUCHING = 1e-9
 """Ratio of the gap to the length of the longest contact surface; below it vertices touch."""
 _SET_DOWN = 1e-9
 """Ratio of the gap to the radius of a wheel that is set down; below it vertices touch."""
-_WINDOWS = 4
-"""Number of windows of bodies that are kept in memory."""
 _EXPANDED = 8
 """Number of displacement fields of condensed bodies that are kept for results and audit."""
 
@@ -101,7 +99,7 @@ class System:
             for contact in model.contacts
         )
 
-        self._windows: OrderedDict[tuple[int, bytes], Windowed] = OrderedDict()
+        self._windows: dict[int, tuple[bytes, Windowed, PartOperators]] = {}
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._at_vertices: dict[int, csr_array] = {}
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
@@ -170,24 +168,27 @@ class System:
         )
 
     def window(self, number: int, region: Region) -> Windowed:
-        """Return a meshed body of which only a region may yield and touch."""
-        key = number, region.key
-        if key not in self._windows:
-            part, elastic = self.parts[number], self.operators[number].elastic
+        """Return a meshed body of which only a region may yield and touch.
+
+        The last window of each body is kept in memory.
+        """
+        known = self._windows.get(number)
+        if known is None or known[0] != region.key:
+            self._windows.pop(number, None)  # its factors go before others are made
+            part = self.parts[number]
             assert isinstance(part, Discretisation)
-            self._windows[key] = Windowed(part, region, elastic, self._linear_solver)
-            while len(self._windows) > _WINDOWS:
-                self._windows.popitem(last=False)
-        self._windows.move_to_end(key)
-        return self._windows[key]
+            made = Windowed(part, region, self._linear_solver)
+            inverses = made.inverses(self.operators[number].elastic, self._linear_solver)
+            known = self._windows[number] = region.key, made, inverses
+        return known[1]
 
     def within(self, parts: tuple[Part, ...]) -> System:
-        """Return the system with windows in the place of some of its parts."""
+        """Return the system with the last windows in the place of some of its parts."""
         small = copy(self)
         small.parts = parts
         small.operators = tuple(
-            part.inverses if isinstance(part, Windowed) else known
-            for part, known in zip(parts, self.operators, strict=True)
+            self._windows[number][2] if isinstance(part, Windowed) else self.operators[number]
+            for number, part in enumerate(parts)
         )
         small.interfaces = tuple(
             replace(interface, parts=(parts[interface.slave], parts[interface.master]))

@@ -98,20 +98,13 @@ class Windowed(Discretisation):
     whole : the meshed body
     elements : (n_elements,) which of its elements the window has; at least those of the region
     kept : (n,) unknowns of the whole body
-    inverses : its inverse stiffnesses, for all increments
-
-    Parameters
-    ----------
-    elastic : the elastic operator of the whole body
     """
 
     _begin: NDArray[np.float64]
     _outer: Eliminated
     _plastic: PlasticState
 
-    def __init__(
-        self, whole: Discretisation, region: Region, elastic: Operator, linear_solver: str
-    ) -> None:
+    def __init__(self, whole: Discretisation, region: Region, linear_solver: str) -> None:
         nodes = np.zeros(whole.X.shape[1], dtype=bool)
         nodes[whole.dofs[region.elements] // 2] = True
         nodes[np.flatnonzero(region.contact) // 2] = True
@@ -131,8 +124,7 @@ class Windowed(Discretisation):
         self.active = choose_pins(self.rigid, self.free)
         self._mesh(whole, number)
         self._condense(whole, linear_solver)
-        contact = number[region.contact]
-        self.inverses = Operators(self, contact, linear_solver, Restricted(elastic, kept, whole.n))
+        self._contact = number[region.contact]
 
     def _mesh(self, whole: Discretisation, number: NDArray[np.int64]) -> None:
         """Take the elements of the window, and what belongs to their points."""
@@ -175,6 +167,11 @@ class Windowed(Discretisation):
         del time
         change = self._outer.finish(u - self._begin[self.kept])
         return (self._begin + change)[self.whole.copied]
+
+    def inverses(self, elastic: Operator, linear_solver: str) -> Operators:
+        """Return its inverse stiffnesses, given the elastic operator of the whole body."""
+        restricted = Restricted(elastic, self.kept, self.whole.n)
+        return Operators(self, self._contact, linear_solver, restricted)
 
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
