@@ -89,7 +89,7 @@ class Candidates:
         return np.asarray(rows.block @ u[rows.dofs])
 
     def touched(self, part: int) -> NDArray[np.int64]:
-        """Return the indices of the unknowns of a part on which contact forces act."""
+        """Return the unknowns of a part on which contact forces may act."""
         rows = self.rows[part]
         if rows is None:
             return np.zeros(0, dtype=np.int64)

@@ -12,6 +12,7 @@ from solver.contact.problem import OPEN, STICK
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.fem.window import Region
     from solver.materials.state import PlasticState, Response
 
 
@@ -188,6 +189,7 @@ class Converged:
     energy : work since the lap began
     timing : how well contact was resolved in time since then
     lost : difference between the beginning of this increment and the end of the previous one
+    windows : for each part, the region of the window in which it was solved, if in any
     """
 
     start: State
@@ -206,3 +208,4 @@ class Converged:
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)
     lost: float = 0.0
+    windows: tuple[Region | None, ...] = ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ from solver.fem.fields import Sampler, recovery
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
 from solver.fem.wheel import Wheel
+from solver.fem.window import Region, Windowed
 from solver.model.friction import ContactPlaces, lines_of
 
 if TYPE_CHECKING:
@@ -73,6 +75,7 @@ class System:
     model : the model; slave and master of a pair are exchanged where that is better
     names : names of the meshed bodies
     all_names : these names, then those of the rigid bodies, in the order of ``parts``
+    surfaces : for each part, its contact surfaces in the numbering of the whole body
     """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
@@ -84,7 +87,7 @@ class System:
         surfaces = surfaces_of(model, wholes)
         self.model = model = with_slaves(model, surfaces)
         own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
-        self._own, self._linear_solver = own, linear_solver
+        self.surfaces, self._linear_solver = own, linear_solver
         self.names = [body.name for body in model.bodies]
         self.all_names = list(wholes)
         self.parts: tuple[Part, ...] = tuple(
@@ -96,6 +99,7 @@ class System:
             for contact in model.contacts
         )
 
+        self._windows: dict[int, tuple[bytes, Windowed, PartOperators]] = {}
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._at_vertices: dict[int, csr_array] = {}
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
@@ -160,8 +164,37 @@ class System:
         """The inverses of the stiffness of each part."""
         return tuple(
             part.operators(chains, self._linear_solver)
-            for part, chains in zip(self.parts, self._own, strict=True)
+            for part, chains in zip(self.parts, self.surfaces, strict=True)
         )
+
+    def window(self, number: int, region: Region) -> Windowed:
+        """Return a meshed body of which only a region may yield and touch.
+
+        The last window of each body is kept in memory.
+        """
+        known = self._windows.get(number)
+        if known is None or known[0] != region.key:
+            self._windows.pop(number, None)  # its factors go before others are made
+            part = self.parts[number]
+            assert isinstance(part, Discretisation)
+            made = Windowed(part, region, self._linear_solver)
+            inverses = made.inverses(self.operators[number].elastic, self._linear_solver)
+            known = self._windows[number] = region.key, made, inverses
+        return known[1]
+
+    def within(self, parts: tuple[Part, ...]) -> System:
+        """Return the system with the last windows in the place of some of its parts."""
+        small = copy(self)
+        small.parts = parts
+        small.operators = tuple(
+            self._windows[number][2] if isinstance(part, Windowed) else self.operators[number]
+            for number, part in enumerate(parts)
+        )
+        small.interfaces = tuple(
+            replace(interface, parts=(parts[interface.slave], parts[interface.master]))
+            for interface in self.interfaces
+        )
+        return small
 
     @property
     def n_unknowns(self) -> int:
@@ -241,7 +274,7 @@ class System:
     def plastic_strain(self, pair: int, state: State) -> Array:
         """Return the accumulated plastic strain (n,) at the vertices of a slave."""
         interface = self.interfaces[pair]
-        number, chain = interface.slave, interface.slave_surface
+        number, chain = interface.slave, self.chain(*interface.declared.slave)
         if not self.parts[number].meshed:
             return np.zeros(len(chain.vertices))
         if pair not in self._at_vertices:

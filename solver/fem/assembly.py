@@ -18,18 +18,26 @@ class Assembly:
     ----------
     dofs : (n_elements, m) unknowns of each element
     active : unknowns that are rows of the matrix, out of all ``n``
+    block : (b,) unknowns that a dense matrix couples too; none by default
 
     Attributes
     ----------
     pattern : the matrix, values not set
     """
 
-    def __init__(self, dofs: NDArray[np.int64], active: NDArray[np.int64], n: int) -> None:
+    def __init__(
+        self,
+        dofs: NDArray[np.int64],
+        active: NDArray[np.int64],
+        n: int,
+        block: NDArray[np.int64] | None = None,
+    ) -> None:
         number = np.full(n, -1)
         number[active] = np.arange(len(active))
-        local = number[dofs]
-        rows = np.broadcast_to(local[:, :, None], (*local.shape, local.shape[1])).ravel()
-        columns = np.broadcast_to(local[:, None, :], (*local.shape, local.shape[1])).ravel()
+        pairs = [_pairs(number[dofs])]
+        if block is not None:
+            pairs.append(_pairs(number[block][None]))
+        rows, columns = np.concatenate(pairs, axis=1)
         kept = (rows >= 0) & (columns >= rows)
         key = rows.astype(np.int64) * len(active) + columns
         unique, slot = np.unique(key[kept], return_inverse=True)
@@ -38,16 +46,33 @@ class Assembly:
         self.pattern = sparse.csr_array((np.zeros(len(unique)), unique % m, indptr), shape=(m, m))
         place = np.full(len(key), len(unique))
         place[kept] = slot
-        self._place = place.reshape(len(local), -1)
+        at, self._block_place = np.split(place, [pairs[0].shape[1]])
+        self._place = at.reshape(len(dofs), -1)
 
     def values(
         self, elements: NDArray[np.int64] | slice, matrices: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return the values on `pattern` of the sum of some elements' matrices."""
+        return self._summed(self._place[elements], matrices)
+
+    def block_values(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values on `pattern` of a dense matrix (b, b) on the block."""
+        return self._summed(self._block_place, matrix)
+
+    def _summed(
+        self, place: NDArray[np.int64], matrices: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         size = self.pattern.nnz + 1
-        place = self._place[elements].ravel()
-        data = np.bincount(place, weights=matrices.ravel(), minlength=size)
+        data = np.bincount(place.ravel(), weights=matrices.ravel(), minlength=size)
         return np.asarray(data[:-1], dtype=float)
+
+
+def _pairs(local: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return row and column (2, n) of each entry of matrices on unknowns (n_matrices, m)."""
+    n, m = local.shape
+    rows = np.broadcast_to(local[:, :, None], (n, m, m))
+    columns = np.broadcast_to(local[:, None, :], (n, m, m))
+    return np.stack([rows.ravel(), columns.ravel()])
 
 
 def whole_matrix(

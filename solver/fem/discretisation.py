@@ -77,7 +77,7 @@ class Discretisation(Nodes, Part):
         self.moves = body.travelling is not None
         self._travelling: tuple[float, NDArray[np.float64]] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
-        self._eigenstrains = eigenstrains(self)
+        self.eigenstrains = eigenstrains(self)
         self.heat = Heat.of(self, self.points.reshape(2, -1))
         self._hold()
 
@@ -172,12 +172,12 @@ class Discretisation(Nodes, Part):
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
         """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
-        return self._eigenstrains.at(time).reshape(4, -1)
+        return self.eigenstrains.at(time).reshape(4, -1)
 
     def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
         """Return stress, tangent and new state at all points; the tangent is symmetric."""
         strain = self.strain(u)
-        if self._eigenstrains.cases:
+        if self.eigenstrains.cases:
             strain -= self.eigenstrain(time)
         response = self.law(time).respond(strain, state)
         if self.body.law.symmetric:
@@ -189,14 +189,14 @@ class Discretisation(Nodes, Part):
     def condensable(self) -> Superposed:
         """Nodal forces (n,) of all loads and of the eigenstrain on an elastic body [N]."""
         C = self.body.law.stiffness(self.B.shape[2])
-        strains = self._eigenstrains
+        strains = self.eigenstrains
         pushed = [self.internal_force(C @ strain.reshape(4, -1)) for strain in strains.fields.T]
         both = (*self.loads.cases, *strains.cases), (*self.loads.fields.T, *pushed)
         return Superposed.of(self.n, zip(*both, strict=True))
 
     def force_level(self, time: float) -> float:
         """Return the norm of the forces that load the body at a time, with eigenstrain [N]."""
-        if not self._eigenstrains.cases:
+        if not self.eigenstrains.cases:
             return super().force_level(time)
         return float(np.linalg.norm(self.condensable.at(time)))
 
@@ -207,7 +207,7 @@ class Discretisation(Nodes, Part):
         of element forces are added at the nodes, where they cancel in a body that can deform.
         """
         nodal, energy = np.zeros(self.n), 0.0
-        if self._eigenstrains.cases:
+        if self.eigenstrains.cases:
             strain = self.eigenstrain(time)
             stress = self.body.law.stiffness(len(strain)) @ strain
             energy += float((stress * strain).sum(axis=0) @ self.volumes) / 2
@@ -300,18 +300,23 @@ class Discretisation(Nodes, Part):
         return self._assembly.pattern
 
     @cached_property
-    def _elastic_elements(self) -> NDArray[np.float64]:
+    def elastic_elements(self) -> NDArray[np.float64]:
+        """Elastic stiffness of each element (n_elements, m, m)."""
         C = self.body.law.stiffness(self.B.shape[2])
         return self._element_stiffness(slice(None), C[None, None])
 
     @cached_property
     def elastic_data(self) -> NDArray[np.float64]:
         """Values of the elastic stiffness on `pattern`."""
-        return self._assembly.values(slice(None), self._elastic_elements)
+        return self._assembly.values(slice(None), self.elastic_elements)
+
+    @cached_property
+    def _elastic_matrix(self) -> sparse.csr_array:
+        return whole_matrix(self.dofs, self.elastic_elements, self.n)
 
     def elastic_matrix(self) -> sparse.csr_array:
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
-        return whole_matrix(self.dofs, self._elastic_elements, self.n)
+        return self._elastic_matrix
 
     def tangent_data(self, response: Response) -> NDArray[np.float64]:
         """Return the values of the consistent tangent on `pattern`.
@@ -324,5 +329,5 @@ class Discretisation(Nodes, Part):
             return self.elastic_data
         tangent = response.tangent.reshape(*response.tangent.shape[:2], *shape)
         tangent = tangent[:, :, elements].transpose(2, 3, 0, 1)
-        change = self._element_stiffness(elements, tangent) - self._elastic_elements[elements]
+        change = self._element_stiffness(elements, tangent) - self.elastic_elements[elements]
         return self.elastic_data + self._assembly.values(elements, change)

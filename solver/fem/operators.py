@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from solver.fem.region import box_around, inside
 from solver.linear import solvers as linear
 from solver.linear.solvers import Begun
-from solver.linear.window import Windowed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
 
-    from solver.fem.region import Box
     from solver.materials.state import Response
-
-
-_WINDOWS = 4
-"""Number of windows kept in memory: a moving load passes from one to the next."""
-_SMALL = 0.25
-"""Ratio of the elements of a window to those of the body; above it a window saves too little."""
 
 
 class Operator(Protocol):
@@ -45,16 +35,12 @@ class Stiff(Protocol):
     """A part whose stiffness is assembled.
 
     The unknowns ``active`` of all ``n`` are solved for; ``copied`` (n,) gives for each unknown the
-    one whose value it takes; ``pattern`` is the upper triangle on the active ones. ``X`` are the
-    nodes, ``dofs`` (n_elements, m) the unknowns of each element, ``points`` its points.
+    one whose value it takes; ``pattern`` is the upper triangle on the active ones.
     """
 
     n: int
     active: NDArray[np.int64]
     copied: NDArray[np.int64]
-    X: NDArray[np.float64]
-    dofs: NDArray[np.int64]
-    points: NDArray[np.float64]
 
     @property
     def pattern(self) -> sparse.csr_array:
@@ -77,38 +63,15 @@ class Analysed:
     contact : active unknowns on its contact surfaces, kept
     kept : (n,) position of each unknown among those kept, -1 for the others
     solver : linear solver of the active unknowns
-
-    Parameters
-    ----------
-    window : (n,) unknowns between which alone the stiffness changes; all by default
     """
 
-    def __init__(
-        self,
-        part: Stiff,
-        contact: NDArray[np.int64],
-        name: str,
-        window: NDArray[np.bool_] | None = None,
-    ) -> None:
+    def __init__(self, part: Stiff, contact: NDArray[np.int64], name: str) -> None:
         self.part = part
         kept = np.isin(part.active, contact)
-        if window is not None:
-            kept &= window[part.active]
         self.contact = part.active[kept]
         self.kept = np.full(part.n, -1)
         self.kept[self.contact] = np.arange(len(self.contact))
-        self.solver: linear.LinearSolver
-        if window is None:
-            self.solver = linear.analyse(part.pattern, name, np.flatnonzero(kept))
-        else:
-            elastic = part.pattern.copy()
-            elastic.data = part.elastic_data
-            self.solver = Windowed(elastic, window[part.active], np.flatnonzero(kept), name)
-
-    def keeps(self, touched: NDArray[np.int64]) -> bool:
-        """Whether the unknowns (m,) are kept, as far as they are active."""
-        active = np.isin(touched, self.part.active)
-        return bool((self.kept[touched[active]] >= 0).all())
+        self.solver = linear.analyse(part.pattern, name, np.flatnonzero(kept))
 
 
 class Factored:
@@ -149,11 +112,8 @@ class PartOperators(Protocol):
     def elastic(self) -> Operator:
         """The operator of the elastic stiffness."""
 
-    def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
-        """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``.
-
-        ``touched`` are the unknowns on which contact forces act.
-        """
+    def tangent(self, response: Response, blend: float) -> Operator:
+        """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
 
 
 class Operators:
@@ -162,52 +122,40 @@ class Operators:
     Parameters
     ----------
     contact : unknowns of its contact surfaces
+    elastic : its elastic operator, where it is known
     """
 
-    def __init__(self, part: Stiff, contact: NDArray[np.int64], linear_solver: str) -> None:
+    def __init__(
+        self,
+        part: Stiff,
+        contact: NDArray[np.int64],
+        linear_solver: str,
+        elastic: Operator | None = None,
+    ) -> None:
         self._part = part
         self._contact = contact
         self._name = linear_solver
-        self._windows: OrderedDict[Box, tuple[NDArray[np.bool_], Analysed | None]] = OrderedDict()
+        self._known = elastic
 
     @cached_property
     def elastic(self) -> Operator:
         """The elastic operator."""
+        if self._known is not None:
+            return self._known
         return Factored(Analysed(self._part, self._contact, self._name), self._part.elastic_data)
 
     @cached_property
     def _analysed(self) -> Analysed:
         return Analysed(self._part, self._contact, self._name)
 
-    def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
+    def tangent(self, response: Response, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
         if blend >= 1 or not response.yielding.any():
             return self.elastic
         data = self._part.tangent_data(response)
         if blend:
             data = (1 - blend) * data + blend * self._part.elastic_data
-        return Factored(self._around(response, touched), data)
-
-    def _around(self, response: Response, touched: NDArray[np.int64]) -> Analysed:
-        """Return the pattern of a window around yielding and contact, or that of the whole body."""
-        if linear.chosen(self._name) != "pardiso" or not len(touched):
-            return self._analysed
-        yielding = response.yielding.reshape(self._part.points.shape[1:]).any(axis=1)
-        nodes = np.concatenate([self._part.dofs[yielding].ravel(), touched]) // 2
-        box = box_around(self._part.X[:, nodes])
-        if box not in self._windows:
-            within = inside(box, self._part.points.mean(axis=2))
-            window = np.zeros(self._part.n, dtype=bool)
-            window[self._part.dofs[within]] = True
-            small = within.mean() < _SMALL
-            new = Analysed(self._part, self._contact, self._name, window) if small else None
-            self._windows[box] = within, new
-            while len(self._windows) > _WINDOWS:
-                self._windows.popitem(last=False)
-        self._windows.move_to_end(box)
-        within, found = self._windows[box]
-        known = found is not None and within[yielding].all() and found.keeps(touched)
-        return found if found is not None and known else self._analysed
+        return Factored(self._analysed, data)
 
 
 class Dense:
@@ -228,13 +176,41 @@ class Dense:
         return np.asarray(rows @ self._inverse[np.ix_(dofs, dofs)] @ rows.T)
 
 
+class Restricted:
+    """The operator of a body of which only the unknowns ``kept`` (m,) are left, all forces on them.
+
+    Parameters
+    ----------
+    whole : operator of the body with all ``n`` unknowns
+    """
+
+    def __init__(self, whole: Operator, kept: NDArray[np.int64], n: int) -> None:
+        self._whole, self._kept, self._n = whole, kept, n
+
+    def _all(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        every = np.zeros(self._n)
+        every[self._kept] = force
+        return every
+
+    def begin(self, force: NDArray[np.float64]) -> Begun:
+        """See `Operator`."""
+        begun = self._whole.begin(self._all(force))
+        return Begun(
+            begun.kept[self._kept], lambda change: begun.finish(self._all(change))[self._kept]
+        )
+
+    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `Operator`."""
+        return self._whole.compliance(self._kept[dofs], rows)
+
+
 class Fixed:
     """The operators of a part whose stiffness never changes."""
 
     def __init__(self, operator: Operator) -> None:
         self.elastic = operator
 
-    def tangent(self, response: Response, blend: float, touched: NDArray[np.int64]) -> Operator:
+    def tangent(self, response: Response, blend: float) -> Operator:
         """Return the elastic operator."""
-        del response, blend, touched
+        del response, blend
         return self.elastic

@@ -16,7 +16,8 @@ class Tolerances:
     ----------
     residual : largest out-of-balance force over the largest force level so far
     contact : largest violation of the contact conditions, as a force, over the same level
-    iterations : largest number of Newton iterations of an increment
+    iterations : largest number of Newton iterations of an increment; half as many more in windows
+        of the bodies, where an iteration costs a fraction
     """
 
     residual: float = 1e-8

@@ -19,7 +19,7 @@ plastic tangent of the previous step would make Newton's method diverge.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,6 +65,24 @@ _LATE = 1
 """Number of the first iteration in which a step without stiffness means plastic flow."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Balanced:
+    """The last iterate of an increment, in equilibrium.
+
+    ``scale`` is the force level [N]; ``iterations``, ``pivoted`` and ``blended`` as in `Converged`.
+    """
+
+    u: Vectors
+    contacts: tuple[ContactState, ...]
+    responses: tuple[Response, ...]
+    residuals: Vectors
+    candidates: Candidates
+    scale: float
+    iterations: int
+    pivoted: int
+    blended: int
+
+
 class Increment:
     """One increment of ``system`` from the state ``start`` to ``time``.
 
@@ -78,6 +96,7 @@ class Increment:
     elastic_only : raise `Yielded` as soon as a point yields
     patient : use all iterations if every body hardens, so that an equilibrium exists: with little
         hardening the residual rises and falls while the energy falls
+    stiffness : elastic stiffness of contact points by their vertices, as far as known [N/mm]
     """
 
     def __init__(
@@ -93,6 +112,7 @@ class Increment:
         elastic_only: bool = False,
         patient: bool = False,
         tolerances: Tolerances | None = None,
+        stiffness: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
         self.system = system
         self.start = start
@@ -109,14 +129,27 @@ class Increment:
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
-        self._stiff: dict[bytes, NDArray[np.float64]] = {}
+        self.stiffness = {} if stiffness is None else stiffness
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
         with one_thread():
+            return self._commit(self._iterate())
+
+    def closed(self, found: Balanced) -> Converged | None:
+        """Return the increment that ends in an iterate, or None if that is out of balance."""
+        with one_thread():
+            scale, error, violation = self._errors(found.residuals, found.candidates)
+            if not self._ends(found.u, found.candidates, scale, error, violation):
+                return None
+            return self._commit(replace(found, scale=scale))
+
+    def approach(self) -> Balanced:
+        """Return where the iterations of an increment end, or raise `IncrementFailed`."""
+        with one_thread():
             return self._iterate()
 
-    def _iterate(self) -> Converged:
+    def _iterate(self) -> Balanced:
         tolerances = self.tolerances
         origin = self.system.moved(self.guess or self.start, self.time)
         u, contacts = origin.u, origin.contacts
@@ -137,12 +170,18 @@ class Increment:
             hopeless |= error > _DIVERGED * max(best, begun)
             if hopeless or not (np.isfinite(error) and np.isfinite(violation)):
                 break
-            # a body that flows moves far: an out-of-balance force may then be more than rounding
-            balanced = error < tolerances.residual
-            little = 0 < error < _UNBALANCED * tolerances.residual
-            balanced |= little and error * scale <= rounding(self.system, u)
-            if balanced and violation < tolerances.contact and candidates.beyond >= 0:
-                return self._commit(u, responses, residuals, candidates, scale, iteration)
+            if self._ends(u, candidates, scale, error, violation):
+                return Balanced(
+                    u=u,
+                    contacts=contacts,
+                    responses=responses,
+                    residuals=residuals,
+                    candidates=candidates,
+                    scale=scale,
+                    iterations=iteration,
+                    pivoted=self._pivoted,
+                    blended=self._blended,
+                )
             elastic_first = iteration == 0 and self.elastic_first
             first = _STIFF if crawled > 1 else int(self._softened)
             first = len(_BLENDS) - 1 if elastic_first else first
@@ -240,13 +279,25 @@ class Increment:
         out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
         return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
 
+    def _ends(
+        self, u: Vectors, candidates: Candidates, scale: float, error: float, violation: float
+    ) -> bool:
+        """Whether an iterate meets the tolerances."""
+        limit = self.tolerances.residual
+        # a body that flows moves far: an out-of-balance force may then be more than rounding
+        balanced = error < limit
+        little = 0 < error < _UNBALANCED * limit
+        balanced |= little and error * scale <= rounding(self.system, u)
+        met = violation < self.tolerances.contact and candidates.beyond >= 0
+        return balanced and met
+
     def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
         """Return the elastic stiffness of the contact points [N/mm], a scale; computed once."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
-        if key not in self._stiff:
+        if key not in self.stiffness:
             W = candidates.compliance([o.elastic for o in self.system.operators])
-            self._stiff[key] = 1 / np.diag(W)
-        return self._stiff[key]
+            self.stiffness[key] = 1 / np.diag(W)
+        return self.stiffness[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -264,10 +315,8 @@ class Increment:
         for blend in blends:
             try:
                 operators = [
-                    o.tangent(response, blend, candidates.touched(number))
-                    for number, (o, response) in enumerate(
-                        zip(self.system.operators, responses, strict=True)
-                    )
+                    o.tangent(response, blend)
+                    for o, response in zip(self.system.operators, responses, strict=True)
                 ]
                 step = newton_step(self.system, residuals, operators, candidates, self.contact)
             except Singular:
@@ -309,15 +358,8 @@ class Increment:
 
     # -- 6: the converged state ----------------------------------------------------------------
 
-    def _commit(
-        self,
-        u: Vectors,
-        responses: tuple[Response, ...],
-        residuals: Vectors,
-        candidates: Candidates,
-        scale: float,
-        iterations: int,
-    ) -> Converged:
+    def _commit(self, found: Balanced) -> Converged:
+        u, responses, candidates = found.u, found.responses, found.candidates
         contacts = candidates.kept(self.start.contacts, self.time - self.start.time)
         spent = [
             part.plastic_work(before, response, self.time)
@@ -326,7 +368,7 @@ class Increment:
             )
         ]
         inner = on_parts(self.system, candidates, candidates.forces)
-        held = zip(self.system.parts, residuals, inner, strict=True)
+        held = zip(self.system.parts, found.residuals, inner, strict=True)
         return Converged(
             start=self.start,
             forces=tuple(part.external(self.time) - r - c for part, r, c in held),
@@ -334,11 +376,11 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.time, u, tuple(r.state for r in responses), contacts, scale),
+            state=State(self.time, u, tuple(r.state for r in responses), contacts, found.scale),
             responses=responses,
-            iterations=iterations,
-            pivoted=self._pivoted,
-            blended=self._blended,
+            iterations=found.iterations,
+            pivoted=found.pivoted,
+            blended=found.blended,
             beyond_end=beyond_end(self.system, u, candidates),
             timing=self._timing(candidates),
             separated=not self.contact,

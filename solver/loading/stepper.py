@@ -18,6 +18,7 @@ from solver.linear.threads import one_thread
 from solver.loading.energy import worked
 from solver.loading.history import lost
 from solver.loading.increment import Increment
+from solver.loading.narrowing import narrowed
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
 from solver.loading.program import ROUNDING
@@ -208,7 +209,22 @@ class Stepper:
         state = point.now.state
         guess = self._predict(point.past, state, time) if contact else None
 
+        tolerances = self.control.tolerances
+
         def solved(start: State, guess: State | None) -> Converged:
+            if contact:
+                with one_thread():
+                    near = narrowed(
+                        self.system,
+                        point.now,
+                        start,
+                        time,
+                        guess=guess,
+                        patient=patient,
+                        tolerances=tolerances,
+                    )
+                if near is not None:
+                    return near
             return Increment(
                 self.system,
                 start,
@@ -217,7 +233,7 @@ class Stepper:
                 contact=contact,
                 elastic_first=guess is None,
                 patient=patient,
-                tolerances=self.control.tolerances,
+                tolerances=tolerances,
             ).solve()
 
         converged = solved(state, guess)

@@ -12,7 +12,6 @@ from solver.errors import ModelError
 from solver.linear import pardiso
 from solver.linear import solvers as linear
 from solver.linear.schur import SchurComplement
-from solver.linear.window import Windowed
 
 NAMES = ["superlu", *(["pardiso"] if pardiso.library() else [])]
 
@@ -117,36 +116,6 @@ def test_a_solution_begun_is_finished_for_any_change_on_the_kept_unknowns(name, 
     assert np.abs(A @ begun.finish(change[kept]) - changed).max() < 1e-9 * size
     assert np.abs(A @ begun.finish(0 * kept) - b).max() < 1e-9 * size
     assert np.abs(begun.kept - solver.solve(b)[kept]).max() < 1e-9 * size
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_window_gives_what_the_whole_matrix_gives(name):
-    """Only entries between unknowns of the window change; the grid is 30 by 30."""
-    A, upper = matrix()
-    at = np.arange(A.shape[0])
-    window = (at % 30 < 12) & (at // 30 < 9)
-    kept = np.array([3, 17 + 30 - 15, 185])
-    assert window[kept].all()
-    solver = Windowed(upper, window, kept, name)
-    random = np.random.default_rng(6)
-    b, change = random.standard_normal((2, len(at)))
-    rows = random.standard_normal((2, 3))
-    row, column = upper.tocoo().coords
-    for grown in (0.0, 4.0):
-        diagonal = (row == column) & window[row]
-        data = upper.data + np.where(diagonal, grown * np.sin(row), 0.0) ** 2
-        solver.factorise(data)
-        full = A + sparse.diags_array(np.where(window, grown * np.sin(at), 0.0) ** 2)
-        exact = np.linalg.inv(full.toarray())
-        assert np.abs(solver.solve(b) - exact @ b).max() < 1e-12 * np.abs(exact @ b).max()
-        begun = solver.begin(b)
-        changed = b.copy()
-        changed[kept] += change[kept]
-        size = np.abs(exact @ changed).max()
-        assert np.abs(begun.kept - (exact @ b)[kept]).max() < 1e-12 * size
-        assert np.abs(begun.finish(change[kept]) - exact @ changed).max() < 1e-12 * size
-        W = rows @ exact[np.ix_(kept, kept)] @ rows.T
-        assert np.abs(solver.compliance(rows) - W).max() < 1e-12 * np.abs(W).max()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,245 @@
+"""A body of which only a window is meshed; the rest is elastic and condensed, exactly.
+
+Outside the window, displacements follow those of its boundary b linearly. With r the out-of-balance
+forces of all elements outside at displacements u0, i the unknowns inside the rest and K the
+stiffness of the rest, the rest exerts on the nodes of the window
+
+    r_b - K_bi K_ii^-1 r_i - S (u - u0)_b,      S = K_bb - K_bi K_ii^-1 K_ib
+
+An increment then costs as much as its window: stress, tangent, factor and solves.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.assembly import Assembly
+from solver.fem.discretisation import Discretisation, choose_pins
+from solver.fem.heat import Heat
+from solver.fem.loads import Superposed
+from solver.fem.operators import Operators, Restricted
+from solver.linear.schur import SchurComplement
+from solver.linear.solvers import Singular
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.fem.operators import Operator
+    from solver.fem.surface import Surface
+    from solver.linear.schur import Eliminated
+    from solver.materials import PlasticState, Response
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Where a body may yield and touch.
+
+    Attributes
+    ----------
+    elements : (n_elements,) which of its elements may yield
+    contact : (n,) on which of its unknowns contact forces may act
+    """
+
+    elements: NDArray[np.bool_]
+    contact: NDArray[np.bool_]
+
+    @classmethod
+    def around(
+        cls, whole: Discretisation, surfaces: Sequence[Surface], inner: Region, layers: int
+    ) -> Region:
+        """Return a region of a body and its surfaces with layers of elements around another.
+
+        Where nothing yields it has the elements that touch.
+        """
+        touched = inner.contact[whole.dofs].any(axis=1)
+        near = np.zeros(whole.n, dtype=bool)
+        near[whole.dofs[_layered(whole, touched, layers)]] = True
+        contact = np.zeros(whole.n, dtype=bool)
+        for surface in surfaces:
+            contact[surface.dofs] = near[whole.copied[surface.dofs]]
+        yields = inner.elements if inner.elements.any() else touched
+        return cls(_layered(whole, yields, layers), contact)
+
+    def has(self, other: Region) -> bool:
+        """Whether it has all of another region."""
+        yields, touches = other.elements & ~self.elements, other.contact & ~self.contact
+        return not (yields.any() or touches.any())
+
+    @property
+    def key(self) -> bytes:
+        """Its content."""
+        return np.packbits(np.concatenate([self.elements, self.contact])).tobytes()
+
+
+def _layered(whole: Discretisation, elements: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
+    """Return some elements (n_elements,) with layers of neighbours around them."""
+    for _ in range(layers):
+        within = np.zeros(whole.n, dtype=bool)
+        within[whole.dofs[elements]] = True
+        elements = within[whole.dofs].any(axis=1)
+    return elements
+
+
+class Windowed(Discretisation):
+    """A body whose unknowns are those of a region.
+
+    An increment uses it like a `Discretisation`, after `at` has given it the beginning of the
+    increment. The rest of a contact surface stays where it is then.
+
+    Attributes
+    ----------
+    whole : the meshed body
+    elements : (n_elements,) which of its elements the window has; at least those of the region
+    kept : (n,) unknowns of the whole body
+    """
+
+    _begin: NDArray[np.float64]
+    _outer: Eliminated
+    _plastic: PlasticState
+
+    def __init__(self, whole: Discretisation, region: Region, linear_solver: str) -> None:
+        nodes = np.zeros(whole.X.shape[1], dtype=bool)
+        nodes[whole.dofs[region.elements] // 2] = True
+        nodes[np.flatnonzero(region.contact) // 2] = True
+        nodes[whole.same[nodes]] = True
+        nodes |= nodes[whole.same]
+        self.whole, self.body = whole, whole.body
+        self.elements = nodes[whole.dofs // 2].all(axis=1)
+        at = np.flatnonzero(nodes)
+        self.kept = kept = np.stack([2 * at, 2 * at + 1], axis=1).ravel()
+        self._number = number = np.full(whole.n, -1)
+        number[kept] = np.arange(len(kept))
+        self.n = len(kept)
+        self.X = self.nodes = whole.X[:, at]
+        self.copied = number[whole.copied[kept]]
+        self.rigid = whole.rigid[kept]
+        self.free = np.flatnonzero(np.isin(kept, whole.free))
+        self.active = choose_pins(self.rigid, self.free)
+        self._mesh(whole, number)
+        self._condense(whole, linear_solver)
+        self._contact = number[region.contact]
+
+    def _mesh(self, whole: Discretisation, number: NDArray[np.int64]) -> None:
+        """Take the elements of the window, and what belongs to their points."""
+        self.dofs = number[whole.dofs[self.elements]]
+        self.B, self.weights = whole.B[self.elements], whole.weights[self.elements]
+        self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
+        self.points = whole.points[:, self.elements]
+        self.heat = Heat.of(self, self.points.reshape(2, -1))
+        per_element = whole.weights.shape[1]
+        self._at = np.flatnonzero(np.repeat(self.elements, per_element))
+        strains = whole.eigenstrains
+        components, cases = self.B.shape[2], len(strains.cases)
+        fields = strains.fields.reshape(components, whole.weights.size, cases)[:, self._at]
+        self.eigenstrains = Superposed(
+            strains.cases, fields.reshape(components * len(self._at), cases)
+        )
+
+    def _condense(self, whole: Discretisation, linear_solver: str) -> None:
+        """Condense the rest of the body."""
+        K = whole.elastic_matrix()
+        inside = np.setdiff1d(whole.free, self.kept)
+        self._schur = SchurComplement(K, self.kept, inside, linear_solver)
+        self._edge = edge = self._schur.boundary
+        every = self.kept[edge]
+        own = self.elastic_matrix()[edge][:, edge]
+        self._rest = (K[every][:, every] - own).toarray() - self._schur.taken
+
+    def at(self, u: NDArray[np.float64], plastic: PlasticState, time: float) -> Windowed:
+        """Return the window for an increment from displacements and a state of the whole body."""
+        here = copy(self)
+        response = self.whole.respond(u, plastic, time)
+        out = self.whole.residual(time, u, response)
+        out[self.kept] += self.internal_force(response.stress[:, self._at])
+        here._outer, here._begin = self._schur.begin(out), u
+        here._plastic = plastic.at(self._at)
+        return here
+
+    def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """Return the whole body's displacements [mm]."""
+        del time
+        change = self._outer.finish(u - self._begin[self.kept])
+        return (self._begin + change)[self.whole.copied]
+
+    def inverses(self, elastic: Operator, linear_solver: str) -> Operators:
+        """Return its inverse stiffnesses, given the elastic operator of the whole body."""
+        restricted = Restricted(elastic, self.kept, self.whole.n)
+        return Operators(self, self._contact, linear_solver, restricted)
+
+    def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
+        at = self._number[surface.dofs]
+        return np.where(at < 0, self._begin[surface.dofs], u[at]).reshape(-1, 2).T
+
+    def pull_back(
+        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """See `Part.pull_back`; raises `Singular` if contact has left the window."""
+        del u, gaps
+        at = self._number[surface.dofs]
+        if block[:, at < 0].any():
+            raise Singular("contact has left the window")
+        return at[at >= 0], block[:, at >= 0]
+
+    # -- the window as a body ------------------------------------------------------------------
+
+    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
+        """Return the response from the beginning of the increment, whose state is known."""
+        del state
+        return super().respond(u, self._plastic, time)
+
+    def residual(
+        self, time: float, u: NDArray[np.float64], response: Response
+    ) -> NDArray[np.float64]:
+        """Return external minus internal forces (n,), those of the rest condensed [N]."""
+        del time
+        force = self._outer.condensed - self.internal_force(response.stress)
+        force[self._edge] -= self._rest @ (u - self._begin[self.kept])[self._edge]
+        return force
+
+    def external(self, time: float) -> NDArray[np.float64]:
+        """Return the external nodal forces (n,) at a time, those on the rest condensed [N]."""
+        return self._schur.begin(self.whole.external(time)).condensed
+
+    def force_level(self, time: float) -> float:
+        """Return the norm of the forces that load the whole body at a time [N]."""
+        return self.whole.force_level(time)
+
+    def clamped(self, time: float) -> tuple[float, float]:
+        """See `Discretisation.clamped`."""
+        return self.whole.clamped(time)
+
+    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """Return the unknowns, whose prescribed motions have their values already."""
+        del time
+        return u
+
+    def rounding(self, u: NDArray[np.float64]) -> float:
+        """Return the out-of-balance force that rounding can cause in the whole body [N]."""
+        moved = self._begin.copy()
+        moved[self.kept] = u
+        return self.whole.rounding(moved)
+
+    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
+        edge = step[self._edge]
+        rest = float(edge @ self._rest @ edge)
+        tangent, elastic = super().stiffness_along(step, response)
+        return tangent + rest, elastic + rest
+
+    @cached_property
+    def _assembly(self) -> Assembly:
+        return Assembly(self.dofs, self.active, self.n, self._edge)
+
+    @cached_property
+    def elastic_data(self) -> NDArray[np.float64]:
+        """Values of the elastic stiffness on `pattern`."""
+        rest = self._assembly.block_values(self._rest)
+        return rest + self._assembly.values(slice(None), self.elastic_elements)

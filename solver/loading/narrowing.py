@@ -1,0 +1,183 @@
+"""Iterate an increment in windows of its bodies, outside of which nothing yields.
+
+Few elements of a body yield, so most of an iteration is spent on what does not change. An increment
+is therefore first solved in windows around the yielding elements, the rest condensed
+(`solver.fem.window`), and then checked on the whole bodies. If elements outside have yielded, the
+windows grow. A window is kept from increment to increment until elements outside yield.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.candidates import find_candidates
+from solver.fem.discretisation import Discretisation
+from solver.fem.window import Region, Windowed
+from solver.linear.solvers import Singular
+from solver.loading.increment import Increment
+from solver.loading.outcome import IncrementFailed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged, State
+    from solver.contact.system import System
+    from solver.fem.part import Part
+    from solver.loading.control import Tolerances
+    from solver.loading.increment import Balanced
+    from solver.materials import Response
+
+    Windows = tuple[Region | None, ...]
+
+_LAYERS = 3
+"""Number of layers of elements around those that yield, in a new window."""
+_LARGE = 0.5
+"""Ratio of the elements of a window to those of the body; above it a window saves too little."""
+_PATIENCE = 1.5
+"""Ratio of the largest number of iterations in a window to that with whole bodies."""
+_ROUNDS = 4
+"""Number of times windows may grow in an increment."""
+
+
+def narrowed(
+    system: System,
+    before: Converged,
+    start: State,
+    time: float,
+    *,
+    guess: State | None,
+    patient: bool,
+    tolerances: Tolerances,
+) -> Converged | None:
+    """Return an increment from ``start`` to ``time`` that was solved in windows.
+
+    None if nothing yields, if windows would be large, or if the increment fails in them.
+
+    Parameters
+    ----------
+    before : the last increment, which ended at ``start``
+    guess : predicted state, if any
+    """
+    windows = before.windows or (None,) * len(system.parts)
+    longer = replace(tolerances, iterations=int(_PATIENCE * tolerances.iterations))
+    begin, count = system.moved(start, time), np.zeros(3, dtype=int)
+    at, elastic_first = system.moved(guess or start, time), guess is None
+    needed = _needed(system, at, start, time, before.responses)
+    stiffness: dict[bytes, NDArray[np.float64]] = {}
+    if not before.windows and not any(need and need.elements.any() for need in needed):
+        return None
+    for _ in range(_ROUNDS):
+        windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
+        if not any(windows):
+            return None
+        parts = tuple(
+            part
+            if region is None
+            else system.window(number, region).at(begin.u[number], start.plastic[number], time)
+            for number, (part, region) in enumerate(zip(system.parts, windows, strict=True))
+        )
+        try:
+            found = Increment(
+                system.within(parts),
+                _inside(start, parts),
+                time,
+                guess=_inside(at, parts),
+                elastic_first=elastic_first,
+                patient=patient,
+                tolerances=longer,
+                stiffness=stiffness,
+            ).approach()
+        except (IncrementFailed, Singular):
+            return None
+        count += (found.iterations, found.pivoted, found.blended)
+        found = _expanded(system, start, time, parts, found)
+        at, elastic_first = replace(at, u=found.u, contacts=found.contacts), False
+        yields = _yields(system, found.responses)
+        each = list(zip(windows, yields, strict=True))
+        if all(w is None or y is None or not (y & ~w.elements).any() for w, y in each):
+            iterations, pivoted, blended = count.tolist()
+            found = replace(found, iterations=iterations, pivoted=pivoted, blended=blended)
+            whole = Increment(system, start, time, tolerances=tolerances, stiffness=stiffness)
+            converged = whole.closed(found)
+            return converged and replace(converged, windows=windows)
+        needed = _needed(system, at, start, time, found.responses)
+    return None
+
+
+def _expanded(
+    system: System, start: State, time: float, parts: tuple[Part, ...], found: Balanced
+) -> Balanced:
+    """Return an iterate of windows as one of the whole bodies."""
+    expanded = zip(parts, found.u, strict=True)
+    u = tuple(p.expand(v, time) if isinstance(p, Windowed) else v for p, v in expanded)
+    rows = tuple(
+        replace(row, dofs=part.kept[row.dofs]) if isinstance(part, Windowed) and row else row
+        for part, row in zip(parts, found.candidates.rows, strict=True)
+    )
+    each = zip(system.parts, u, start.plastic, strict=True)
+    responses = tuple(part.respond(ui, plastic, time) for part, ui, plastic in each)
+    forces = zip(system.parts, u, responses, strict=True)
+    return replace(
+        found,
+        u=u,
+        responses=responses,
+        residuals=tuple(part.residual(time, ui, response) for part, ui, response in forces),
+        candidates=replace(found.candidates, rows=rows),
+    )
+
+
+def _yields(system: System, responses: tuple[Response, ...]) -> list[NDArray[np.bool_] | None]:
+    """Return the elements (n_elements,) of each meshed part that yield, None of the others."""
+    each = zip(system.parts, responses, strict=True)
+    return [
+        np.asarray(response.yielding.reshape(part.weights.shape).any(axis=1))
+        if isinstance(part, Discretisation)
+        else None
+        for part, response in each
+    ]
+
+
+def _needed(
+    system: System,
+    at: State,
+    start: State,
+    time: float,
+    before: tuple[Response, ...],
+) -> list[Region | None]:
+    """Return where each meshed part yields and touches at displacements of the whole bodies.
+
+    Where it yields in the responses ``before`` counts too.
+    """
+    candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
+    parts = zip(system.parts, at.u, start.plastic, strict=True)
+    now = _yields(system, tuple(part.respond(u, plastic, time) for part, u, plastic in parts))
+    needed: list[Region | None] = []
+    for number, (after, old) in enumerate(zip(now, _yields(system, before), strict=True)):
+        if after is None or old is None:
+            needed.append(None)
+            continue
+        contact = np.zeros(system.parts[number].n, dtype=bool)
+        contact[candidates.touched(number)] = True
+        needed.append(Region(after | old, contact))
+    return needed
+
+
+def _around(
+    system: System, number: int, window: Region | None, need: Region | None
+) -> Region | None:
+    """Return the window so far if it has all that is needed, else a new one, if small."""
+    part = system.parts[number]
+    if need is None or not isinstance(part, Discretisation):
+        return None
+    if window is None or not window.has(need):
+        window = Region.around(part, system.surfaces[number], need, _LAYERS)
+    return window if 0 < window.elements.mean() < _LARGE else None
+
+
+def _inside(state: State, parts: tuple[Part, ...]) -> State:
+    """Return a state with the unknowns of the windows."""
+    each = zip(parts, state.u, strict=True)
+    return replace(state, u=tuple(u[p.kept] if isinstance(p, Windowed) else u for p, u in each))

@@ -1,0 +1,101 @@
+"""Windows of bodies that yield: the same equilibrium, and the same result as without them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.contact.system import System
+from solver.fem.window import Region, Windowed
+from solver.loading import narrowing
+from solver.loading.control import Control
+from solver.loading.increment import Increment
+from solver.loading.walker import Walker
+from solver.scenes.punch import PUNCH, PunchParameters
+from solver.scenes.rolling import ROLLING
+from solver.scenes.rolling_parameters import RollingParameters
+
+PRESSED = PunchParameters(accuracy="draft", friction=0.3, load_ratio=0.6)
+ROLLED = RollingParameters(
+    track=24.0, element_size=2.0, advance_step=2.0, growth=1.3, traction=0.5, passes=2
+)
+
+
+def corner(system):
+    """The half-plane, and the region of its elements closest to the corner of the punch."""
+    part = system.parts[1]
+    near = np.hypot(part.points[0] - 50.0, part.points[1]).min(axis=1) < 2.0
+    inner = Region(near, np.zeros(part.n, dtype=bool))
+    return part, Region.around(part, system.surfaces[1], inner, 1)
+
+
+def test_a_region_grows_by_its_neighbours_and_their_surface():
+    system = System(PUNCH.model(PRESSED))
+    part, region = corner(system)
+    wider = Region.around(part, system.surfaces[1], region, 1)
+    assert wider.has(region)
+    assert not region.has(wider)
+    assert 0 < region.elements.sum() < wider.elements.sum() < len(region.elements)
+    touched = np.zeros(part.n, dtype=bool)
+    touched[system.surfaces[1][0].dofs[40:44]] = True
+    nothing = np.zeros_like(region.elements)
+    around = Region.around(part, system.surfaces[1], Region(nothing, touched), 1)
+    assert around.elements[touched[part.dofs].any(axis=1)].all()
+    assert around.contact[touched].all()
+    assert around.contact.sum() > touched.sum()
+
+
+@pytest.mark.parametrize("scale", [0.0, 1e-3])
+def test_the_rest_of_a_body_is_in_equilibrium_with_its_window(scale):
+    """Whatever the window's displacements; the rest has plastic strain and starts out of balance.
+
+    At the expanded displacements the whole body has no out-of-balance force outside the window, and
+    inside that of the window.
+    """
+    system = System(PUNCH.model(PRESSED))
+    part, region = corner(system)
+    random = np.random.default_rng(2)
+    begin = np.stack([5e-5 * part.X[0], -3e-5 * part.X[1]], axis=1).ravel()
+    plastic = part.virgin()
+    plastic.plastic_strain[:3] += 1e-5 * random.standard_normal((3, len(part.volumes)))
+    window = Windowed(part, region, "auto").at(begin, plastic, 1.0)
+    u = begin[window.kept]
+    u[window.free] += scale * random.standard_normal(len(window.free))
+    every = window.expand(u, 1.0)
+    assert np.abs(every[window.kept] - u).max() == 0
+    # what is outside answers elastically, also where the random strains would yield
+    response = window.respond(u, plastic, 1.0)
+    stress = part.body.law.stiffness(4) @ (part.strain(every) - plastic.plastic_strain)
+    stress[:, np.repeat(window.elements, part.weights.shape[1])] = response.stress
+    out = part.external(1.0) - part.internal_force(stress)
+    size = np.abs(out[window.kept]).max()
+    inside = np.setdiff1d(part.free, window.kept)
+    assert np.abs(out[inside]).max() < 1e-9 * size
+    miss = out[window.kept] - window.residual(1.0, u, response)
+    assert np.abs(miss[window.free]).max() < 1e-9 * size
+
+
+@pytest.mark.solves
+@pytest.mark.parametrize(("scene", "run"), [(PUNCH, PRESSED), (ROLLING, ROLLED)])
+def test_windows_change_the_result_by_less_than_the_tolerance(scene, run, monkeypatch):
+    used = []
+
+    class Counted(Increment):
+        def closed(self, found):
+            used.append(found.iterations)
+            return super().closed(found)
+
+    monkeypatch.setattr(narrowing, "Increment", Counted)
+    found = []
+    for large in (narrowing._LARGE, 0.0):
+        monkeypatch.setattr(narrowing, "_LARGE", large)
+        system = System(scene.model(run))
+        (outcome,) = Walker(system, Control()).walk([scene.program(run)])
+        assert outcome.error is None
+        found.append((outcome, len(used)))
+    (windowed, some), (whole, all_used) = found
+    assert 5 < some == all_used
+    assert sum(windowed.tally.iterations) < 1.2 * sum(whole.tally.iterations)
+    body = system.names[-1]
+    stress = [system.response(body, o.points["unloaded"]).stress for o in (windowed, whole)]
+    assert np.abs(stress[0] - stress[1]).max() < 1e-4
