@@ -40,6 +40,7 @@ from service.runner import Runner
 from service.settings import Settings, chosen
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
+from studies.scratch import remove_left
 
 BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
 """How the description of the service announces that keys are required; `Gate` requires them."""
@@ -149,6 +150,7 @@ def serve(
     scheduler : address of a dask scheduler; without one each study starts its own workers
     """
     find_modules_at_home()
+    remove_left()
     try:
         settings = chosen(host=host, port=port, data=data, scheduler=scheduler)
     except StudyError as error:

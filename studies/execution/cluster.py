@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
-import os
-import tempfile
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError, Unusable
 from studies.execution.script import GUARD, check_script
+from studies.scratch import scratch
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -35,8 +37,6 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
     # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
-    # Ctrl-C reaches every process of the terminal; only the calling process shall react to it.
-    "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
     # dask's pages are closed. Without the statistics for them processes that wait take a quarter of
     # the time: by default each looks at itself 50 times a second, and a worker at its stack 100.
     "distributed.admin.tick.interval": "1s",
@@ -95,18 +95,14 @@ class Access:
         return cls(**content)  # type: ignore[arg-type]
 
 
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let processes that are started meanwhile run no file of the current directory.
+def _ignore_interrupts() -> None:
+    """Block Ctrl-C for this thread, and for the threads and processes that it starts.
 
-    Before such a process knows the module path of this one, it looks there for Python's modules.
+    Ctrl-C reaches every process of the terminal, also one that has only just begun; only the
+    calling process shall react to it.
     """
-    before = os.environ.get("PYTHONSAFEPATH", "")
-    os.environ["PYTHONSAFEPATH"] = "1"
-    try:
-        yield
-    finally:
-        os.environ["PYTHONSAFEPATH"] = before  # empty is as good as none
+    resource_tracker.ensure_running()  # it would unblock Ctrl-C when it starts
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
 
 
 @contextmanager
@@ -137,24 +133,25 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
 
     security = Security.temporary()
     with (
-        _safe_path(),
-        tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True) as scratch,
+        scratch() as folder,
         dask.config.set({**CONFIGURATION, **_CLOSED}),
     ):
         try:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                protocol="tls://",
-                security=security,
-                dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
-                scheduler_kwargs={"dashboard": False},
-                local_directory=scratch,
-                silence_logs=logging.CRITICAL,
-                **({"memory_limit": memory} if memory else {}),
-            )
+            with ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
+                cluster = starter.submit(
+                    LocalCluster,
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    protocol="tls://",
+                    security=security,
+                    dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
+                    scheduler_kwargs={"dashboard": False},
+                    local_directory=str(folder),
+                    silence_logs=logging.CRITICAL,
+                    **({"memory_limit": memory} if memory else {}),
+                ).result()
         except RuntimeError as error:  # as where a thread of the script asks for them
             raise RuntimeError(
                 "worker processes did not start; they import the calling script again, so it must "
@@ -243,5 +240,4 @@ def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
     from dask.delayed import delayed
 
     later = [delayed(call)() for call in calls]
-    with _safe_path():
-        return list(compute(*later, scheduler="processes", num_workers=workers))
+    return list(compute(*later, scheduler="processes", num_workers=workers))

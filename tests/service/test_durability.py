@@ -151,6 +151,26 @@ def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(lively: Se
     assert lively.finished(next_id)["status"] == "successful"
 
 
+def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
+    mortal: Server, tmp_path: Path
+) -> None:
+    (temporary := tmp_path / "temporary").mkdir()
+    mortal.settings["TMPDIR"] = str(temporary)
+    study = mortal.start().post(fake_study("left", seconds=0.5))
+    wait_until(mortal.computed)
+    assert mortal.process is not None
+    (left,) = temporary.glob("residua-*")
+    family = psutil.Process(mortal.process.pid).children(recursive=True)
+    for each in (mortal.process, *family):
+        each.kill()
+    mortal.process.wait()
+    psutil.wait_procs(family, timeout=10)
+    assert left.exists()
+    mortal.start()
+    assert not left.exists()
+    assert mortal.finished(study)["status"] == "successful"
+
+
 def test_a_study_that_hangs_keeps_neither_a_stopped_nor_a_killed_service(mortal: Server) -> None:
     mortal.settings = {"RESIDUA_GRACE_SECONDS": "1"}
     mortal.start()
