@@ -69,7 +69,7 @@ def create_app(settings: Settings) -> FastAPI:
     keys = Keys(settings.data)
     if settings.keys_required and not keys.all():
         raise KeysError(
-            f"{settings.published or settings.host} is open to others, who need an API key; make "
+            f"{settings.host} is open to others, who need an API key; make "
             f"one: residua keys add NAME --scope admin --data {shlex.quote(str(settings.data))}"
         )
     lock = lock_directory(settings.data, settings.lock_seconds)
