@@ -9,18 +9,22 @@ ENV PIP_NO_CACHE_DIR=1 \
     MKL_NUM_THREADS=1 \
     NUMBA_CACHE_DIR=/tmp/numba \
     MPLCONFIGDIR=/tmp/matplotlib \
+    PYTHONSAFEPATH=1 \
     NO_PROXY=127.0.0.1,localhost \
     no_proxy=127.0.0.1,localhost
 
 WORKDIR /app
-COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY pyproject.toml requirements.lock mkl.lock README.md LICENSE ./
 COPY solver solver
 COPY studies studies
 COPY service service
 COPY residua residua
 COPY data data
-RUN if [ "$(uname -m)" = x86_64 ]; then extra='[mkl]'; else extra=''; fi \
-    && pip install --constraint constraints.txt ".$extra"
+# Every file that is installed has a digest in a lock (`make lock`). `--build-arg MKL=yes` adds
+# Intel's PARDISO, whose licence is not free: docs/operations.md.
+ARG MKL=
+RUN pip install --require-hashes --requirement requirements.lock ${MKL:+--requirement mkl.lock} \
+    && pip install --no-deps --no-build-isolation .
 # Compiled kernels, which `watched.py` copies to where a container may write, and digests of sources.
 RUN cd / \
     && NUMBA_CACHE_DIR=/app/kernels python -c "import solver.prism.influence, solver.steady.sweep" \
@@ -29,7 +33,8 @@ COPY docker/watched.py /usr/local/lib/watched.py
 
 RUN useradd --create-home --uid 1000 residua \
     && install --directory --owner residua /data \
-    && install --directory --owner residua --mode 700 /certificates
+    && install --directory --owner residua --mode 700 /certificates /certificates/scheduler \
+        /certificates/worker /certificates/service
 USER residua
 WORKDIR /home/residua
 VOLUME /data
@@ -39,6 +44,5 @@ HEALTHCHECK --interval=15s --timeout=5s --start-period=60s --retries=3 \
     CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/health', timeout=4)"]
 
 ENTRYPOINT ["python", "/usr/local/lib/watched.py", "http://127.0.0.1:8000/health"]
-# Inside a container the address says nothing about who gets in: without a key it does not start,
-# unless RESIDUA_PUBLISHED says that the port is published on 127.0.0.1 only.
+# Inside a container the address says nothing about who gets in: without a key it does not start.
 CMD ["residua", "serve", "--host", "0.0.0.0", "--port", "8000", "--data", "/data"]

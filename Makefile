@@ -7,7 +7,7 @@ KERNELS := solver/prism/influence.py solver/steady/sweep.py
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run check test serve lint bench stress stress-service clean
+.PHONY: help setup run check test serve lint bench stress stress-service lock sbom clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -40,6 +40,15 @@ stress: setup ## run a thousand seeded scenes, and see that none is answered wro
 
 stress-service: setup ## put the service under stress, and see what it stands (15 minutes)
 	$(BIN)/python -m tests.stress
+
+lock: setup ## pin what the image installs, with digests, as constraints.txt has it
+	$(BIN)/python docker/lock.py
+
+sbom: ## list what the image installs as build/sbom.json (CycloneDX)
+	$(PYTHON) -m venv build/sbom
+	build/sbom/bin/python -m pip install --quiet --disable-pip-version-check cyclonedx-bom==7.5.0
+	build/sbom/bin/cyclonedx-py requirements requirements.lock --pyproject pyproject.toml \
+		--output-reproducible --of JSON -o build/sbom.json
 
 clean: ## remove the environment and caches; results in out/ stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

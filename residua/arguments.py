@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from residua import commands, keys
+from residua.status import BAD_INPUT, complain
 from studies.execution.limits import Limits
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser; `command` of its options is the function that carries them out."""
-    whole = argparse.ArgumentParser(
-        prog="residua", description="Residual stress after elastic-plastic contact."
-    )
+    whole = _Parser(prog="residua", description="Residual stress after elastic-plastic contact.")
     known = whole.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, **defaults: Any) -> argparse.ArgumentParser:
@@ -25,8 +25,8 @@ def parser() -> argparse.ArgumentParser:
         return one
 
     one = add("run", commands.run)
-    one.add_argument("study", type=Path, metavar="STUDY.toml")
-    one.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
+    one.add_argument("study", type=_path, metavar="STUDY.toml")
+    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
     one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
     for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
@@ -48,10 +48,10 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("name", nargs="?")
 
     one = add("show", commands.show)
-    one.add_argument("path", type=Path, metavar="DIR|RUN")
+    one.add_argument("path", type=_path, metavar="DIR|RUN")
 
     one = add("plot", commands.plot)
-    one.add_argument("path", type=Path, metavar="RUN|DIR")
+    one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument(
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
@@ -69,22 +69,29 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
-    one.add_argument("--out", type=Path, required=True, metavar="PNG")
+    one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
     one = add("export", commands.export)
-    one.add_argument("path", type=Path, metavar="RUN|DIR")
+    one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument("--vtu", type=Path, required=True, metavar="FOLDER", help="where they go")
+    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
 
     one = add("serve", commands.serve)
     one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
     one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
-    one.add_argument("--data", type=Path, metavar="DIR", help="default: out")
+    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
     _add_access(add)
     _add_remote(add)
     return whole
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells a mistake in one line, as the commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -93,14 +100,14 @@ def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
         name = act.__name__.strip("_")
         one = actions.add_parser(name, help=act.__doc__, description=act.__doc__)
         one.set_defaults(act=act)
-        one.add_argument("--data", type=Path, metavar="DIR", help="of the service; default: out")
+        one.add_argument("--data", type=_path, metavar="DIR", help="of the service; default: out")
         if name != "list":
             one.add_argument("name", metavar="NAME")
         if name == "add":
             one.add_argument("--scope", choices=["read", "submit", "admin"], required=True)
 
     one = add("certificates", keys.certificates)
-    one.add_argument("--out", type=Path, required=True, metavar="DIR")
+    one.add_argument("--out", type=_path, required=True, metavar="DIR")
 
 
 def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -109,16 +116,22 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
         one = add(name, commands.remote, talk=talk)
         one.add_argument("--url", default="http://127.0.0.1:8000")
         one.add_argument(
-            "--api-key-file", type=Path, metavar="FILE",
+            "--api-key-file", type=_path, metavar="FILE",
             help="contains the API key (default: environment variable RESIDUA_API_KEY); as an "
             "argument the key would be visible to everybody on this machine",
         )  # fmt: skip
         if name == "submit":
-            one.add_argument("study", type=Path, metavar="STUDY.toml")
+            one.add_argument("study", type=_path, metavar="STUDY.toml")
         else:
             one.add_argument("id")
         if name == "fetch":
-            one.add_argument("--out", type=Path, metavar="FILE")
+            one.add_argument("--out", type=_path, metavar="FILE")
+
+
+def _path(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be the name of a file or a folder")
+    return Path(text)
 
 
 def _integer(least: int, most: int) -> Callable[[str], int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
             preparing.start()
         progress(event)
 
-    with _interruption() as interrupted:
+    with _interruption() as interrupted, _safe_path():
         outcome = run_study(
             study,
             store,
@@ -197,6 +198,23 @@ def _interruption() -> Iterator[list[int]]:
         yield received
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let processes that are started meanwhile run no file of the current directory.
+
+    Before a worker knows the module path of this process, it would look there for Python's modules.
+    """
+    name = "PYTHONSAFEPATH"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[name]
+        if before is not None:
+            os.environ[name] = before
 
 
 def _save(drawn: Any, path: Path) -> None:

@@ -43,7 +43,7 @@ def remove(known: Any, options: argparse.Namespace) -> None:
 
 
 def certificates(options: argparse.Namespace) -> int:
-    """Write the certificate and key that scheduler, workers and service share."""
+    """Write a certificate and key each for scheduler, workers and service."""
     from studies.execution.certificates import write_certificates
 
     for path in write_certificates(options.out):

@@ -40,6 +40,7 @@ from service.runner import Runner
 from service.settings import Settings, chosen
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
+from studies.scratch import remove_left
 
 BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
 """How the description of the service announces that keys are required; `Gate` requires them."""
@@ -68,7 +69,7 @@ def create_app(settings: Settings) -> FastAPI:
     keys = Keys(settings.data)
     if settings.keys_required and not keys.all():
         raise KeysError(
-            f"{settings.published or settings.host} is open to others, who need an API key; make "
+            f"{settings.host} is open to others, who need an API key; make "
             f"one: residua keys add NAME --scope admin --data {shlex.quote(str(settings.data))}"
         )
     lock = lock_directory(settings.data, settings.lock_seconds)
@@ -155,6 +156,7 @@ def serve(
     except StudyError as error:
         refuse(str(error))
     find_modules_at_home()
+    remove_left()
     logs.configure(settings.log_format)
     try:
         app = create_app(settings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene, read_scene
 from studies.scenes.table import FILE_NAME
+from studies.scratch import scratch
 
 SECONDS = 60
 """Longest time of reading a scene [s]."""
@@ -51,10 +51,10 @@ class Inspector:
                 allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
                 raise StudyError("meshes", name, allowed)
         async with self.process.turn():
-            with tempfile.TemporaryDirectory() as folder:
+            with scratch() as folder:
                 for name, data in {**meshes, _FILE: text}.items():
-                    (Path(folder) / name).write_bytes(data)
-                found = json.loads(await self.process.call(inspected, folder, name=_FILE))
+                    (folder / name).write_bytes(data)
+                found = json.loads(await self.process.call(inspected, str(folder), name=_FILE))
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}

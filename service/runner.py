@@ -7,6 +7,7 @@ import contextlib
 import json
 import logging
 import math
+import re
 import sys
 import time
 from asyncio.subprocess import Process
@@ -21,7 +22,7 @@ from service.jobs import Jobs
 from service.pool import Pool, PoolAway
 from service.processes import Starter
 from service.settings import Settings
-from studies.errors import StoreFull
+from studies.errors import StoreFull, without_folders
 
 log = logging.getLogger(__name__)
 
@@ -243,8 +244,12 @@ class Runner:
         return await self.starter.give(order)
 
     def _plain(self, text: str) -> str:
-        """Return a message about a study without the path of the data directory."""
-        return text.replace(str(self.settings.data.resolve()), "the data directory")
+        """Return a message about a study without folders of this machine."""
+        data = str(self.settings.data.resolve())
+        inside = text.replace(f"{data}/", "/")
+        return without_folders(
+            re.sub(rf"{re.escape(data)}(?![\w.-])", "the data directory", inside)
+        )
 
     async def _unwanted(self, job: Job) -> bool:
         if self._stopping.is_set():

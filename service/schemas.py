@@ -156,6 +156,9 @@ class KeptScene(BaseModel):
     id: str = Field(description="content id: a study names the scene so")
     name: str
     summary: str
+    note: str = Field(
+        default="", description="what the answer shows in place of what was posted, and why"
+    )
 
 
 class Health(BaseModel):

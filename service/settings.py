@@ -30,9 +30,6 @@ class Settings(BaseSettings):
     data: Path = Field(default=Path("out"), description="directory of runs, studies and the queue")
     host: str = Field(default="127.0.0.1", description="where to listen")
     port: int = Field(default=8000, ge=0, le=65535, description="where to listen")
-    published: str | None = Field(
-        default=None, description="address at which a container's port is reached, in place of host"
-    )
     require_keys: bool = Field(
         default=False, description="ask for API keys also where only this machine gets in"
     )
@@ -159,9 +156,8 @@ class Settings(BaseSettings):
 
         Behind a proxy on this machine every caller has the address 127.0.0.1.
         """
-        host = self.published or self.host
-        address = address_of(host)
-        local = address.is_loopback if address else host == "localhost"
+        address = address_of(self.host)
+        local = address.is_loopback if address else self.host == "localhost"
         return self.require_keys or not local
 
 

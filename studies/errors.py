@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import re
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 
@@ -129,6 +131,17 @@ def nearest(name: Any, names: Iterable[str]) -> str:
     """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
     matches = difflib.get_close_matches(str(name), list(names), n=1)
     return f"; did you mean {matches[0]}?" if matches else ""
+
+
+_PATH = re.compile(r"""(?<![^\s'"(\[<=,])(?:(?<=')/[^']+|(?<=")/[^"]+|/[\w.][^\s'",;:)\]>]*)""")
+
+
+def without_folders(text: str) -> str:
+    """Return a text with the last part of each absolute path in place of the path.
+
+    Messages of runs and studies go to others, who need not know the folders of this machine.
+    """
+    return _PATH.sub(lambda path: PurePath(path[0]).name, text)
 
 
 _WORDS = {

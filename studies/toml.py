@@ -3,12 +3,35 @@
 from __future__ import annotations
 
 import json
+import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from solver.errors import ModelError
 from studies.errors import StudyError
+
+LARGEST = 50_000_000
+"""Largest size of a file that a user names [bytes]."""
+
+
+def read_bytes(path: Path | str, field: str) -> bytes:
+    """Return the content of a file.
+
+    Raises
+    ------
+    StudyError
+        for ``field``, when it is a device or a pipe, too large, or cannot be read
+    """
+    try:
+        found = Path(path).stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise StudyError(field, str(path), "must be a file")
+        if found.st_size > LARGEST:
+            raise StudyError(field, str(path), f"must be at most {LARGEST} bytes")
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
 
 
 def read_toml(path: Path | str, field: str) -> dict[str, Any]:
@@ -19,11 +42,7 @@ def read_toml(path: Path | str, field: str) -> dict[str, Any]:
     StudyError
         for ``field``, when the file cannot be read or is no TOML
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
-    return toml_of(data, field, str(path))
+    return toml_of(read_bytes(path, field), field, str(path))
 
 
 def read_study(path: Path | str) -> dict[str, Any]:

@@ -19,6 +19,11 @@ from studies.storage.shelf import newest
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
+FIRST_WORDS = (
+    "this scene is kept already, with another summary, description or advice: these stay as they "
+    "were first posted"
+)
+
 LISTED = 100
 """Number of posted scenes that are listed, the newest first."""
 
@@ -49,6 +54,9 @@ async def post_scene(
 
     A study names it by its `id`.
     """
+    count = len((await request.form()).getlist("scene"))
+    if count > 1:
+        raise StudyError("scene", f"{count} files", "must be one file: post each by itself")
     files: dict[str, bytes] = {}
     for each in meshes:
         if not each.filename or each.filename in files:
@@ -57,10 +65,12 @@ async def post_scene(
     found = await inspector.inspect(await scene.read(), files)
     known = await asyncio.to_thread(_kept, store, found.id)
     await asyncio.to_thread(store.save_scene, found)
+    kept = known or found
     if known:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
-    return KeptScene(id=found.id, name=found.name, summary=found.summary)
+    note = FIRST_WORDS if kept.description.content != found.description.content else ""
+    return KeptScene(id=kept.id, name=kept.name, summary=kept.summary, note=note)
 
 
 @router.get("/{name}")

@@ -1,8 +1,7 @@
-"""The certificate that a scheduler, its workers and its clients share.
+"""Certificates of a scheduler, its workers and the service: one each, of one authority.
 
-Anybody who has the key may run code on the workers. Scheduler, workers and clients share one
-certificate, because separate ones would not increase security. dask does the same for the clusters
-it starts (`distributed.security.Security.temporary`), for one year; these are valid for ten.
+Anybody who has a key may run code on the workers, so each process sees only its own. The key of the
+authority is not stored: nobody can add a certificate later, and all are made again together.
 """
 
 from __future__ import annotations
@@ -19,39 +18,62 @@ from studies.storage.appearing import appearing
 
 _LIFE = timedelta(days=3650)
 
+_Key = ec.EllipticCurvePrivateKey
+
+
+OWNERS = ("scheduler", "worker", "service")
+"""Who has a certificate; all workers share one."""
+
 
 def write_certificates(directory: Path) -> Sequence[Path]:
-    """Write ``ca.pem``, ``cert.pem`` and ``key.pem``, unless all exist; return the new files.
+    """Write ``ca.pem``, ``cert.pem`` and ``key.pem`` in a folder for each of `OWNERS`.
 
-    The certificate is self-signed, so ``ca.pem`` is a copy of ``cert.pem``. Only the owner may read
-    the key.
+    If all exist, none is written. Only the owner of a file may read it.
+
+    Returns
+    -------
+    Sequence[Path]
+        the new files
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    paths = [directory / name for name in ("ca.pem", "cert.pem", "key.pem")]
+    names = ("ca.pem", "cert.pem", "key.pem")
+    paths = [directory / owner / name for owner in OWNERS for name in names]
     if all(path.is_file() for path in paths):  # those who run already hold them
         return []
     key = ec.generate_private_key(ec.SECP256R1())
-    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "residua")])
-    now = datetime.now(UTC)
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - timedelta(hours=1))  # clocks of other machines
-        .not_valid_after(now + _LIFE)
-        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
-        .sign(key, hashes.SHA256())
-    )
-    public = certificate.public_bytes(serialization.Encoding.PEM)
-    private = key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
-    )
-    for path, content in zip(paths, (public, public, private), strict=True):
+    authority = _certificate("residua", key, "residua", key)
+    contents = []
+    for owner in OWNERS:
+        own = ec.generate_private_key(ec.SECP256R1())
+        private = own.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            serialization.NoEncryption(),
+        )
+        contents += [authority, _certificate(f"residua {owner}", own, "residua", key), private]
+    for path, content in zip(paths, contents, strict=True):
+        path.parent.mkdir(parents=True, exist_ok=True)
         with appearing(path) as part:
             part.touch(mode=0o600)
             part.write_bytes(content)
     return paths
+
+
+def _certificate(name: str, own: _Key, issuer: str, key: _Key) -> bytes:
+    """Return the certificate of a key that another key signs; one signed by itself may sign."""
+    now = datetime.now(UTC)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(_name(name))
+        .issuer_name(_name(issuer))
+        .public_key(own.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(hours=1))  # clocks of other machines
+        .not_valid_after(now + _LIFE)
+        .add_extension(x509.BasicConstraints(ca=own is key, path_length=None), critical=True)
+        .sign(key, hashes.SHA256())
+        .public_bytes(serialization.Encoding.PEM)
+    )
+
+
+def _name(text: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, text)])

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import logging
-import os
-import tempfile
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError, Unusable
 from studies.execution.forking import beginning, prepare
 from studies.execution.script import GUARD, check_script
+from studies.scratch import scratch
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -109,18 +111,14 @@ def prepare_workers() -> None:
     import distributed  # noqa: F401
 
 
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let processes that are started meanwhile run no file of the current directory.
+def _ignore_interrupts() -> None:
+    """Block Ctrl-C for this thread, and for the threads and processes that it starts.
 
-    Before such a process knows the module path of this one, it looks there for Python's modules.
+    Ctrl-C reaches every process of the terminal, also one that has only just begun; only the
+    calling process shall react to it.
     """
-    before = os.environ.get("PYTHONSAFEPATH", "")
-    os.environ["PYTHONSAFEPATH"] = "1"
-    try:
-        yield
-    finally:
-        os.environ["PYTHONSAFEPATH"] = before  # empty is as good as none
+    resource_tracker.ensure_running()  # it would unblock Ctrl-C when it starts
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
 
 
 @contextmanager
@@ -146,24 +144,22 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
         if the running script would start workers in each worker again
     """
     check_script()
-    method = prepare(_FROM_THE_START)
-    import dask  # takes half a second to import, while the workers' process loads the solver
-    import distributed.utils
-    from distributed import LocalCluster, Security
+    with ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
+        method = starter.submit(prepare, _FROM_THE_START).result()
+        import dask  # takes half a second to import, while the workers' process loads the solver
+        import distributed.utils
+        from distributed import LocalCluster, Security
 
-    distributed.utils._forkserver_preload_set = True  # or dask would load pandas, here and there
-    started = {
-        "distributed.worker.multiprocessing-method": method,
-        "distributed.worker.preload": [beginning(_FROM_THE_START)],
-    }
-    security = Security.temporary()
-    with (
-        tempfile.TemporaryDirectory(prefix="residua-", ignore_cleanup_errors=True) as scratch,
-        dask.config.set({**CONFIGURATION, **_CLOSED, **started}),
-    ):
-        try:
-            with _safe_path():
-                cluster = LocalCluster(
+        distributed.utils._forkserver_preload_set = True  # or dask would load pandas everywhere
+        started = {
+            "distributed.worker.multiprocessing-method": method,
+            "distributed.worker.preload": [beginning(_FROM_THE_START)],
+        }
+        security = Security.temporary()
+        with scratch() as folder, dask.config.set({**CONFIGURATION, **_CLOSED, **started}):
+            try:
+                cluster = starter.submit(
+                    LocalCluster,
                     n_workers=workers,
                     threads_per_worker=1,
                     processes=True,
@@ -172,24 +168,22 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
                     security=security,
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
-                    local_directory=scratch,
+                    local_directory=str(folder),
                     silence_logs=logging.CRITICAL,
                     **({"memory_limit": memory} if memory else {}),
+                ).result()
+            except RuntimeError as error:  # as where a thread of the script asks for them
+                raise RuntimeError(
+                    "worker processes did not start; they import the calling script again, so it "
+                    f"must do its work under: {GUARD}"
+                ) from error
+            with cluster, _kept(cluster, workers):
+                yield Access(
+                    cluster.scheduler_address,
+                    security.tls_ca_file,
+                    security.tls_client_cert,
+                    security.tls_client_key,
                 )
-        except RuntimeError as error:  # as where a thread of the script asks for them
-            raise RuntimeError(
-                "worker processes did not start; they import the calling script again, so it must "
-                f"do its work under: {GUARD}"
-            ) from error
-        # A fork has the safe path of its server; what is spawned for a lost worker needs it here.
-        safe = _safe_path() if method == "spawn" else nullcontext()
-        with cluster, _kept(cluster, workers), safe:
-            yield Access(
-                cluster.scheduler_address,
-                security.tls_ca_file,
-                security.tls_client_cert,
-                security.tls_client_key,
-            )
 
 
 @contextmanager
@@ -266,5 +260,4 @@ def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
     from dask.delayed import delayed
 
     later = [delayed(call)() for call in calls]
-    with _safe_path():
-        return list(compute(*later, scheduler="processes", num_workers=workers))
+    return list(compute(*later, scheduler="processes", num_workers=workers))

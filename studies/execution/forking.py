@@ -57,12 +57,7 @@ def prepare(settings: Mapping[str, object]) -> str:
 def beginning(settings: Mapping[str, object]) -> str:
     """Return what a worker runs first: it takes its environment from this process."""
     environment = {**_texts(settings), **os.environ}
-    return (
-        "import os, signal\n"
-        # Ctrl-C reaches every process of the terminal; only the calling process shall react to it.
-        "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        f"os.environ.clear()\nos.environ.update({environment!r})\n"
-    )
+    return f"import os\nos.environ.clear()\nos.environ.update({environment!r})\n"
 
 
 def _texts(settings: Mapping[str, object]) -> dict[str, str]:

@@ -13,7 +13,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import solver_hash
-from studies.errors import StoreFull, StudyError
+from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
 from studies.storage.store import Store
 
@@ -168,4 +168,4 @@ def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[s
 
 
 def _reason(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+    return without_folders(f"{type(error).__name__}: {error}")

@@ -14,14 +14,13 @@ from pydantic import ValidationError
 
 from solver.parts import Declared
 from studies.errors import SceneError, StudyError
-from studies.scenes import meshfile
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
 from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import ACCURACY, OPEN, ParameterTable, SceneFile
-from studies.toml import toml_of
+from studies.toml import read_bytes, toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
 """Entries of a scene file without expressions of parameters, and the derived numbers."""
@@ -97,11 +96,11 @@ class Description:
             if a file cannot be read or is no TOML
         """
         path = Path(path)
-        content = toml_of(_bytes(path), "scene", path.name)
+        content = toml_of(read_bytes(path, "scene"), "scene", path.name)
         meshes = {}
         for name in mesh_names(content):
             if (path.parent / name).is_file():  # a missing one is a mistake of the scene file
-                meshes[name] = MeshFile(name, _bytes(path.parent / name))
+                meshes[name] = MeshFile(name, read_bytes(path.parent / name, "scene"))
         return cls(path.name, content, meshes, shipped)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -283,15 +282,6 @@ def _open(tables: Any) -> list[Mapping[str, Any]]:
 
 def _is_open(table: Any) -> bool:
     return isinstance(table, Mapping) and table.get("open") is True
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > meshfile.LARGEST:
-            raise StudyError("scene", str(path), f"must be at most {meshfile.LARGEST} bytes")
-        return path.read_bytes()
-    except OSError as error:
-        raise StudyError("scene", str(path), f"cannot be read: {error.strerror}") from None
 
 
 def _with_values(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:

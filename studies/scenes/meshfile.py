@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import tempfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import ModelError
+from studies.scratch import scratch
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 OUTLINE = "outline"
 """Boundary of every mesh: all edges with an element on one side only."""
-
-LARGEST = 50_000_000
-"""Largest size of a mesh file [bytes]."""
 
 MOST_POINTS = 1_000_000
 """Largest number of points of a mesh file."""
@@ -102,8 +99,8 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
 def _read(name: str, data: bytes) -> Any:
     import meshio
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"mesh{''.join(Path(name).suffixes[-1:])}"
+    with scratch() as folder:
+        path = folder / f"mesh{''.join(Path(name).suffixes[-1:])}"
         path.write_bytes(data)
         try:
             with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):

@@ -60,6 +60,16 @@ def kept(directory: Path, scene_id: str) -> FileScene | None:
     return scene
 
 
+def named(directory: Path, name: str) -> list[FileScene]:
+    """Return the stored scenes of this name, without those that cannot be read."""
+    word, found = json.dumps(name).encode(), []
+    for file in sorted((directory / "scenes").glob(f"*/{_FILE}")):
+        with suppress(OSError, StudyError):
+            if word in file.read_bytes():  # else its meshes need not be read
+                found.append(kept(directory, file.parent.name))
+    return [scene for scene in found if scene and scene.name == name]
+
+
 def newest(directory: Path, count: int) -> list[FileScene]:
     """Return the latest stored scenes, newest first, without those that cannot be read."""
     files = sorted((directory / "scenes").glob(f"*/{_FILE}"), key=lambda f: -f.stat().st_mtime_ns)

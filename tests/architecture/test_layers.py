@@ -17,7 +17,9 @@ LAYERS = {
         "version", "errors", "parameters", "parts", "tensors", "linear", "mesh", "materials",
         "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
     ),
-    "studies": ("errors", "toml", "scenes", "definition", "storage", "execution", "views"),
+    "studies": (
+        "errors", "toml", "scratch", "scenes", "definition", "storage", "execution", "views",
+    ),
     "residua": (
         "neighbours", "status", "client", "cost", "progress", "keys", "commands", "arguments",
         "cli", "__main__",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,51 @@ def test_a_lower_bound_is_a_version_that_the_tests_run_with(each: Requirement) -
     assert bound.operator == ">="
     assert pinned >= Version(bound.version)
     assert pinned.release[:2] == Version(bound.version).release[:2]
+
+
+def locked(name: str) -> dict[str, tuple[Version, list[str]]]:
+    """Name of each distribution of a lock -> its version and the digests of its files."""
+    found = {}
+    for line in (ROOT / name).read_text().splitlines():
+        if not line.startswith("#"):
+            pin, *options = line.split()
+            package, version = pin.split("==")
+            digests = [re.fullmatch(r"--hash=sha256:([0-9a-f]{64})", each)[1] for each in options]
+            found[canonicalize_name(package)] = (Version(version), digests)
+    return found
+
+
+def closure(given: list[str]) -> set[str]:
+    """Names of the distributions that requirements need, as the installed ones say."""
+    found: set[str] = set()
+    todo = [Requirement(each) for each in given]
+    while todo:
+        one = todo.pop()
+        name = canonicalize_name(one.name)
+        if name in found or (one.marker and not one.marker.evaluate({"extra": ""})):
+            continue
+        found.add(name)
+        extras = one.extras or {""}
+        for each in map(Requirement, distribution(name).requires or ()):
+            if not each.marker or any(each.marker.evaluate({"extra": e}) for e in extras):
+                each.marker = None
+                todo.append(each)
+    return found
+
+
+def test_the_locks_have_all_that_the_image_needs_at_the_versions_of_the_tests() -> None:
+    (build,) = map(Requirement, PROJECT["build-system"]["requires"])
+    (pin,) = build.specifier
+    assert pin.operator == "==", "the build tool is pinned"
+    lock, mkl = locked("requirements.lock"), locked("mkl.lock")
+    assert lock.pop(canonicalize_name(build.name))[0] == Version(pin.version)
+    free = closure(PROJECT["project"]["dependencies"])
+    extra = closure(PROJECT["project"]["optional-dependencies"]["mkl"])
+    assert (set(lock), set(mkl)) == (free, extra)
+    for name, (version, digests) in (lock | mkl).items():
+        assert version == pins()[name], name
+        assert digests, name
+    assert "mkl" not in lock, "its licence is not free"
 
 
 @pytest.mark.parametrize("page", [p for p in tracked() if p.suffix == ".md"], ids=str)

@@ -200,7 +200,41 @@ def test_a_wrong_command_line_returns_2(
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 2
-    assert "usage: residua" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert told.startswith("residua: ") and told.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "study.toml", "--out", ""],
+        ["run", ""],
+        ["show", ""],
+        ["serve", "--data", ""],
+        ["certificates", "--out", ""],
+    ],
+)
+def test_an_empty_name_of_a_file_is_told_in_one_line(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    told = capsys.readouterr().err
+    assert "'': must be the name of a file or a folder" in told
+    assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("device", ["/dev/null", "/dev/zero", "pipe"])
+def test_a_study_that_is_no_file_is_told_in_one_line(
+    device: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (Path(device), tmp_path / device):
+        assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
+        told = capsys.readouterr().err
+        assert told.startswith("residua: file = ") and told.count("\n") == 1
+    assert "must be a file" in told
 
 
 @pytest.mark.parametrize("inside", ["", "deeper"])

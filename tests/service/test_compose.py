@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -18,6 +19,7 @@ import yaml
 
 from service.settings import Settings
 from studies import open_netcdf
+from studies.execution.certificates import OWNERS
 from tests.architecture.sources import ROOT
 from tests.service.servers import end, environment, fake_study, free_port, wait_until
 
@@ -40,7 +42,7 @@ PROGRAMS = {
 KEYS = {
     "image", "build", "restart", "init", "command", "healthcheck", "volumes", "depends_on",
     "ports", "stop_grace_period", "environment", "read_only", "tmpfs", "security_opt", "cap_drop",
-    "pids_limit", "mem_limit", "cpus", "logging", "entrypoint",
+    "pids_limit", "mem_limit", "cpus", "logging", "entrypoint", "networks",
 }  # fmt: skip
 DURATION = re.compile(r"\d+s")
 SIZE = re.compile(r"\d+[mg]")
@@ -53,7 +55,9 @@ def interpolated(text: str) -> str:
 
 
 def test_the_file_keeps_to_the_compose_specification() -> None:
-    assert set(COMPOSE) == {"name", "x-residua", "x-check", "services", "volumes"}
+    assert set(COMPOSE) == {
+        "name", "x-residua", "x-check", "services", "networks", "volumes",
+    }  # fmt: skip
     assert set(SERVICES) == {"certificates", *LASTING}
     for name, service in SERVICES.items():
         assert set(service) <= KEYS
@@ -101,7 +105,7 @@ def test_every_service_restarts_and_is_watched(name: str) -> None:
     assert service["restart"] == "always"
     assert service["healthcheck"]["test"][0] == "CMD"
     assert {"interval", "timeout", "retries", "start_period"} <= set(service["healthcheck"])
-    assert service["image"] == "residua" and service["build"] == "."
+    assert service["image"] == "residua" and service["build"]["context"] == "."
 
 
 def test_only_the_service_is_reachable_from_outside() -> None:
@@ -109,21 +113,28 @@ def test_only_the_service_is_reachable_from_outside() -> None:
     (port,) = SERVICES["service"]["ports"]
     assert interpolated(port) == "127.0.0.1:8000:8000"
     assert not [name for name, service in SERVICES.items() if "network_mode" in service]
+    networks = {name: service["networks"] for name, service in SERVICES.items()}
+    assert networks.pop("service") == ["inside", "outside"]
+    assert set(map(tuple, networks.values())) == {("inside",)}
+    assert COMPOSE["networks"]["inside"] == {"internal": True}, "without a way out"
 
 
-def test_the_service_is_opened_to_others_only_with_keys(tmp_path: Path) -> None:
-    """One variable says where the port is published and, by that, whether keys are asked."""
-    service = SERVICES["service"]
-    given = service["environment"]["RESIDUA_PUBLISHED"]
-    assert service["ports"] == [f"{given}:8000:8000"]
-    host = service["command"][service["command"].index("--host") + 1]
-    for published, asked in ((interpolated(given), False), ("0.0.0.0", True), ("10.1.2.3", True)):
-        assert Settings(data=tmp_path, host=host, published=published).keys_required is asked
+def test_callers_need_keys_wherever_the_port_is_published(tmp_path: Path) -> None:
+    """Also where somebody writes ``ports: 8000:8000``; no variable of the file turns it off."""
+    command = SERVICES["service"]["command"]
+    host = command[command.index("--host") + 1]
+    for given in ({}, {"require_keys": False}):
+        assert Settings(data=tmp_path, host=host, **given).keys_required
 
 
-def test_only_who_has_the_certificate_reaches_the_scheduler() -> None:
+def test_only_who_has_a_certificate_reaches_the_scheduler_and_sees_no_other_key() -> None:
     command = SERVICES["certificates"]["command"]
     folder = command[command.index("--out") + 1]
+    assert folder == "/certificates"
+    assert set(SERVICES["certificates"]["volumes"]) == {
+        f"{name}-certificate:{folder}/{name}" for name in LASTING
+    }
+    assert set(LASTING) == set(OWNERS)
     files = [f"{folder}/{name}.pem" for name in ("ca", "cert", "key")]
     for name in ("scheduler", "worker"):
         words = SERVICES[name]["command"]
@@ -132,9 +143,9 @@ def test_only_who_has_the_certificate_reaches_the_scheduler() -> None:
     assert "--protocol tls" in " ".join(SERVICES["scheduler"]["command"])
     settings = SERVICES["service"]["environment"]
     assert [settings[f"RESIDUA_SCHEDULER_{each}"] for each in ("CA", "CERT", "KEY")] == files
-    mounted = {name: service["volumes"][-1] for name, service in SERVICES.items()}
-    assert mounted.pop("certificates") == f"certificates:{folder}"
-    assert set(mounted.values()) == {f"certificates:{folder}:ro"}
+    for name in LASTING:
+        mounted = [each for each in SERVICES[name]["volumes"] if folder in each]
+        assert mounted == [f"{name}-certificate:{folder}:ro"]
 
 
 def test_no_page_of_dask_is_reachable_from_other_containers() -> None:
@@ -144,9 +155,9 @@ def test_no_page_of_dask_is_reachable_from_other_containers() -> None:
 
 
 def test_workers_and_service_see_the_data_under_the_same_path() -> None:
-    mounted = {name: service["volumes"] for name, service in SERVICES.items()}
-    assert mounted["worker"] == mounted["service"] and mounted["service"][0] == "data:/data"
-    assert set(COMPOSE["volumes"]) == {"data", "certificates"}
+    for name in ("worker", "service"):
+        assert SERVICES[name]["volumes"][0] == "data:/data"
+    assert set(COMPOSE["volumes"]) == {"data", *(f"{name}-certificate" for name in LASTING)}
     command = SERVICES["service"]["command"]
     assert command[command.index("--data") + 1] == "/data"
 
@@ -197,10 +208,16 @@ def test_the_image_runs_as_an_ordinary_user_with_pinned_packages() -> None:
     assert re.fullmatch(r"python:3\.11-slim@sha256:[0-9a-f]{64}", steps[0][1])
     users = [argument for step, argument in steps if step == "USER"]
     assert users == ["residua"]
-    assert "--constraint constraints.txt" in DOCKERFILE
+    assert "--require-hashes --requirement requirements.lock" in DOCKERFILE
+    assert "--no-deps --no-build-isolation" in DOCKERFILE
     assert "HEALTHCHECK" in DOCKERFILE
-    for folder in ("/data", "/certificates"):  # a new volume takes its owner from the image
-        assert re.search(f"install --directory --owner residua .*{folder}\\b", DOCKERFILE)
+    made = re.findall(r"install --directory --owner residua ((?:.*\\\n)*.*)", DOCKERFILE)
+    folders = {"/data", *(f"/certificates/{name}" for name in LASTING)}
+    assert folders <= set(" ".join(made).split()), "a new volume takes its owner from the image"
+
+
+def test_python_runs_no_file_of_the_folder_where_a_container_works() -> None:
+    assert re.search(r"^ +PYTHONSAFEPATH=1\b", DOCKERFILE, re.MULTILINE)
 
 
 class Stage:
@@ -211,19 +228,23 @@ class Stage:
         self.stack = stack
         self.ports = {port: str(free_port()) for port in ("8786", "8787", "8790", "8000")}
         self.folders = {"/data": "data", "/tmp": "scratch", "/certificates": "certificates"}
-        self.environment = environment(home / "computed.log")
+        # Here the service listens on 127.0.0.1, in a container on 0.0.0.0, which asks for keys.
+        self.environment = environment(home / "computed.log") | {"RESIDUA_REQUIRE_KEYS": "true"}
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
 
-    def translated(self, words: list[str]) -> list[str]:
+    def translated(self, name: str, words: list[str]) -> list[str]:
         """Return a command of a container as a command of this machine."""
 
-        return PROGRAMS[words[0]] + [self.word(text) for text in words[1:]]
+        return PROGRAMS[words[0]] + [self.word(name, text) for text in words[1:]]
 
-    def word(self, text: str) -> str:
+    def word(self, name: str, text: str) -> str:
         """Return a word of the file with the ports and folders of this machine."""
         top, _, rest = text[1:].partition("/")
         if text.startswith("/") and f"/{top}" in self.folders:
-            return str(self.home / self.folders[f"/{top}"] / rest)
+            folder = self.home / self.folders[f"/{top}"]
+            if rest and top == "certificates":  # each has its own volume there
+                folder /= name
+            return str(folder / rest)
         text = interpolated(text)
         text = text.replace("scheduler:", "127.0.0.1:").replace("0.0.0.0", "127.0.0.1")
         return re.sub(r"\b\d{4}\b", lambda port: self.ports.get(port[0], port[0]), text)
@@ -233,10 +254,10 @@ class Stage:
         log = self.stack.enter_context((self.home / f"{name}.log").open("ab"))
         given = SERVICES[name].get("environment", {})
         process = subprocess.Popen(
-            self.translated(SERVICES[name]["command"]),
+            self.translated(name, SERVICES[name]["command"]),
             cwd=self.home,
             env=self.environment
-            | {key: self.word(value) for key, value in given.items() if value is not None},
+            | {key: self.word(name, value) for key, value in given.items() if value is not None},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -246,9 +267,23 @@ class Stage:
 
     def healthy(self, name: str) -> bool:
         """Return what the health check of a service says."""
-        check = self.translated(SERVICES[name]["healthcheck"]["test"][1:])
+        check = self.translated(name, SERVICES[name]["healthcheck"]["test"][1:])
         done = subprocess.run(check, env=self.environment, capture_output=True, check=False)
         return done.returncode == 0
+
+    def client(self) -> httpx.Client:
+        """Return a client with a key, made by the first line of the file."""
+        words = (ROOT / "docker-compose.yml").read_text().splitlines()[0].split(" service ")[1]
+        command = self.translated("service", words.replace("NAME", "anna").split())
+        with contextlib.suppress(subprocess.CalledProcessError):  # known from the last time
+            made = subprocess.run(
+                command, env=self.environment, capture_output=True, check=True, text=True
+            )
+            self.key = made.stdout.strip()
+        return httpx.Client(
+            base_url=f"http://127.0.0.1:{self.ports['8000']}",
+            headers={"authorization": f"Bearer {self.key}"},
+        )
 
 
 @pytest.fixture(scope="module")
@@ -258,6 +293,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
         stage = Stage(tmp_path_factory.mktemp("stage"), stack)
         stage.start("certificates")
         assert stage.processes["certificates"].wait(timeout=60.0) == 0
+        stage.client().close()
         for name in LASTING:
             stage.start(name)
         for name in LASTING:
@@ -266,7 +302,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 
 
 def test_the_three_processes_compute_a_posted_study(stage: Stage) -> None:
-    with httpx.Client(base_url=f"http://127.0.0.1:{stage.ports['8000']}") as client:
+    with stage.client() as client:
         url = client.post("/studies", json=fake_study("composed")).headers["location"]
         wait_until(lambda: client.get(url).json()["status"] == "successful", 60.0)
         fetched = stage.home / "fetched.nc"
@@ -278,7 +314,7 @@ def test_the_three_processes_compute_a_posted_study(stage: Stage) -> None:
 def test_a_scheduler_that_restarts_costs_no_study(stage: Stage) -> None:
     study = fake_study("interrupted", seconds=0.3)
     study["sweep"]["friction"] = [0.0, 0.1, 0.2]
-    with httpx.Client(base_url=f"http://127.0.0.1:{stage.ports['8000']}") as client:
+    with stage.client() as client:
         url = client.post("/studies", json=study).headers["location"]
         wait_until(lambda: client.get(url).json()["counts"].get("ok", 0) >= 2, 60.0)
         stage.processes["scheduler"].kill()

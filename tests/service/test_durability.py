@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -149,6 +150,57 @@ def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(lively: Se
     assert (study["status"], study["counts"]) == ("failed", {"error": 1})
     assert "worker" in study["runs"][0]["message"]
     assert lively.finished(next_id)["status"] == "successful"
+
+
+def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
+    mortal: Server, tmp_path: Path
+) -> None:
+    (temporary := tmp_path / "temporary").mkdir()
+    mortal.settings["TMPDIR"] = str(temporary)
+    study = mortal.start().post(fake_study("left", seconds=0.5))
+    wait_until(mortal.computed)
+    assert mortal.process is not None
+    (left,) = temporary.glob("residua-*")
+    family = psutil.Process(mortal.process.pid).children(recursive=True)
+    for each in (mortal.process, *family):
+        each.kill()
+    mortal.process.wait()
+    psutil.wait_procs(family, timeout=10)
+    assert left.exists()
+    mortal.start()
+    assert not left.exists()
+    assert mortal.finished(study)["status"] == "successful"
+
+
+def test_a_copy_of_the_directory_is_restored_with_studies_that_ran_and_waited(
+    mortal: Server, tmp_path: Path
+) -> None:
+    """The copy is made file by file while the service works, and the queue may be damaged in it."""
+    mortal.settings["RESIDUA_STUDIES_AT_ONCE"] = "1"
+    mortal.start()
+    ended = mortal.post(fake_study("ended"))
+    assert mortal.finished(ended)["status"] == "successful"
+    ran = mortal.post(fake_study("ran", seconds=1.0))
+    waited = mortal.post(fake_study("waited", seconds=0.01))
+    wait_until(lambda: mortal.study(ran)["counts"].get("ok"))
+    assert mortal.study(waited)["status"] == "accepted"
+    elsewhere = Server(tmp_path / "elsewhere", settings=mortal.settings)
+    shutil.copytree(mortal.data, elsewhere.data)
+    mortal.kill()
+    kept = len(list((elsewhere.data / "runs").glob("*.nc")))
+    assert 4 < kept < 8
+    try:
+        elsewhere.start()
+        for study in (ended, ran, waited):
+            assert elsewhere.finished(study)["status"] == "successful"
+            answer = elsewhere.client.get(f"/studies/{study}/dataset.nc")
+            (fetched := tmp_path / "fetched.nc").write_bytes(answer.content)
+            with open_netcdf(fetched) as dataset:
+                plastic = dataset["max_plastic_strain"].sel(load_ratio=0.5)
+                assert plastic.values.ravel().tolist() == [0.5, 0.5]
+        assert len(elsewhere.computed()) == 12 - kept, "what the copy has is not computed again"
+    finally:
+        elsewhere.close()
 
 
 def test_a_study_that_hangs_keeps_neither_a_stopped_nor_a_killed_service(mortal: Server) -> None:

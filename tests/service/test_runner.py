@@ -201,3 +201,18 @@ def test_a_process_is_ready_before_it_is_needed() -> None:
         assert waiting is not None and waiting.returncode is not None
 
     asyncio.run(work())
+
+
+@pytest.mark.parametrize(
+    ("reason", "plain"),
+    [
+        ("{} is not there; mount it", "the data directory is not there; mount it"),
+        ("cannot read {}/runs/ab.nc", "cannot read ab.nc"),
+        ("cannot read {}-old/ab.nc", "cannot read ab.nc"),
+    ],
+)
+def test_a_message_of_a_study_shows_no_half_of_a_path(
+    reason: str, plain: str, tmp_path: Path
+) -> None:
+    runner = Runner(Settings(data=tmp_path), *[None] * 4)  # type: ignore[arg-type]
+    assert runner._plain(reason.format(tmp_path.resolve())) == plain

@@ -49,6 +49,46 @@ def test_a_scene_has_the_id_of_its_content(service: Server, pin: str) -> None:
     assert again.json()["name"] == "pin"
 
 
+def test_the_first_words_of_a_scene_stay_and_the_answer_says_so(service: Server, pin: str) -> None:
+    first = post(service, PIN, pin_msh=MESH).json()
+    assert first["note"] == ""
+    other = PIN.replace(first["summary"].encode(), b"other words")
+    assert other != PIN
+    again = post(service, other, pin_msh=MESH)
+    assert (again.status_code, again.json()["id"]) == (200, pin)
+    assert again.json()["summary"] == first["summary"]
+    assert "stay as they were first posted" in again.json()["note"]
+    assert service.client.get(f"/scenes/{pin}").json()["summary"] == first["summary"]
+
+
+def test_a_form_with_two_scenes_is_refused(service: Server) -> None:
+    files = [("scene", ("a.toml", PIN)), ("scene", ("b.toml", PIN)), ("meshes", ("pin.msh", MESH))]
+    answer = service.client.post("/scenes", files=files)
+    assert answer.status_code == 422
+    assert answer.json()["detail"] == "scene: must be one file: post each by itself"
+
+
+def test_a_study_names_a_posted_scene_by_its_name_if_no_other_has_it(service: Server) -> None:
+    first = BLOCKS.replace('name = "blocks"', 'name = "dovetail"').encode()
+    assert b"dovetail" in first
+    study = {"name": "by-name", "scene": "dovetail", "sweep": {"mu": [0.1]}}
+    unknown = service.client.post("/estimate", json=study)
+    assert unknown.status_code == 422 and "must be one of punch" in unknown.text
+    one = post(service, first).json()["id"]
+    named = service.client.post("/studies", json=study)
+    assert named.status_code == 201, named.text
+    same = service.client.post("/studies", json=study | {"scene": one})
+    assert (same.status_code, same.json()["id"]) == (200, named.json()["id"])
+    assert service.study(same.json()["id"])["scene"] == one
+    other = post(service, first.replace(b"value = 150.0", b"value = 151.0")).json()["id"]
+    refused = service.client.post("/estimate", json=study)
+    assert refused.status_code == 422
+    (mistake,) = refused.json()["errors"]
+    assert (mistake["field"], mistake["value"]) == ("scene", "dovetail")
+    assert "is the name of 2 posted scenes" in mistake["allowed"]
+    assert one in mistake["allowed"] and other in mistake["allowed"]
+
+
 def test_a_posted_scene_is_listed_and_described(service: Server, pin: str) -> None:
     listed = {each["id"]: each for each in service.client.get("/scenes").json()}
     assert listed[pin]["name"] == "pin"

@@ -7,6 +7,7 @@ import ssl
 from pathlib import Path
 
 import pytest
+from cryptography import x509
 
 from residua.cli import main
 
@@ -45,18 +46,36 @@ def test_who_holds_the_certificate_gets_in_and_nobody_else(
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     for home in (ours, theirs):
         assert main(["certificates", "--out", str(home)]) == 0
-    assert capsys.readouterr().out.count("wrote ") == 6
-    shake_hands(ours, ours)
-    with pytest.raises(ssl.SSLError):
-        shake_hands(ours, theirs)
-    assert (ours / "key.pem").stat().st_mode & 0o777 == 0o600
+    assert capsys.readouterr().out.count("wrote ") == 18
+    for client in ("worker", "service"):
+        shake_hands(ours / "scheduler", ours / client)
+        with pytest.raises(ssl.SSLError):
+            shake_hands(ours / "scheduler", theirs / client)
+    for key in ours.glob("*/key.pem"):
+        assert key.stat().st_mode & 0o777 == 0o600
+
+
+def test_each_has_a_certificate_of_its_own_and_none_may_make_another(tmp_path: Path) -> None:
+    assert main(["certificates", "--out", str(tmp_path)]) == 0
+    found = {
+        path.parent.name: x509.load_pem_x509_certificate(path.read_bytes())
+        for path in tmp_path.glob("*/cert.pem")
+    }
+    assert set(found) == {"scheduler", "worker", "service"}
+    assert len({path.read_bytes() for path in tmp_path.glob("*/key.pem")}) == 3
+    (authority,) = {path.read_bytes() for path in tmp_path.glob("*/ca.pem")}
+    signer = x509.load_pem_x509_certificate(authority)
+    for each in found.values():
+        each.verify_directly_issued_by(signer)
+        assert not each.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+        assert each.public_key() != signer.public_key(), "the key of the authority is not stored"
 
 
 def test_certificates_that_are_in_use_stay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["certificates", "--out", str(tmp_path)]) == 0
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert set(before) == {"ca.pem", "cert.pem", "key.pem"}
+    before = {path: path.read_bytes() for path in tmp_path.glob("*/*")}
+    assert len(before) == 9
     assert main(["certificates", "--out", str(tmp_path)]) == 0
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert {path: path.read_bytes() for path in tmp_path.glob("*/*")} == before

@@ -85,6 +85,28 @@ def test_a_killed_parent_leaves_only_whole_runs_and_its_workers_die(
     assert store.catalogue.runs()[1] == RUNS
 
 
+def test_an_interrupt_while_workers_start_ends_the_command_without_a_traceback(
+    slow: tuple[Study, Store, Path], tmp_path: Path
+) -> None:
+    """Ctrl-C in a terminal reaches every process of the group, the newest too."""
+    study, store, _ = slow
+    with start(study, store.directory, tmp_path) as parent:
+        known: set[int] = set()
+        while parent.poll() is None and not store.directory.joinpath("runs").exists():
+            time.sleep(0.01)
+        while parent.poll() is None and len(known) < 3:  # two workers, and Python's tracker
+            family = {child.pid for child in psutil.Process(parent.pid).children(recursive=True)}
+            if family - known:
+                known |= family
+                for each in family:
+                    os.kill(each, signal.SIGINT)
+        parent.send_signal(signal.SIGINT)
+        printed, told = parent.communicate(timeout=60)
+    assert parent.returncode == 130, told
+    assert "Traceback" not in told + printed
+    assert "stopping; finished runs are kept" in told
+
+
 def test_a_killed_worker_costs_only_the_path_it_was_on(
     slow: tuple[Study, Store, Path],
 ) -> None:

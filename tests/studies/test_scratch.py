@@ -1,0 +1,60 @@
+"""Temporary folders: removed at the end, and after a kill by the next process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from studies.scratch import remove_left, scratch
+from tests.architecture.sources import ROOT
+
+HOLDER = """
+import time
+from studies.scratch import scratch
+with scratch() as folder:
+    (folder / "file").touch()
+    print(folder, flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture(autouse=True)
+def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The directory of temporary files."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    return tmp_path
+
+
+def test_a_folder_ends_with_its_context(folders: Path) -> None:
+    with scratch() as one, scratch() as other:
+        assert one != other and one.parent == other.parent == folders
+        (one / "file").touch()
+        remove_left()
+        assert (one / "file").exists() and other.exists(), "in use"
+    assert list(folders.iterdir()) == []
+
+
+@pytest.mark.processes
+def test_a_folder_of_a_killed_process_is_removed_by_the_next(folders: Path) -> None:
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDER], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    with holder:
+        assert holder.stdout is not None
+        left = Path(holder.stdout.readline().strip())
+        remove_left()
+        assert (left / "file").exists(), "in use"
+        holder.kill()
+        holder.wait()
+    assert left.exists()
+    (folders / "residua-file").touch()
+    (folders / "residua-link").symlink_to(ROOT)
+    with scratch():
+        assert not left.exists()
+    assert {each.name for each in folders.iterdir()} == {"residua-file", "residua-link"}
+    assert (ROOT / "pyproject.toml").exists()
