@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_PREFIX = "residua-"
+_PREFIX = "residua-scratch-"
+"""Of folders made here alone: another name could be that of somebody's results."""
 
 
 @contextmanager

@@ -52,9 +52,14 @@ def test_a_folder_of_a_killed_process_is_removed_by_the_next(folders: Path) -> N
         holder.kill()
         holder.wait()
     assert left.exists()
-    (folders / "residua-file").touch()
-    (folders / "residua-link").symlink_to(ROOT)
+    (folders / "residua-scratch-file").touch()
+    (folders / "residua-results").mkdir()
+    (folders / "residua-scratch-link").symlink_to(ROOT)
     with scratch():
         assert not left.exists()
-    assert {each.name for each in folders.iterdir()} == {"residua-file", "residua-link"}
+    assert {each.name for each in folders.iterdir()} == {
+        "residua-scratch-file",
+        "residua-scratch-link",
+        "residua-results",
+    }
     assert (ROOT / "pyproject.toml").exists()
