@@ -56,7 +56,7 @@ class Inspector:
                     (Path(folder) / name).write_bytes(data)
                 found = json.loads(await self.process.call(inspected, folder, name=_FILE))
         if mistakes := found.get("mistakes"):
-            raise SceneError(_FILE, [StudyError(*each) for each in mistakes])
+            raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}
         description = Description(_FILE, found["content"], given)
         return await asyncio.to_thread(file_scene, description)
@@ -67,9 +67,10 @@ def inspected(folder: str) -> str:
     try:
         answer = {"content": _read(Path(folder))}
     except SceneError as error:
-        answer = {"mistakes": [_fields_of(each) for each in error.mistakes]}
+        listed = [_fields_of(each) for each in error.mistakes]
+        answer = {"mistakes": listed, "count": error.count}
     except StudyError as error:
-        answer = {"mistakes": [_fields_of(error)]}
+        answer = {"mistakes": [_fields_of(error)], "count": 1}
     return json.dumps(answer).replace(f"{folder}/", "")
 
 

@@ -9,7 +9,6 @@ Deleting it again, or a retry, completes the work.
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import shutil
 import sqlite3
@@ -21,7 +20,7 @@ from pathlib import Path
 
 from service.errors import Conflict, NotFound
 from service.jobs import Jobs
-from studies import Store, Study
+from studies import FileDamaged, Store
 
 log = logging.getLogger(__name__)
 
@@ -167,12 +166,9 @@ class Keeper:
             known = {row["id"] for row in queue.execute("SELECT id FROM job")}
         needed: set[str] = set()
         for path in (self.store.directory / "studies").glob("*/study.json"):
-            with suppress(ValueError, OSError):
+            with suppress(FileDamaged, ValueError):
                 if path.parent.name not in known:
-                    content = json.loads(path.read_text(encoding="utf-8"))
-                    study = Study.known(content, self.store.scene)
-                    if study.id == path.parent.name:
-                        needed.update(study.run_ids())
+                    needed.update(self.store.study(path.parent.name).run_ids())
         return needed
 
 

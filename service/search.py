@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from service.schemas import RunFilter, Window
 from solver.scenes import Scene
-from studies import StudyError
+from studies import Store, StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
 from studies.errors import one_of
 from studies.scenes.registry import built_in, known_names, scene_named
-from studies.storage.shelf import newest
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""
@@ -25,13 +23,13 @@ PLAIN = ("scene", "status", *Window.model_fields)
 """Names in a query that are not parameters of scenes."""
 
 
-def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
+def conditions(which: RunFilter, store: Store) -> dict[str, Any]:
     """Return the arguments of `Catalogue.runs` for a query.
 
     Parameters
     ----------
     which : the query
-    directory : directory of the store, which may have posted scenes
+    store : the store, which may have posted scenes
 
     Raises
     ------
@@ -40,7 +38,7 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     """
     if which.status not in (None, *OUTCOMES):
         raise StudyError("status", which.status, one_of(which.status, OUTCOMES))
-    posted = newest(directory, KEPT)
+    posted = store.newest_scenes(KEPT)
     scenes: list[Scene] = [*built_in(), *posted]
     if which.scene is not None:
         own = [scene for scene in posted if scene.name == which.scene]

@@ -4,11 +4,25 @@ from __future__ import annotations
 
 import json
 import tomllib
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from solver.errors import ModelError
 from studies.errors import StudyError
+
+DEEPEST = 50
+"""Largest number of tables and lists inside one another."""
+
+
+def too_deep(content: Any) -> bool:
+    """Whether lists and tables are more than `DEEPEST` inside one another."""
+    level = [content]
+    for _ in range(DEEPEST + 1):
+        level = [each for each in level if isinstance(each, dict | list)]
+        inside = (each.values() if isinstance(each, dict) else each for each in level)
+        level = list(chain.from_iterable(inside))
+    return bool(level)
 
 
 def read_toml(path: Path | str, field: str) -> dict[str, Any]:
@@ -74,6 +88,8 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
     """
     try:
         tables = tomllib.loads(data.decode("utf-8-sig"))
+        if too_deep(tables):
+            raise ValueError(f"it has tables or lists more than {DEEPEST} deep")
         plain: dict[str, Any] = json.loads(json.dumps(tables, default=str))
     except (ValueError, RecursionError) as error:
         raise StudyError(field, name, f"must be valid TOML: {error}") from None

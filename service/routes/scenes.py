@@ -13,9 +13,7 @@ from service.errors import REFUSED, NotFound
 from service.schemas import KeptScene, SceneSummary
 from solver.scenes import Scene
 from studies import StudyError, scene_schema
-from studies.definition.identity import is_id
-from studies.scenes.registry import known_names, known_scenes, scene_named
-from studies.storage.shelf import newest
+from studies.scenes.registry import known_names, known_scenes, name_of, scene_named
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
@@ -27,7 +25,7 @@ LISTED = 100
 def list_scenes(store: TheStore) -> list[SceneSummary]:
     """List the scenes: those of the product, of installed packages, then the latest posted ones."""
     listed: list[tuple[str | None, Scene]] = [(None, scene) for scene in known_scenes()]
-    listed += [(scene.id, scene) for scene in newest(store.directory, LISTED)]
+    listed += [(name_of(scene), scene) for scene in store.newest_scenes(LISTED)]
     return [
         SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch, id=scene_id)
         for scene_id, scene in listed
@@ -55,7 +53,7 @@ async def post_scene(
             raise StudyError("meshes", each.filename, "must have file names of their own")
         files[each.filename] = await each.read()
     found = await inspector.inspect(await scene.read(), files)
-    known = await asyncio.to_thread(_kept, store, found.id)
+    known = await asyncio.to_thread(store.scene, found.id)
     await asyncio.to_thread(store.save_scene, found)
     if known:
         response.status_code = HTTPStatus.OK
@@ -69,18 +67,9 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
     `name` is that of a scene, or the id of a posted one.
     """
-    kept = _kept(store, name) if is_id(name) else None
-    if kept:
-        entry = {"id": kept.id, "name": kept.name, "summary": kept.summary}
+    if kept := store.scene(name):
+        entry = {"id": name, "name": kept.name, "summary": kept.summary}
         return scene_schema(kept) | entry
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
     return scene_schema(scene_named(name))
-
-
-def _kept(store: TheStore, scene_id: str) -> Any:
-    """Return a posted scene; None where it is not kept, or cannot be read any more."""
-    try:
-        return store.scene(scene_id)
-    except StudyError:
-        return None

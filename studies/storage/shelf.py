@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from contextlib import suppress
 from pathlib import Path
 
 from solver.scenes import Scene
-from studies.errors import StudyError
+from studies.errors import FileDamaged, StudyError
 from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.appearing import appearing
+from studies.storage.seal import content_of, sealed_json, state_of
 
 _FILE = "scene.json"
 
@@ -21,14 +20,11 @@ def keep(directory: Path, scene: Scene) -> None:
     if not (isinstance(scene, FileScene) and scene.posted):
         return
     folder = directory / "scenes" / scene.id
-    with suppress(StudyError):  # a damaged one is written again
-        if kept(directory, scene.id):
-            return
     folder.mkdir(parents=True, exist_ok=True)
     meshes = scene.description.meshes or {}
     written = {name: mesh.data for name, mesh in meshes.items()}
     content = {"file": scene.description.file, "content": scene.description.content}
-    written |= {_FILE: (json.dumps(content, indent=2) + "\n").encode()}  # last: then all is there
+    written |= {_FILE: sealed_json(f"scene {scene.id}", content)}  # last: then all is there
     for name, data in written.items():
         with appearing(folder / name) as part:
             part.write_bytes(data)
@@ -39,32 +35,29 @@ def kept(directory: Path, scene_id: str) -> FileScene | None:
 
     Raises
     ------
-    StudyError
+    FileDamaged
         if the stored content does not have this id
     """
     folder = directory / "scenes" / scene_id
-    path = folder / _FILE
-    if len(Path(scene_id).parts) != 1 or not path.is_file():
+    state = state_of(folder / _FILE) and state_of(folder)
+    if state is None:
         return None
     try:
-        saved = json.loads(path.read_bytes())
+        saved = content_of(folder / _FILE, f"scene {scene_id}")
         names = mesh_names(saved["content"])
         meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
         scene = file_scene(Description(saved["file"], saved["content"], meshes))
-    except (OSError, ValueError, KeyError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise StudyError("scene", scene_id, f"is stored damaged, post it again: {reason}") from None
-    if scene.id != scene_id:
-        allowed = "is stored damaged, post it again: its content has changed"
-        raise StudyError("scene", scene_id, allowed)
-    return scene
+    except (FileDamaged, OSError, StudyError, AttributeError, LookupError, TypeError) as error:
+        reason = error.reason if isinstance(error, FileDamaged) else f"{error}".partition("\n")[0]
+    else:
+        if scene.id == scene_id:
+            return scene
+        reason = "its content has changed"
+    raise FileDamaged(folder, f"scene {scene_id}", reason, state)
 
 
-def newest(directory: Path, count: int) -> list[FileScene]:
-    """Return the latest stored scenes, newest first, without those that cannot be read."""
-    files = sorted((directory / "scenes").glob(f"*/{_FILE}"), key=lambda f: -f.stat().st_mtime_ns)
-    found = []
-    for each in files[:count]:
-        with suppress(StudyError):
-            found.append(kept(directory, each.parent.name))
-    return [scene for scene in found if scene]
+def newest(directory: Path, count: int) -> list[str]:
+    """Return the ids of the latest stored scenes, newest first."""
+    files = {path: state_of(path) for path in (directory / "scenes").glob(f"*/{_FILE}")}
+    there = {path: state[2] for path, state in files.items() if state}
+    return [path.parent.name for path in sorted(there, key=lambda path: -there[path])[:count]]
