@@ -62,6 +62,14 @@ class Keeper:
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
 
+    def delete_scene(self, scene_id: str) -> None:
+        """Delete a posted scene; raise `Conflict` if a study in the queue names it."""
+        with self.jobs.transaction() as queue:
+            user = queue.execute("SELECT id FROM job WHERE scene = ?", (scene_id,)).fetchone()
+            if user:
+                raise Conflict(f"the study {user['id']} needs this scene: delete it first")
+            self.store.discard_scene(scene_id)
+
     def purge(self, study_id: str) -> int:
         """Delete a study, its data set, and those of its runs that no other study needs.
 

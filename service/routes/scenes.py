@@ -6,29 +6,29 @@ import asyncio
 from http import HTTPStatus
 from typing import Annotated, Any
 
-from fastapi import APIRouter, File, Request, Response, UploadFile
+from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
-from service.dependencies import TheInspector, TheStore
+from service.dependencies import TheInspector, TheKeeper, TheStore
 from service.errors import REFUSED, NotFound
-from service.schemas import KeptScene, SceneSummary
-from solver.scenes import Scene
+from service.schemas import ContentId, KeptScene, SceneSummary, Window
 from studies import StudyError, scene_schema
-from studies.scenes.registry import known_names, known_scenes, name_of, scene_named
+from studies.scenes.registry import known_names, known_scenes, scene_named
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
-LISTED = 100
-"""Number of posted scenes that are listed, the newest first."""
 
-
-@router.get("")
-def list_scenes(store: TheStore) -> list[SceneSummary]:
+@router.get("", responses=REFUSED)
+def list_scenes(which: Annotated[Window, Query()], store: TheStore) -> list[SceneSummary]:
     """List the scenes: those of the product, of installed packages, then the latest posted ones."""
-    listed: list[tuple[str | None, Scene]] = [(None, scene) for scene in known_scenes()]
-    listed += [(name_of(scene), scene) for scene in store.newest_scenes(LISTED)]
-    return [
-        SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch, id=scene_id)
-        for scene_id, scene in listed
+    known = [*known_scenes()]
+    shown = [
+        SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch)
+        for scene in known[which.offset : which.offset + which.limit]
+    ]
+    posted = store.scenes(which.limit - len(shown), max(which.offset - len(known), 0))
+    return shown + [
+        SceneSummary(name=each.name, summary=each.summary, branch=each.branch, id=each.id)
+        for each in posted
     ]
 
 
@@ -52,13 +52,11 @@ async def post_scene(
         if not each.filename or each.filename in files:
             raise StudyError("meshes", each.filename, "must have file names of their own")
         files[each.filename] = await each.read()
-    found = await inspector.inspect(await scene.read(), files)
-    known = await asyncio.to_thread(store.scene, found.id)
-    await asyncio.to_thread(store.save_scene, found)
-    if known:
+    found, content = await inspector.inspect(await scene.read(), files)
+    if not await asyncio.to_thread(store.keep_scene, found.id, content):
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
-    return KeptScene(id=found.id, name=found.name, summary=found.summary)
+    return found
 
 
 @router.get("/{name}")
@@ -67,9 +65,17 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
     `name` is that of a scene, or the id of a posted one.
     """
-    if kept := store.scene(name):
+    if kept := store.scene(name, whole=False):
         entry = {"id": name, "name": kept.name, "summary": kept.summary}
         return scene_schema(kept) | entry
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
     return scene_schema(scene_named(name))
+
+
+@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)
+def delete_scene(name: ContentId, keeper: TheKeeper, store: TheStore) -> None:
+    """Delete a posted scene that no study names; `name` is its id."""
+    if store.scene(name, whole=False) is None:
+        raise NotFound(f"no posted scene has the id {name}")
+    keeper.delete_scene(name)

@@ -7,7 +7,6 @@ after any change of this project's sources or of the libraries that write and dr
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -19,7 +18,7 @@ from studies.definition.study import Study
 from studies.errors import FileDamaged
 from studies.storage.appearing import appearing
 from studies.storage.room import needs_room
-from studies.storage.seal import content_of, digest, sealed_json
+from studies.storage.seal import content_of, digest, digest_of, sealed_json
 from studies.storage.store import Store
 
 _LIBRARIES = ("h5netcdf", "matplotlib", "xarray")
@@ -62,7 +61,7 @@ class Made:
         """Write files with these contents, record their inputs, and return their paths."""
         for name, content in contents.items():
             self._write(self._directory / name, content)
-        self._note(result, of, {name: _hex(content) for name, content in contents.items()})
+        self._note(result, of, {name: digest_of(content) for name, content in contents.items()})
         return [self._directory / name for name in contents]
 
     def _note(self, result: str, of: str, files: Mapping[str, str]) -> None:
@@ -82,14 +81,10 @@ class Made:
             part.write_bytes(content)
 
     def _made_of(self, of: str) -> str:
-        return _hex("\n".join([of, *self._makers]).encode())
+        return digest_of("\n".join([of, *self._makers]).encode())
 
     @cached_property
     def _makers(self) -> list[str]:
         """Digests of the sources, and versions of libraries."""
-        found = [_hex(path.read_bytes()) for path in sources(self._study.problem)]
+        found = [digest_of(path.read_bytes()) for path in sources(self._study.problem)]
         return found + [importlib.metadata.version(name) for name in _LIBRARIES]
-
-
-def _hex(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -43,14 +43,14 @@ State = tuple[int, int, int, int]
 def sealed(name: str, content: bytes) -> bytes:
     """Return the content of a file with its seal."""
     begun = content + f"\n{name} sha256 ".encode()
-    return begun + _hex(begun) + b"\n"
+    return begun + digest_of(begun).encode() + b"\n"
 
 
 def sealed_json(name: str, content: Mapping[str, Any]) -> bytes:
     """Return the text of a JSON object with its seal."""
     entries = {**content, "seal": f"{name} sha256 "}
     begun = json.dumps(entries, indent=2).removesuffix('"\n}').encode()
-    return begun + _hex(begun) + b'"\n}\n'
+    return begun + digest_of(begun).encode() + b'"\n}\n'
 
 
 def seal(path: Path, name: str) -> None:
@@ -158,5 +158,6 @@ def _fed(digest: Any, file: BinaryIO, up_to: int) -> Any:
     return digest
 
 
-def _hex(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode()
+def digest_of(content: bytes) -> str:
+    """Return the SHA-256 of the content of a file."""
+    return hashlib.sha256(content).hexdigest()

@@ -7,6 +7,7 @@ studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it
 catalogue.sqlite              made again from the files if it is missing or damaged
+scenes.sqlite                 index of the scenes, likewise
 unreadable/                   what was damaged or in a wrong place
 ```
 A file gets its name only when it is complete; that of a run, only after it has been read back and
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import tempfile
 import time
 import uuid
@@ -33,8 +35,9 @@ from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.errors import CatalogueDamaged, FileDamaged, StudyError, Unusable
-from studies.scenes.registry import name_of
+from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError, Unusable
+from studies.scenes.description import Description
+from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
 from studies.storage.appearing import appearing
@@ -85,23 +88,53 @@ class Store:
         """Return the path of the combined data set of a study."""
         return self.study_directory(study_id) / "dataset.nc"
 
-    def scene(self, scene_id: str) -> Scene | None:
-        """Return the scene from a file that is stored here under this id, or None."""
+    def scene(self, scene_id: str, whole: bool = True) -> Scene | None:
+        """Return the scene from a file that is stored here under this id, or None.
+
+        One that is not ``whole`` has no meshes, so that it takes little time and memory.
+        """
+        read = shelf.kept if whole else shelf.described
         try:
-            return shelf.kept(self.directory, scene_id) if is_id(scene_id) else None
+            return read(self.directory, scene_id) if is_id(scene_id) else None
         except FileDamaged as error:
             self.set_aside(error, "post the scene again")
             return None
 
-    def newest_scenes(self, count: int) -> list[Scene]:
-        """Return the latest stored scenes, newest first."""
-        return [s for each in shelf.newest(self.directory, count) if (s := self.scene(each))]
+    def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:
+        """Return a page of the scenes that are stored here, or of those of a name, newest first."""
+        index = shelf.Index(self.directory)
+        try:
+            with suppress(StoreFull):  # then the latest ones are missing
+                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+            return index.page(limit, offset, name)
+        except CatalogueDamaged as error:
+            found = FileDamaged(index.path, index.path.name, f"{error}", seal.state_of(index.path))
+            self.set_aside(found, "it is made again from the scenes")
+            return self.scenes(limit, offset, name) if not index.path.exists() else []
 
     def save_scene(self, scene: Scene) -> None:
         """Store a scene from a file, so that studies can name it by its id."""
-        if self.scene(name_of(scene)) is None:
+        if isinstance(scene, FileScene) and scene.posted:
+            self.keep_scene(scene.id, scene.description)
+
+    def keep_scene(self, scene_id: str, description: Description) -> bool:
+        """Store a scene of this content id; return whether it is new."""
+        folder, meshes = self.directory / "scenes" / scene_id, description.meshes or {}
+        wrong = [n for n, m in meshes.items() if seal.digest(folder / n) != seal.digest_of(m.data)]
+        if wrong:
+            name, reason = f"scene {scene_id}", f"{wrong[0]} is missing or has changed"
+            found = FileDamaged(folder, name, reason, seal.state_of(folder))
+            self.set_aside(found, "it is written again")
+        new = self.scene(scene_id, whole=False) is None
+        if new:
             with self._writable():
-                shelf.keep(self.directory, scene)
+                shelf.keep(self.directory, scene_id, description)
+        return new
+
+    def discard_scene(self, scene_id: str) -> None:
+        """Delete a scene."""
+        with suppress(FileNotFoundError):
+            shutil.rmtree(self.directory / "scenes" / _checked(scene_id))
 
     def dataset(self, study_id: str) -> Path:
         """Return the path of the data set of a study, checked.

@@ -29,7 +29,7 @@ from service.recovery import Mender, open_queue
 from service.settings import Settings
 from studies import FileDamaged, Store, Study, open_netcdf
 from studies.scenes.scene import read_scene
-from studies.storage import seal
+from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, fake_study, wait_until
 from tests.service.test_access import Ask, asking
@@ -452,3 +452,76 @@ def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
 
     assert asyncio.run(watched()) == [True, False]
     problem(mortal.client.get(f"/studies/{UNKNOWN}"), 401)
+
+
+# -- many scenes -------------------------------------------------------------------------------
+
+
+def test_scenes_are_read_once_for_lists_and_searches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path / "data")
+    text = (ROOT / "data/scenes/pin.toml").read_text()
+    shutil.copy(ROOT / "data/scenes/pin.msh", tmp_path)
+    ids = []
+    for number in range(5):
+        path = tmp_path / f"pin{number}.toml"
+        path.write_text(text.replace("clearance", f"play{number}"))
+        store.save_scene(read_scene(path))
+        ids.append(read_scene(path).id)
+    ask = asking(create_app(Settings(data=store.directory)))
+
+    def listed(query: str = "") -> list[str]:
+        return [each["id"] for each in ask("GET", f"/scenes{query}").json() if each["id"]]
+
+    assert set(listed("?limit=1000")) == set(ids)
+    read: list[str] = []
+    described = shelf.described
+    monkeypatch.setattr(shelf, "kept", None)  # the meshes are not needed
+    monkeypatch.setattr(shelf, "described", lambda d, i: read.append(i) or described(d, i))
+    every = ask("GET", "/scenes?limit=1000").json()
+    assert every == [each for k in range(len(every)) for each in page(ask, k)]
+    assert ask("GET", "/runs?status=ok").json()["total"] == 0
+    assert read == []
+    assert ask("GET", "/runs?play3=0.01").json()["total"] == 0
+    assert read == [ids[3]], "only the scene that has the parameter"
+    for wrong in ("play3=-1", "play9=1", "scene=pine", "scene=pin&load=1"):
+        problem(ask("GET", f"/runs?{wrong}"), 422)
+    (store.directory / "scenes.sqlite").write_text("no index" * 100)
+    assert set(listed("?limit=1000")) == set(ids)
+    assert (store.directory / "unreadable" / "scenes.sqlite").exists()
+
+
+def page(ask: Ask, offset: int) -> list[dict[str, Any]]:
+    """Return a page of one scene."""
+    found: list[dict[str, Any]] = ask("GET", f"/scenes?limit=1&offset={offset}").json()
+    return found
+
+
+def test_a_scene_is_deleted_unless_a_study_needs_it(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    pin = read_scene(ROOT / "data/scenes/pin.toml")
+    study = Study.from_dict({"name": "pins", "sweep": {"friction": [0.0]}}, scene=pin)
+    store.save_study(study)
+    app = create_app(Settings(data=tmp_path))
+    ask = asking(app)
+    assert "needs this scene" in problem(ask("DELETE", f"/scenes/{pin.id}"), 409)["detail"]
+    app.state.jobs.dismiss(study.id)
+    assert ask("DELETE", f"/studies/{study.id}?purge=true").status_code == 204
+    assert ask("DELETE", f"/scenes/{pin.id}").status_code == 204
+    problem(ask("DELETE", f"/scenes/{pin.id}"), 404)
+    assert pin.id not in {each["id"] for each in ask("GET", "/scenes").json()}
+
+
+def test_a_mesh_that_has_changed_spoils_its_scene_until_it_is_posted_again(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    pin = read_scene(ROOT / "data/scenes/pin.toml")
+    store.save_scene(pin)
+    mesh = tmp_path / "scenes" / pin.id / "pin.msh"
+    whole = mesh.read_bytes()
+    for find in (lambda: store.scene(pin.id), lambda: store.keep_scene(pin.id, pin.description)):
+        mesh.write_bytes(whole.replace(b"1", b"2", 1))
+        find()
+        store.save_scene(pin)
+        assert mesh.read_bytes() == whole and store.scene(pin.id) is not None
+    assert len(list((tmp_path / "unreadable").glob(f"{pin.id}*"))) == 2
