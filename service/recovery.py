@@ -38,8 +38,7 @@ def open_queue(
             _adopt(jobs, store)
             return jobs
     except QueueLost as error:
-        damaged = FileDamaged(path, path.name, str(error), state_of(path))
-        store.set_aside(damaged, "it is made again from the studies")
+        store.put_aside(path, str(error.__cause__), "it is made again from the studies")
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)
     jobs = Jobs(part)

@@ -55,10 +55,6 @@ class Catalogue(Database):
         super().__init__(path, lambda reason: CatalogueDamaged(f"{reason}; {again}"), StoreBusy)
         self.of = of
 
-    def run(self, run_id: str) -> Row | None:
-        """Return the row of one run, or None."""
-        return self.rows([run_id]).get(run_id)
-
     def runs(
         self,
         scene: str | None = None,

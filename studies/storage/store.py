@@ -108,8 +108,7 @@ class Store:
                 index.follow(lambda scene_id: self.scene(scene_id, whole=False))
             return index.page(limit, offset, name)
         except CatalogueDamaged as error:
-            found = FileDamaged(index.path, index.path.name, f"{error}", seal.state_of(index.path))
-            self.set_aside(found, "it is made again from the scenes")
+            self.put_aside(index.path, str(error.__cause__), "it is made again from the scenes")
             return self.scenes(limit, offset, name) if not index.path.exists() else []
 
     def save_scene(self, scene: Scene) -> None:
@@ -122,9 +121,7 @@ class Store:
         folder, meshes = self.directory / "scenes" / scene_id, description.meshes or {}
         wrong = [n for n, m in meshes.items() if seal.digest(folder / n) != seal.digest_of(m.data)]
         if wrong:
-            name, reason = f"scene {scene_id}", f"{wrong[0]} is missing or has changed"
-            found = FileDamaged(folder, name, reason, seal.state_of(folder))
-            self.set_aside(found, "it is written again")
+            self.put_aside(folder, f"{wrong[0]} is missing or has changed", "it is written again")
         new = self.scene(scene_id, whole=False) is None
         if new:
             with self._writable():
@@ -283,23 +280,25 @@ class Store:
         return rows
 
     def set_aside(self, error: FileDamaged, then: str) -> None:
-        """Move what is damaged to ``unreadable/``, and log it in one line.
+        """Move what is damaged to ``unreadable/``, unless it is gone or another one by now."""
+        if error.state is not None and seal.state_of(error.path) == error.state:
+            self.put_aside(error.path, error.reason, then)
 
-        Nothing is moved if there is nothing, or something else by now.
-        """
-        if error.state is None or seal.state_of(error.path) != error.state:
+    def put_aside(self, path: Path, reason: str, then: str) -> None:
+        """Move a file or directory, if there is one, to ``unreadable/``, and log it in one line."""
+        if not path.exists():
             return
-        here = error.path.relative_to(self.directory)
+        here = path.relative_to(self.directory)
         target = self.directory / "unreadable" / ".".join(here.parts[1:] or here.parts)
         try:
             target.parent.mkdir(exist_ok=True)
             if target.exists():
                 target = target.with_name(f"{target.name}.{uuid.uuid4().hex}")
-            error.path.rename(target)
+            path.rename(target)
             now = f"is now {target.relative_to(self.directory)}"
         except OSError as failed:
             now = f"stays, because it cannot be moved ({failed.strerror})"
-        _LOG.warning("%s cannot be read and %s: %s; %s", here, now, error.reason, then)
+        _LOG.warning("%s cannot be read and %s: %s; %s", here, now, reason, then)
 
     def modified(self, run_ids: Iterable[str]) -> dict[str, int]:
         """Return, by id, the time of change [ns] of the files of runs that exist."""
@@ -329,8 +328,7 @@ class Store:
                 anew.catalogue = Catalogue(part)
                 anew._follow({})
                 for old in (path, path.with_name(f"{path.name}-journal")):
-                    found = FileDamaged(old, old.name, str(error), seal.state_of(old))
-                    self.set_aside(found, "it has been made again from the runs")
+                    self.put_aside(old, str(error.__cause__), "it is made again from the runs")
             _LOG.warning("%s has been made again from the files of the runs", path.name)
             known = self.catalogue.stamps()
         self.catalogue.damaged = False
@@ -394,8 +392,7 @@ class Store:
     def clear(self, path: Path) -> None:
         """Set a directory aside that has the name of a file."""
         if path.is_dir():
-            found = FileDamaged(path, path.name, "it is a directory", seal.state_of(path))
-            self.set_aside(found, "a file takes its place")
+            self.put_aside(path, "it is a directory", "a file takes its place")
 
 
 def _left(part: Path) -> bool:

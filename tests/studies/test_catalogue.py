@@ -55,7 +55,7 @@ def wounded(catalogue: Catalogue) -> Catalogue:
 
 
 READERS: dict[str, Callable[[Catalogue], Any]] = {
-    "run": lambda catalogue: [catalogue.run("0")],
+    "run": lambda catalogue: [catalogue.rows(["0"]).get("0")],
     "runs": lambda catalogue: catalogue.runs()[0],
     "rows": lambda catalogue: list(catalogue.rows(["0", "1"]).values()),
 }
@@ -93,7 +93,7 @@ def test_a_catalogue_that_cannot_be_written_to_is_read(catalogue: Catalogue) -> 
 
 def empty(catalogue: Catalogue) -> bool:
     return (
-        catalogue.run("0") is None
+        catalogue.rows(["0"]).get("0") is None
         and catalogue.runs(scene="fake") == ([], 0)
         and catalogue.rows(["0"]) == {}
         and catalogue.stamps() == {}

@@ -131,7 +131,7 @@ def test_a_damaged_run_is_told_set_aside_and_computed_again(
     study, store = damaged
     damage(study, store)
     if quietly:  # as the disk damages it; the catalogue notices no change
-        row = store.catalogue.run(first(study))
+        row = store.catalogue.rows([first(study)]).get(first(study))
         assert row is not None
         state = store.run_path(first(study)).stat()
         store.catalogue.put([row | {"size": state.st_size, "modified": state.st_mtime_ns}])
@@ -177,7 +177,7 @@ def test_a_file_deleted_in_mid_study_is_missing(
     damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, store = damaged
-    failed = store.catalogue.run(first(study))
+    failed = store.catalogue.rows([first(study)]).get(first(study))
     assert failed is not None
     store.catalogue.put([failed | {"status": "error"}])  # so that there is something to compute
     last = list(study.cases())[-1].id
@@ -198,7 +198,7 @@ def test_a_run_without_its_seal_is_unknown_and_computed_again(
     wrong = run_dataset(FAKE, case, record(other.parameters))
     wrong.to_netcdf(store.run_path(case.id), engine="h5netcdf")
     store.reconcile()
-    assert store.catalogue.run(case.id) is None
+    assert store.catalogue.rows([case.id]).get(case.id) is None
     assert repeat(study, store, monkeypatch) == [case.id]
     true_numbers(study, store)
 
@@ -326,7 +326,7 @@ def test_a_run_that_is_deleted_is_gone_with_its_row(damaged: ComputedStudy) -> N
     study, store = damaged
     store.discard([first(study)])
     assert not store.run_path(first(study)).exists()
-    assert store.catalogue.run(first(study)) is None
+    assert store.catalogue.rows([first(study)]).get(first(study)) is None
     assert store.catalogue.runs()[1] == 3
 
 

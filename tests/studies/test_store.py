@@ -72,7 +72,7 @@ def test_a_second_writer_is_refused_and_the_lock_dies_with_its_process(store: St
 
 def test_reading_makes_nothing(store: Store) -> None:
     assert store.catalogue.runs() == ([], 0)
-    assert store.catalogue.run("0" * 32) is None
+    assert store.catalogue.rows(["0" * 32]).get("0" * 32) is None
     assert store.catalogue.rows(["0" * 32]) == {}
     assert not store.directory.exists()
 
@@ -94,7 +94,7 @@ def test_a_saved_study_is_found_again(computed: ComputedStudy) -> None:
 def test_a_row_says_what_the_run_is(computed: ComputedStudy) -> None:
     study, store = computed
     case = next(study.cases())
-    row = store.catalogue.run(case.id)
+    row = store.catalogue.rows([case.id]).get(case.id)
     assert row is not None
     assert row["scene"] == "fake"
     assert row["status"] == "ok"
@@ -146,7 +146,7 @@ def test_the_catalogue_forgets_files_that_are_gone(store: Store) -> None:
     store.run_path(gone).unlink()
     store.reconcile()
     assert store.catalogue.runs()[1] == 3
-    assert store.catalogue.run(gone) is None
+    assert store.catalogue.rows([gone]).get(gone) is None
 
 
 def test_a_damaged_catalogue_is_made_anew(store: Store) -> None:
