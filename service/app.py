@@ -80,7 +80,8 @@ def create_app(settings: Settings) -> FastAPI:
     mend = Mender(jobs, store).look
     runner = Runner(settings, jobs, Pool(settings, held), Starter("service.child", held), mend)
     examiner = Examiner(settings)
-    keeper = Keeper(jobs, store, runner.computes, settings.keep_days, settings.keep_bytes)
+    kept = settings.keep_days, settings.keep_bytes, settings.max_scenes_bytes
+    keeper = Keeper(jobs, store, runner.computes, *kept)
     metrics = Metrics(jobs, store, runner)
 
     @contextlib.asynccontextmanager

@@ -21,6 +21,7 @@ from pathlib import Path
 from service.errors import Conflict, NotFound
 from service.jobs import Jobs
 from studies import FileDamaged, Store
+from studies.scenes.description import Description
 
 log = logging.getLogger(__name__)
 
@@ -41,6 +42,7 @@ class Keeper:
     computes : (study id) -> whether a process may still work on it
     days, size : age [days] and total size [bytes] beyond which studies that have ended are deleted,
         the oldest first; None for no limit
+    scenes : largest size of all posted scenes [bytes]; None for no limit
     """
 
     jobs: Jobs
@@ -48,6 +50,7 @@ class Keeper:
     computes: Callable[[str], bool]
     days: float | None = None
     size: int | None = None
+    scenes: int | None = None
 
     def delete_run(self, run_id: str) -> None:
         """Delete a run; raise `Conflict` if a waiting or running study needs it."""
@@ -61,6 +64,22 @@ class Keeper:
                     needed = f"the study {user['id']} needs this run"
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
+
+    def keep_scene(self, scene_id: str, description: Description) -> bool:
+        """Store a posted scene; return whether it is new.
+
+        Raises
+        ------
+        Conflict
+            If all posted scenes would take more than is allowed.
+        """
+        if self.store.scene(scene_id, whole=False) is None:
+            given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
+            taken = size(self.store.directory / "scenes") + given
+            if self.scenes is not None and taken > self.scenes:
+                allowed = f"at most {self.scenes} are allowed: delete some"
+                raise Conflict(f"the posted scenes would take {taken} bytes, {allowed}")
+        return self.store.keep_scene(scene_id, description)
 
     def delete_scene(self, scene_id: str) -> None:
         """Delete a posted scene; raise `Conflict` if a study in the queue names it."""

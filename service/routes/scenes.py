@@ -36,7 +36,7 @@ def list_scenes(which: Annotated[Window, Query()], store: TheStore) -> list[Scen
 async def post_scene(
     scene: Annotated[UploadFile, File(description="a scene file, in TOML")],
     inspector: TheInspector,
-    store: TheStore,
+    keeper: TheKeeper,
     request: Request,
     response: Response,
     meshes: Annotated[
@@ -53,7 +53,7 @@ async def post_scene(
             raise StudyError("meshes", each.filename, "must have file names of their own")
         files[each.filename] = await each.read()
     found, content = await inspector.inspect(await scene.read(), files)
-    if not await asyncio.to_thread(store.keep_scene, found.id, content):
+    if not await asyncio.to_thread(keeper.keep_scene, found.id, content):
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
     return found

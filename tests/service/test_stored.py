@@ -21,6 +21,7 @@ import pytest
 
 from service import access
 from service.app import create_app
+from service.errors import Conflict
 from service.job import StudyState
 from service.jobs import Jobs
 from service.keys import Keys, Scope
@@ -511,6 +512,15 @@ def test_a_scene_is_deleted_unless_a_study_needs_it(tmp_path: Path) -> None:
     assert ask("DELETE", f"/scenes/{pin.id}").status_code == 204
     problem(ask("DELETE", f"/scenes/{pin.id}"), 404)
     assert pin.id not in {each["id"] for each in ask("GET", "/scenes").json()}
+
+
+def test_all_scenes_together_have_a_largest_size(tmp_path: Path) -> None:
+    pin = read_scene(ROOT / "data/scenes/pin.toml")
+    app = create_app(Settings(data=tmp_path, max_scenes_bytes=1000))
+    with pytest.raises(Conflict, match="at most 1000 are allowed: delete some"):
+        app.state.keeper.keep_scene(pin.id, pin.description)
+    Store(tmp_path).save_scene(pin)
+    assert app.state.keeper.keep_scene(pin.id, pin.description) is False, "it is known"
 
 
 def test_a_mesh_that_has_changed_spoils_its_scene_until_it_is_posted_again(tmp_path: Path) -> None:
