@@ -61,25 +61,29 @@ def _adopt(jobs: Jobs, store: Store) -> None:
         try:
             jobs.get(study_id)
         except NotFound:
-            if is_id(study_id) and store.outcomes(study_id):
-                _add(study_id, jobs, store)
+            if is_id(study_id) and store.dataset_path(study_id).exists():
+                _add(study_id, jobs, store, begun=False)
 
 
-def _add(study_id: str, jobs: Jobs, store: Store) -> None:
+def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
     """Add a study of the directory to the queue, if this version of the solver accepts it.
 
-    It has ended if its data set is there, and all runs that are in it.
+    One that the service has ``begun`` has ended if its data set is there, and all runs in it.
+    Another one, which nobody asked the service to compute, is added with its data set alone.
     """
     try:
         study = store.study(study_id)
     except FileDamaged:  # the store has told it
         return
     except ValueError as error:  # StudyError is one
-        log.warning("studies/%s: not restored: %s", study_id, error)
+        if getattr(error, "value", None) != study_id:  # that is of another version of the solver
+            log.warning("studies/%s: not restored: %s", study_id, error)
+        return
+    counts = store.outcomes(study.id)
+    if not (counts or begun):
         return
     jobs.accept(study.id, study.to_dict(), study.run_ids())
-    counts = store.outcomes(study.id)
-    there = sum(store.run_path(run).is_file() for run in study.run_ids())
+    there = sum(store.run_path(run).is_file() for run in study.run_ids()) if begun else study.size
     if counts and there >= counts.total() - counts[MISSING]:
         jobs.finish(study.id, *verdict(counts), standing=StudyState.ACCEPTED)
 

@@ -201,7 +201,6 @@ def test_a_study_computed_without_the_service_is_found_when_it_starts(tmp_path: 
     with h5py.File(store.dataset_path(ended.id), "w") as file:
         file["status"] = ["ok"]
     seal(store.dataset_path(ended.id), f"dataset {ended.id}")
-    store.write_run(next(ended.cases()), "reason")
     for _ in range(2):
         jobs, total = open_queue(path, store, None).page(limit=9, offset=0)
         assert total == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import random
 import shutil
 from collections.abc import Callable
@@ -214,7 +215,9 @@ def test_a_data_set_of_an_earlier_version_is_kept_if_it_is_what_was_noted(
         path.write_bytes(there)
         noted = {"data set": {"of": "", "files": {path.name: sha256(unsealed).hexdigest()}}}
         path.with_name("made.json").write_text(json.dumps(noted))
+        os.utime(path, (1e9, 1e9))
         assert store.outcomes(study.id) == outcomes
+        assert not outcomes or path.stat().st_mtime == 1e9, "it is not the latest of its name now"
     assert (store.directory / "unreadable" / f"{study.id}.dataset.nc").read_bytes() == there
 
 
