@@ -17,7 +17,7 @@ from studies.scenes.registry import known_names, known_scenes, scene_named
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
 
-@router.get("", responses=REFUSED)
+@router.get("")
 def list_scenes(which: Annotated[Window, Query()], store: TheStore) -> list[SceneSummary]:
     """List the scenes: those of the product, of installed packages, then the latest posted ones."""
     known = [*known_scenes()]

@@ -233,7 +233,7 @@ def test_a_run_that_is_stored_while_the_catalogue_is_made_again_is_in_it(
 ) -> None:
     study, store, _ = place
     late = store.run_path(next(study.run_ids()))
-    content, aside = late.read_bytes(), Store.set_aside
+    content, aside = late.read_bytes(), Store.put_aside
     late.unlink()
     store.catalogue.path.unlink()
 
@@ -241,7 +241,7 @@ def test_a_run_that_is_stored_while_the_catalogue_is_made_again_is_in_it(
         late.write_bytes(content)
         aside(self, *given)
 
-    monkeypatch.setattr(Store, "set_aside", stored_meanwhile)
+    monkeypatch.setattr(Store, "put_aside", stored_meanwhile)
     store.reconcile()
     assert set(store.catalogue.stamps()) == set(study.run_ids())
 
