@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from http import HTTPStatus
 
-from anyio import CapacityLimiter
+from anyio import CapacityLimiter, fail_after
 from anyio.to_thread import run_sync
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -30,6 +31,9 @@ NEEDED = [
     )
 ]
 """The scope that a request needs: the first match; requests without a match need ``admin``."""
+
+SECONDS = 2.0
+"""Longest time of reading the keys [s]."""
 
 HOST = re.compile(r"(?:\[([\da-f:.]+)\]|([^\s:/@\[\]]+))(?::\d*)?", re.IGNORECASE)
 FORM = re.compile(r"multipart/form-data\s*;.*", re.IGNORECASE)
@@ -67,9 +71,8 @@ class Gate:
             try:
                 self.check_host(request.headers.getlist("host"))
                 check_page(request)
-                request.state.caller = Scope.ADMIN
-                if self.keys_needed:  # in a thread: the disk may hang
-                    request.state.caller = await run_sync(self.caller, request, limiter=self.one)
+                request.state.caller = await self.caller(request)
+                request.state.admitted = partial(self.admitted, request)
                 check_content(request)
             except HTTPException as refusal:
                 answer = on_http_error(request, refusal)
@@ -88,16 +91,33 @@ class Gate:
                 "the service has another host name than this; RESIDUA_ALLOWED_HOSTS adds names",
             )
 
-    def caller(self, request: Request) -> Scope | None:
+    async def admitted(self, request: Request) -> bool:
+        """Whether the caller of a request that is being answered still has its key."""
+        try:
+            await self.caller(request)
+        except HTTPException as refusal:
+            return refusal.status_code == HTTPStatus.SERVICE_UNAVAILABLE
+        return True
+
+    async def caller(self, request: Request) -> Scope | None:
         """Return the caller's scope, or raise `HTTPException` if it is not sufficient."""
+        if not self.keys_needed:
+            return Scope.ADMIN
         wanted, header = needed(request), request.headers.get("authorization", "")
         if not header and wanted is None:
             return None
         kind, _, text = header.partition(" ")
+        given = text.strip() if kind.lower() == "bearer" else ""
         try:
-            scope = self.keys.scope_of(text.strip()) if kind.lower() == "bearer" else None
-        except KeysError as error:
-            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from None
+            with fail_after(SECONDS):  # in a thread, which is left alone if the disk hangs
+                scope = await run_sync(
+                    self.keys.scope_of, given, limiter=self.one, abandon_on_cancel=True
+                )
+        except (KeysError, TimeoutError) as error:
+            if wanted is None:
+                return None
+            reason = str(error) or f"the keys cannot be read within {SECONDS:g} s"
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, reason) from None
         challenge = 'Bearer realm="residua"'
         if scope is None:
             status, detail = HTTPStatus.UNAUTHORIZED, "this needs authorization: Bearer <API key>"

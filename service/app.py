@@ -7,7 +7,6 @@ import os
 import shlex
 import sys
 from collections.abc import AsyncIterator
-from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,7 +24,6 @@ from service.headers import SecurityHeaders
 from service.inspector import Inspector
 from service.keys import Keys, KeysError
 from service.limits import body_limit
-from service.lock import DirectoryInUse, lock_directory
 from service.maps import Pictures
 from service.methods import head_is_get
 from service.metrics import Metrics
@@ -33,7 +31,7 @@ from service.overview import Details
 from service.pool import Pool
 from service.probe import Probe
 from service.processes import Starter, find_modules_at_home
-from service.recovery import open_queue
+from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
 from service.runner import Runner
@@ -41,6 +39,7 @@ from service.settings import Settings, chosen
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 from studies.scratch import remove_left
+from studies.storage.lock import lock
 
 BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
 """How the description of the service announces that keys are required; `Gate` requires them."""
@@ -48,6 +47,9 @@ BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua 
 DESCRIPTION = """Elastic-plastic contact studies: post one, watch it, fetch its data set.
 
 A study has a content id: the same study posted twice is the same study."""
+
+IN_USE = "has a service in this directory; stop it or name another one"
+"""What is told of a second service."""
 
 OPEN_STREAMS_SECONDS = 2
 """Time that open event streams are given when the service stops."""
@@ -61,7 +63,7 @@ def create_app(settings: Settings) -> FastAPI:
 
     Raises
     ------
-    DirectoryInUse
+    StoreBusy
         If another service works in the data directory.
     KeysError
         If callers need a key and there is none.
@@ -72,15 +74,15 @@ def create_app(settings: Settings) -> FastAPI:
             f"{settings.host} is open to others, who need an API key; make "
             f"one: residua keys add NAME --scope admin --data {shlex.quote(str(settings.data))}"
         )
-    lock = lock_directory(settings.data, settings.lock_seconds)
+    settings.data.mkdir(parents=True, exist_ok=True)
+    held = lock(settings.data / "service.lock", IN_USE, settings.lock_seconds)
     store = open_store(settings.data)
-    open_jobs = partial(open_queue, settings.data / "jobs.sqlite", store, settings.max_queue)
-    jobs = open_jobs()
-    runner = Runner(
-        settings, jobs, Pool.of(settings, lock), Starter("service.child", lock), open_jobs
-    )
+    jobs = open_queue(settings.data / "jobs.sqlite", store, settings.max_queue)
+    mend = Mender(jobs, store).look
+    runner = Runner(settings, jobs, Pool.of(settings, held), Starter("service.child", held), mend)
     examiner = Examiner(settings)
-    keeper = Keeper(jobs, store, runner.computes, settings.keep_days, settings.keep_bytes)
+    kept = settings.keep_days, settings.keep_bytes, settings.max_scenes_bytes
+    keeper = Keeper(jobs, store, runner.computes, *kept)
     metrics = Metrics(jobs, store, runner)
 
     @contextlib.asynccontextmanager
@@ -89,7 +91,7 @@ def create_app(settings: Settings) -> FastAPI:
             async with runner.working(), keeper.working():
                 yield
         finally:
-            os.close(lock)
+            os.close(held)
 
     app = FastAPI(
         title="Residua",
@@ -160,7 +162,7 @@ def serve(
     logs.configure(settings.log_format)
     try:
         app = create_app(settings)
-    except (CatalogueDamaged, DirectoryInUse, KeysError, QueueLost, StoreFull, StudyError) as error:
+    except (CatalogueDamaged, KeysError, QueueLost, StoreBusy, StoreFull, StudyError) as error:
         refuse(str(error))
     except OSError as error:
         refuse(f"data = {str(settings.data)!r}: must be a directory to write in ({error.strerror})")

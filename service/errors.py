@@ -19,19 +19,19 @@ from service.logs import REQUEST
 from service.methods import offered
 from studies import StudyError
 from studies.errors import (
+    LONGEST_FIELD,
+    MOST_MISTAKES,
     CatalogueDamaged,
-    RunUnreadable,
+    FileDamaged,
     SceneError,
     StoreBusy,
     StoreFull,
     Unusable,
+    cut,
     worded,
 )
 
 log = logging.getLogger(__name__)
-
-LONGEST_VALUE = 200
-"""Number of characters of an offending value that the answer shows."""
 
 
 class NotFound(LookupError):
@@ -43,7 +43,7 @@ class Conflict(RuntimeError):
 
 
 class Busy(RuntimeError):
-    """Too many requests of this kind are being processed, or wait."""
+    """Not now: too many requests of this kind wait, or what is asked for is being made again."""
 
 
 class QueueLost(RuntimeError):
@@ -59,7 +59,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
-    RunUnreadable: HTTPStatus.NOT_FOUND,
+    FileDamaged: HTTPStatus.NOT_FOUND,
     StoreBusy: HTTPStatus.SERVICE_UNAVAILABLE,
     Unusable: HTTPStatus.SERVICE_UNAVAILABLE,
     OSError: HTTPStatus.SERVICE_UNAVAILABLE,
@@ -140,7 +140,7 @@ def shown(value: object) -> str | int | float | bool | None:
     if isinstance(value, int | float) and abs(value) < 2**53:
         return value
     text = value if isinstance(value, str) else repr(value)
-    return text if len(text) <= LONGEST_VALUE else text[:LONGEST_VALUE] + "…"
+    return cut(text, LONGEST_FIELD)
 
 
 def dotted(location: Sequence[str | int]) -> str:
@@ -153,7 +153,7 @@ def dotted(location: Sequence[str | int]) -> str:
 def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     """Return field, value and what is allowed for each error FastAPI found."""
     errors = []
-    for error in exc.errors():
+    for error in exc.errors()[:MOST_MISTAKES]:
         field, value, allowed = dotted(error["loc"]), shown(error.get("input")), worded(error)
         if error["type"] == "json_invalid":
             reason = f"{error['ctx']['error']} at character {error['loc'][-1]}"
@@ -170,8 +170,9 @@ def on_scene_error(request: Request, exc: SceneError) -> Problem:
         {"field": shown(each.field), "value": shown(each.value), "allowed": each.allowed}
         for each in exc.mistakes
     ]
-    detail = "; ".join(f"{each['field']}: {each['allowed']}" for each in errors)
-    return problem(request, status_of(exc), detail, errors)
+    texts = [f"{each['field']}: {each['allowed']}" for each in errors]
+    texts += exc.listed[len(errors) :]
+    return problem(request, status_of(exc), "; ".join(texts), errors)
 
 
 def on_field_error(request: Request, exc: StudyError) -> Problem:
@@ -243,7 +244,7 @@ HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     SceneError: on_scene_error,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
-        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged, RunUnreadable),
+        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
         on_plain_error,
     ),
     OSError: on_system_error,

@@ -16,7 +16,6 @@ from service.settings import Settings
 from solver.scenes import Scene
 from studies import Bounds, Estimate, Store, Study, StudyError, estimate
 from studies.scenes.registry import known_names
-from studies.storage.shelf import named
 
 WAITING = 100
 """Number of studies that may wait to be checked."""
@@ -85,10 +84,11 @@ def _posted(store: Store, name: str) -> Scene | None:
     """Return a posted scene by its id, or by its name if no other scene has it."""
     if (scene := store.scene(name)) or name in known_names():
         return scene
-    found = named(store.directory, name)
+    found = store.scenes(limit=LISTED + 1, name=name)
     if len(found) > 1:
         ids = ", ".join(each.id for each in found[:LISTED])
-        more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
-        allowed = f"is the name of {len(found)} posted scenes: give an id, one of {ids}{more}"
-        raise StudyError("scene", name, allowed)
-    return found[0] if found else None
+        more = " and more" if len(found) > LISTED else ""
+        raise StudyError(
+            "scene", name, f"is the name of several posted scenes: give an id, one of {ids}{more}"
+        )
+    return store.scene(found[0].id) if found else None

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from service.guarded import Guarded
+from service.schemas import KeptScene
 from studies import StudyError
 from studies.errors import SceneError
 from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
-from studies.scenes.scene import FileScene, file_scene, read_scene
+from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
 
@@ -34,8 +34,10 @@ class Inspector:
     def __init__(self) -> None:
         self.process = Guarded("scene", WAITING, SECONDS)
 
-    async def inspect(self, text: bytes, meshes: Mapping[str, bytes]) -> FileScene:
-        """Return the scene of a file and its meshes.
+    async def inspect(
+        self, text: bytes, meshes: Mapping[str, bytes]
+    ) -> tuple[KeptScene, Description]:
+        """Return the scene of a file and its meshes, and their content.
 
         Raises
         ------
@@ -56,32 +58,33 @@ class Inspector:
                     (folder / name).write_bytes(data)
                 found = json.loads(await self.process.call(inspected, str(folder), name=_FILE))
         if mistakes := found.get("mistakes"):
-            raise SceneError(_FILE, [StudyError(*each) for each in mistakes])
+            raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}
-        description = Description(_FILE, found["content"], given)
-        return await asyncio.to_thread(file_scene, description)
+        return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
 
 
 def inspected(folder: str) -> str:
-    """Return the content of the scene in a folder or its mistakes, as JSON."""
+    """Return the scene in a folder and its content, or its mistakes, as JSON."""
+    answer: dict[str, Any]
     try:
-        answer = {"content": _read(Path(folder))}
+        scene = _read(Path(folder))
+        kept = {"id": scene.id, "name": scene.name, "summary": scene.summary}
+        answer = {"scene": kept, "content": scene.description.content}
     except SceneError as error:
-        answer = {"mistakes": [_fields_of(each) for each in error.mistakes]}
+        listed = [_fields_of(each) for each in error.mistakes]
+        answer = {"mistakes": listed, "count": error.count}
     except StudyError as error:
-        answer = {"mistakes": [_fields_of(error)]}
+        answer = {"mistakes": [_fields_of(error)], "count": 1}
     return json.dumps(answer).replace(f"{folder}/", "")
 
 
-def _read(folder: Path) -> Any:
-    """Return the content of the scene in a folder; every file must be needed and valid."""
-    content = Description.read(folder / _FILE).content
-    needed = mesh_names(content)
+def _read(folder: Path) -> FileScene:
+    """Return the scene in a folder; every file must be needed and valid."""
+    needed = mesh_names(Description.read(folder / _FILE).content)
     for name in sorted({each.name for each in folder.iterdir()} - {_FILE, *needed}):
         listed = ", ".join(needed) or "(it names none)"
         raise StudyError("meshes", name, f"must be a file that the scene names: {listed}")
-    read_scene(folder / _FILE)
-    return content
+    return read_scene(folder / _FILE)
 
 
 def _fields_of(mistake: StudyError) -> tuple[str, object, str]:

@@ -20,14 +20,14 @@ from typing import Any
 from service import schema
 from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import COLUMNS, UNREADABLE, Job, StudyState, job_of, wanted
-from studies.errors import StoreFull
+from studies.storage.database import Database, check
 
 NEXT_TURN = "(SELECT COALESCE(MAX(turn), 0) + 1 FROM job)"
 SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
     WHERE mine.job = ? AND theirs.job IN (SELECT value FROM json_each(?)) LIMIT 1"""
 
 
-class Jobs:
+class Jobs(Database):
     """The queue in the file ``path``; safe to use from many threads and processes.
 
     Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full.
@@ -39,14 +39,19 @@ class Jobs:
     """
 
     def __init__(self, path: Path, longest: int | None = None) -> None:
-        self.path = path
+        super().__init__(path, QueueLost, OSError)
         self.longest = longest
         new = not path.exists()
         with self.transaction("BEGIN IMMEDIATE", mode="rwc" if new else "rw") as connection:
             schema.prepare(connection, new)
-            for (finding,) in connection.execute("PRAGMA integrity_check(1)"):
-                if finding != "ok":
-                    raise sqlite3.DatabaseError(finding)
+            check(connection)
+
+    def check(self) -> None:
+        """Raise `QueueLost` if the file is missing or damaged; the whole file is read."""
+        with self.transaction("BEGIN") as connection:
+            connection.execute("SELECT 1 FROM job, run LIMIT 1")
+            check(connection)
+        self.damaged = False
 
     def accept(
         self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
@@ -224,8 +229,10 @@ class Jobs:
                 )
             return self._read(connection, job_id)
 
-    def retry(self, job_id: str) -> Job:
+    def retry(self, job_id: str, failed: bool = True) -> Job:
         """Put a job that has ended back into the queue, in the last place.
+
+        Without ``failed`` only its missing runs are computed, and its data set is made again.
 
         Raises
         ------
@@ -241,7 +248,7 @@ class Jobs:
             connection.execute(
                 "UPDATE job SET stood = state, state = ?, message = '', progress = 0, since = ?,"
                 f" started = NULL, finished = NULL, turn = {NEXT_TURN} WHERE id = ?",
-                (StudyState.ACCEPTED, time.time_ns(), job_id),
+                (StudyState.ACCEPTED, time.time_ns() if failed else job.since, job_id),
             )
             return self._read(connection, job_id)
 
@@ -249,31 +256,14 @@ class Jobs:
     def transaction(
         self, begin: str = "BEGIN IMMEDIATE", mode: str = "rw"
     ) -> Iterator[sqlite3.Connection]:
-        """Give a connection for one transaction, during which no other process writes."""
-        try:
-            # A missing file is not created here: other processes may have written to it.
-            address = f"{self.path.resolve().as_uri()}?mode={mode}"
-            connection = sqlite3.connect(address, uri=True, timeout=30.0, isolation_level=None)
+        """Give a connection for one transaction, during which no other process writes.
+
+        A missing file is not created: other processes may have written to it.
+        """
+        with self.connection(begin, mode) as connection:
             connection.row_factory = sqlite3.Row
             connection.text_factory = lambda text: text.decode(errors="replace")
-            try:
-                connection.execute(begin)
-                with connection:
-                    yield connection
-            finally:
-                connection.close()
-        except sqlite3.DatabaseError as error:
-            raise self._translated(error) from error
-
-    def _translated(self, error: sqlite3.DatabaseError) -> Exception:
-        """Return the error of the queue for an error of SQLite."""
-        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
-        if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE):  # the latter past a quota
-            return StoreFull(str(self.path.parent))
-        damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
-        if code & 0xFF in damage or not self.path.is_file():
-            return QueueLost(f"{self.path.name} is missing or damaged ({error})")
-        return OSError(f"{self.path.name} cannot be used now: {error}")
+            yield connection
 
     @staticmethod
     def _study(connection: sqlite3.Connection, job_id: str) -> dict[str, Any]:

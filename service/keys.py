@@ -20,8 +20,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, TypeAdapter
 
-from studies.errors import StudyError
+from studies import FileDamaged, Store, StudyError
 from studies.storage.appearing import appearing
+from studies.storage.seal import State, content_of, sealed_json, state_of
 
 
 class Scope(StrEnum):
@@ -52,22 +53,37 @@ class Key(BaseModel):
 FILE = TypeAdapter(dict[str, Key])
 """Content of the file: the keys by name, oldest first."""
 
+LARGEST = 1_000_000
+"""Largest size of the file [bytes]."""
+
+_NAME = "keys service"
+
 
 class Keys:
-    """The keys of a data directory, read from the file each time: a change takes effect at once."""
+    """The keys of a data directory; a change of their file takes effect at the next request."""
 
     def __init__(self, directory: Path) -> None:
         self.path = directory / "keys.json"
+        self._read: tuple[State | None, dict[str, Key]] = None, {}
 
     def all(self) -> dict[str, Key]:
         """Return the keys by name; raise `KeysError` if the file exists and is not readable."""
         try:
-            return FILE.validate_json(self.path.read_bytes())
-        except FileNotFoundError:
-            return {}
-        except (OSError, ValueError) as error:
+            return self._kept()
+        except (FileDamaged, OSError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is damaged"
             raise KeysError(f"{self.path.name} cannot be read: {reason}") from None
+
+    def _kept(self) -> dict[str, Key]:
+        """Return the keys, read when the file has changed; raise `FileDamaged`."""
+        state = state_of(self.path)
+        if state != self._read[0]:
+            try:
+                content = content_of(self.path, _NAME, LARGEST) if state else {}
+                self._read = state, FILE.validate_python(content)
+            except ValueError as error:
+                raise FileDamaged(self.path, _NAME, type(error).__name__, state) from None
+        return dict(self._read[1])
 
     def scope_of(self, text: str) -> Scope | None:
         """Return the scope of the key ``text``; None if it is unknown.
@@ -80,8 +96,9 @@ class Keys:
 
     def add(self, name: str, scope: Scope) -> str:
         """Make a key and return its text, which is not stored; the name must be new."""
-        if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII):
-            raise StudyError("name", name, "must be 1 to 64 letters, digits, '.', '_' or '-'")
+        if not re.fullmatch(r"(?!seal$)[\w.-]{1,64}", name, re.ASCII):
+            allowed = "must be 1 to 64 letters, digits, '.', '_' or '-', and not 'seal'"
+            raise StudyError("name", name, allowed)
         text = f"residua_{secrets.token_urlsafe(32)}"  # no dash first; a leaked key is recognised
         with self._changing() as keys:
             if name in keys:
@@ -103,11 +120,15 @@ class Keys:
         lock = os.open(self.path.parent, os.O_RDONLY)  # simultaneous commands wait for each other
         try:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            keys = self.all()
+            try:
+                keys = self._kept()
+            except FileDamaged as error:
+                Store(self.path.parent).set_aside(error, "make all keys again")
+                keys = {}
             yield keys
             with appearing(self.path) as part:
                 part.touch(mode=0o600)
-                part.write_bytes(FILE.dump_json(keys, indent=2))
+                part.write_bytes(sealed_json(_NAME, FILE.dump_python(keys, mode="json")))
                 if os.geteuid() == 0:  # the service may be another user: the owner of the directory
                     owner = self.path.parent.stat()
                     os.chown(part, owner.st_uid, owner.st_gid)

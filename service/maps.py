@@ -15,6 +15,7 @@ import solver
 from service.errors import Busy
 from service.schemas import MapQuery
 from studies.storage.runfile import verify
+from studies.storage.seal import digest
 
 
 class Pictures:
@@ -69,8 +70,7 @@ class Pictures:
 
 def tag(path: Path, query: MapQuery) -> str:
     """Return an entity tag that changes with the run's file, the query and the version."""
-    state = path.stat()
-    content = f"{path.name} {solver.__version__} {state.st_mtime_ns} {state.st_size} {query!r}"
+    content = f"{path.name} {solver.__version__} {digest(path)} {query!r}"
     return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
 
 

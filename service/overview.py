@@ -16,6 +16,7 @@ from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
 from studies.definition.vocabulary import taken
+from studies.storage.seal import state_of
 
 KEPT = 100
 """Largest number of answers that are kept."""
@@ -70,7 +71,7 @@ class Details:
     def _look(self, study_id: str, window: Window, detail: Detail) -> None:
         began = time.monotonic()
         job = self.jobs.get(study_id)
-        state = job, self.store.catalogue.changes()
+        state = job, state_of(self.store.catalogue.path)
         if detail.state != state:
             detail.content = self._look_up(job, window).model_dump_json().encode()
             detail.state = state

@@ -5,14 +5,15 @@ from __future__ import annotations
 import asyncio
 import tempfile
 from contextlib import suppress
-from pathlib import Path
+from typing import Any
 
 from anyio import CapacityLimiter, move_on_after
 from anyio.to_thread import run_sync
 
 from service.errors import QueueLost
 from service.jobs import Jobs
-from studies.errors import StoreFull
+from studies import Store
+from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
 
 SECONDS = 5.0
 """Time within which the check must end [s]."""
@@ -23,29 +24,28 @@ class Probe:
 
     def __init__(self) -> None:
         self.limiter = CapacityLimiter(1)
-        self.underway: asyncio.Task[tuple[bool, dict[str, str] | None]] | None = None
+        self.underway: asyncio.Task[dict[str, Any]] | None = None
 
-    async def check(self, directory: Path, jobs: Jobs) -> tuple[bool, dict[str, str] | None]:
-        """Return the result of `check_directory`, or ``(False, None)`` if it takes too long."""
+    async def check(self, store: Store, jobs: Jobs) -> dict[str, Any]:
+        """Return what `look` finds; nothing if that takes too long."""
         if self.underway is None or self.underway.done():
-            checking = run_sync(check_directory, directory, jobs, limiter=self.limiter)
-            self.underway = asyncio.create_task(checking)
+            looking = run_sync(look, store, jobs, limiter=self.limiter)
+            self.underway = asyncio.create_task(looking)
         with move_on_after(SECONDS):
             return await asyncio.shield(self.underway)
-        return False, None
+        return {}
 
 
-def check_directory(directory: Path, jobs: Jobs) -> tuple[bool, dict[str, str] | None]:
-    """Return whether files can be written in a directory, and the waiting jobs by id.
-
-    The second is None if the queue cannot be read.
-    """
-    writable, waiting = True, None
-    try:
-        with tempfile.TemporaryFile(dir=directory) as probe:
-            probe.write(b"1")
-    except OSError:
-        writable = False
+def look(store: Store, jobs: Jobs) -> dict[str, Any]:
+    """Return how a data directory and its files are, as entries of `Health` that are not false."""
+    found: dict[str, Any] = {}
+    with suppress(OSError), tempfile.TemporaryFile(dir=store.directory) as probe:
+        probe.write(b"1")
+        found["data_writable"] = True
     with suppress(QueueLost, StoreFull, OSError):
-        waiting = jobs.waiting()
-    return writable, waiting
+        found["waiting"] = jobs.waiting()
+        found["queue_readable"] = not jobs.damaged
+    with suppress(CatalogueDamaged, StoreBusy, StoreFull, OSError):
+        store.catalogue.runs(limit=1)
+        found["catalogue_readable"] = not store.catalogue.damaged
+    return found

@@ -1,20 +1,26 @@
-"""The queue at the start of the service: with all studies of the directory, and repaired."""
+"""Queue and catalogue: opened at the start, and made again when they are missing or damaged."""
 
 from __future__ import annotations
 
-import json
 import logging
-import shutil
-from collections.abc import Collection
+import time
+from collections.abc import Callable, Collection
+from contextlib import suppress
 from pathlib import Path
 
-from service.errors import NotFound, QueueLost
+from service.errors import Conflict, NotFound, QueueLost
 from service.job import StudyState, verdict
 from service.jobs import Jobs
-from studies import Store, Study
+from studies import FileDamaged, Store
 from studies.definition.identity import is_id
+from studies.definition.vocabulary import MISSING
+from studies.storage.database import Database
+from studies.storage.seal import State, state_of
 
 log = logging.getLogger(__name__)
+
+REST = 50.0
+"""A file that changes all the time is checked in at most a part of the time, one in so many."""
 
 
 def open_queue(
@@ -22,9 +28,9 @@ def open_queue(
 ) -> Jobs:
     """Return the queue; a missing or damaged one is made again from the studies of the store.
 
-    A damaged file is kept under another name. A study with a data set gets its final state from
-    the data set. One without is accepted, and computed. One in ``computed``, on which a process
-    works now, is running.
+    A damaged file is set aside. A study with a data set and all runs in it gets its final state
+    from the data set. Another one is accepted, and computed. One in ``computed``, on which a
+    process works now, is running.
     """
     try:
         if path.exists():
@@ -32,17 +38,12 @@ def open_queue(
             _adopt(jobs, store)
             return jobs
     except QueueLost as error:
-        damaged = path.with_name(f"{path.name}.damaged")
-        log.error("%s: kept as %s, and made again from the studies", error, damaged.name)
-        if damaged.is_dir():
-            shutil.rmtree(damaged)
-        damaged.unlink(missing_ok=True)
-        path.replace(damaged)
+        store.put_aside(path, str(error.__cause__), "it is made again from the studies")
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)
     jobs = Jobs(part)
-    for file in sorted(store.directory.glob("studies/*/study.json")):
-        _find(file, jobs, store)
+    for study_id in _ids(store):
+        _add(study_id, jobs, store)
     jobs.resume(computed)
     # A journal of the lost file would be applied to the new one.
     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
@@ -50,26 +51,76 @@ def open_queue(
     return Jobs(path, longest)
 
 
+def _ids(store: Store) -> list[str]:
+    return [path.parent.name for path in sorted(store.directory.glob("studies/*/study.json"))]
+
+
 def _adopt(jobs: Jobs, store: Store) -> None:
     """Add the studies to the queue that ``residua run`` has computed in this directory."""
-    for file in sorted(store.directory.glob("studies/*/study.json")):
-        study_id = file.parent.name
+    for study_id in _ids(store):
         try:
             jobs.get(study_id)
         except NotFound:
-            if is_id(study_id) and store.outcomes(study_id):
-                _find(file, jobs, store)
+            if is_id(study_id) and store.dataset_path(study_id).exists():
+                _add(study_id, jobs, store, begun=False)
 
 
-def _find(file: Path, jobs: Jobs, store: Store) -> None:
-    """Add a study of the directory to the queue, if this version of the solver accepts it."""
+def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
+    """Add a study of the directory to the queue, if this version of the solver accepts it.
+
+    One that the service has ``begun`` has ended if its data set is there, and all runs in it.
+    Another one, which nobody asked the service to compute, is added with its data set alone.
+    """
     try:
-        study = Study.known(json.loads(file.read_text(encoding="utf-8")), store.scene)
-    except (OSError, ValueError) as error:  # StudyError is a ValueError
-        log.warning("studies/%s: not restored: %s", file.parent.name, error)
+        study = store.study(study_id)
+    except FileDamaged:  # the store has told it
         return
-    if study.id != file.parent.name:
+    except ValueError as error:  # StudyError is one
+        if getattr(error, "value", None) != study_id:  # that is of another version of the solver
+            log.warning("studies/%s: not restored: %s", study_id, error)
+        return
+    counts = store.outcomes(study.id)
+    if not (counts or begun):
         return
     jobs.accept(study.id, study.to_dict(), study.run_ids())
-    if counts := store.outcomes(study.id):
+    there = sum(store.run_path(run).is_file() for run in study.run_ids()) if begun else study.size
+    if counts and there >= counts.total() - counts[MISSING]:
         jobs.finish(study.id, *verdict(counts), standing=StudyState.ACCEPTED)
+
+
+class Mender:
+    """Looks after queue, catalogue and studies: what is lost or damaged is made again, unasked.
+
+    Parameters
+    ----------
+    jobs, store : the queue and the store
+    """
+
+    def __init__(self, jobs: Jobs, store: Store) -> None:
+        self.jobs, self.store = jobs, store
+        self._seen: dict[Path, tuple[State | None, float]] = {}
+
+    def look(self, computed: Collection[str]) -> None:
+        """Look at all; a study in ``computed``, on which a process works, keeps its definition."""
+        self._look_at(self.jobs, lambda: self._mend_queue(computed))
+        self._look_at(self.store.catalogue, self.store.reconcile)
+        for study_id in computed:
+            with suppress(Conflict, NotFound):
+                self.store.save_definition(study_id, self.jobs.study(study_id))
+
+    def _look_at(self, file: Database, mend: Callable[[], None]) -> None:
+        """Mend a file if it has changed, is missing, or damage was found in it."""
+        state, began = state_of(file.path), time.monotonic()
+        seen, due = self._seen.get(file.path, (None, 0.0))
+        if file.damaged or state is None or (state != seen and began >= due):
+            mend()
+            now = time.monotonic()
+            self._seen[file.path] = state, now + REST * (now - began)
+
+    def _mend_queue(self, computed: Collection[str]) -> None:
+        try:
+            self.jobs.check()
+        except QueueLost:
+            open_queue(self.jobs.path, self.store, self.jobs.longest, computed)
+            self.jobs.damaged = False
+            log.warning("%s has been made again from the studies", self.jobs.path.name)

@@ -9,7 +9,6 @@ Deleting it again, or a retry, completes the work.
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import shutil
 import sqlite3
@@ -21,7 +20,8 @@ from pathlib import Path
 
 from service.errors import Conflict, NotFound
 from service.jobs import Jobs
-from studies import Store, Study
+from studies import FileDamaged, Store
+from studies.scenes.description import Description
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +42,7 @@ class Keeper:
     computes : (study id) -> whether a process may still work on it
     days, size : age [days] and total size [bytes] beyond which studies that have ended are deleted,
         the oldest first; None for no limit
+    scenes : largest size of all posted scenes [bytes]; None for no limit
     """
 
     jobs: Jobs
@@ -49,6 +50,7 @@ class Keeper:
     computes: Callable[[str], bool]
     days: float | None = None
     size: int | None = None
+    scenes: int | None = None
 
     def delete_run(self, run_id: str) -> None:
         """Delete a run; raise `Conflict` if a waiting or running study needs it."""
@@ -62,6 +64,30 @@ class Keeper:
                     needed = f"the study {user['id']} needs this run"
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
+
+    def keep_scene(self, scene_id: str, description: Description) -> bool:
+        """Store a posted scene; return whether it is new.
+
+        Raises
+        ------
+        Conflict
+            If all posted scenes would take more than is allowed.
+        """
+        if self.store.scene(scene_id, whole=False) is None:
+            given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
+            taken = size(self.store.directory / "scenes") + given
+            if self.scenes is not None and taken > self.scenes:
+                allowed = f"at most {self.scenes} are allowed: delete some"
+                raise Conflict(f"the posted scenes would take {taken} bytes, {allowed}")
+        return self.store.keep_scene(scene_id, description)
+
+    def delete_scene(self, scene_id: str) -> None:
+        """Delete a posted scene; raise `Conflict` if a study in the queue names it."""
+        with self.jobs.transaction() as queue:
+            user = queue.execute("SELECT id FROM job WHERE scene = ?", (scene_id,)).fetchone()
+            if user:
+                raise Conflict(f"the study {user['id']} needs this scene: delete it first")
+            self.store.discard_scene(scene_id)
 
     def purge(self, study_id: str) -> int:
         """Delete a study, its data set, and those of its runs that no other study needs.
@@ -167,12 +193,9 @@ class Keeper:
             known = {row["id"] for row in queue.execute("SELECT id FROM job")}
         needed: set[str] = set()
         for path in (self.store.directory / "studies").glob("*/study.json"):
-            with suppress(ValueError, OSError):
+            with suppress(FileDamaged, ValueError):
                 if path.parent.name not in known:
-                    content = json.loads(path.read_text(encoding="utf-8"))
-                    study = Study.known(content, self.store.scene)
-                    if study.id == path.parent.name:
-                        needed.update(study.run_ids())
+                    needed.update(self.store.study(path.parent.name).run_ids())
         return needed
 
 

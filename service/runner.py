@@ -22,7 +22,7 @@ from service.jobs import Jobs
 from service.pool import Pool, PoolAway
 from service.processes import Starter
 from service.settings import Settings
-from studies.errors import StoreFull, without_folders
+from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable, without_folders
 
 log = logging.getLogger(__name__)
 
@@ -73,14 +73,14 @@ class Runner:
     settings, jobs : settings of the service, and its queue
     pool : the workers, and the lock of the store
     starter : starts the child processes
-    restore : (ids of the studies being computed) -> makes a missing or damaged queue again
+    mend : (ids of the studies being computed) -> makes again what is lost of queue and catalogue
     """
 
     settings: Settings
     jobs: Jobs
     pool: Pool
     starter: Starter
-    restore: Callable[[list[str]], Jobs]
+    mend: Callable[[list[str]], None]
     _stopping: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
     _studies: dict[str, asyncio.Task[None]] = field(default_factory=dict)
@@ -109,6 +109,7 @@ class Runner:
         while not self._stopping.is_set():
             pause = self.settings.poll_seconds
             try:
+                await asyncio.to_thread(self.mend, list(self._studies))
                 if await self._next():
                     continue
                 idle = 0.0 if self._studies else idle + pause
@@ -117,12 +118,10 @@ class Runner:
                 if idle >= READY_SECONDS:
                     await asyncio.gather(self.pool.prepare(), self.starter.prepare())
                 trouble = ""
-            except (QueueLost, StoreFull, OSError) as error:
+            except (CatalogueDamaged, QueueLost, StoreBusy, StoreFull, Unusable, OSError) as error:
                 if trouble != (trouble := str(error)):  # log it only once
                     log.error("no study can be begun: %s", trouble)
-                if isinstance(error, QueueLost):
-                    await self._restore()
-                pause *= 10
+                pause *= 1 if isinstance(error, QueueLost) else 10
             except Exception:
                 log.exception("no study can be begun; trying again")
                 pause *= 10
@@ -147,12 +146,6 @@ class Runner:
             return False
         self._studies[job.id] = asyncio.create_task(self._carry_out(job))
         return True
-
-    async def _restore(self) -> None:
-        try:
-            await asyncio.to_thread(self.restore, list(self._studies))
-        except Exception as error:  # of the disk, or of the files on it
-            log.error("the queue cannot be made again: %s", error)
 
     async def _carry_out(self, job: Job) -> None:
         """Compute a study; if its end cannot be written, it is tried again a little later."""

@@ -167,6 +167,7 @@ class Health(BaseModel):
     status: Literal["ready", "waiting", "failing"]
     data_writable: bool | None = Field(default=None, description="for callers with a key")
     queue_readable: bool | None = Field(default=None, description="for callers with a key")
+    catalogue_readable: bool | None = Field(default=None, description="for callers with a key")
     executor_alive: bool | None = Field(default=None, description="for callers with a key")
     waiting: dict[str, str] | None = Field(
         default=None, description="running studies that wait, and what for; with a key"

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from itertools import chain
 from typing import Any
 
 from service.schemas import RunFilter, Window
-from solver.scenes import Scene
-from studies import StudyError
+from studies import Store, StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
 from studies.errors import one_of
 from studies.scenes.registry import built_in, known_names, scene_named
-from studies.storage.shelf import newest
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""
@@ -25,13 +23,13 @@ PLAIN = ("scene", "status", *Window.model_fields)
 """Names in a query that are not parameters of scenes."""
 
 
-def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
+def conditions(which: RunFilter, store: Store) -> dict[str, Any]:
     """Return the arguments of `Catalogue.runs` for a query.
 
     Parameters
     ----------
     which : the query
-    directory : directory of the store, which may have posted scenes
+    store : the store, which may have posted scenes
 
     Raises
     ------
@@ -40,23 +38,25 @@ def conditions(which: RunFilter, directory: Path) -> dict[str, Any]:
     """
     if which.status not in (None, *OUTCOMES):
         raise StudyError("status", which.status, one_of(which.status, OUTCOMES))
-    posted = newest(directory, KEPT)
-    scenes: list[Scene] = [*built_in(), *posted]
-    if which.scene is not None:
-        own = [scene for scene in posted if scene.name == which.scene]
-        names = [*known_names(), *(scene.name for scene in posted)]
-        if which.scene not in names:
-            raise StudyError("scene", which.scene, one_of(which.scene, names))
-        scenes = [*own] or [scene_named(which.scene)]
-    known: dict[str, list[Parameter]] = {}
-    for scene in scenes:
-        for name, parameter in parameters_of(scene).items():
-            known.setdefault(name, []).append(parameter)
+    posted = store.scenes(KEPT, name=which.scene)
+    if which.scene is None:
+        scenes = built_in()
+    elif posted:
+        scenes = []
+    elif which.scene in known_names():
+        scenes = [scene_named(which.scene)]
+    else:
+        names = [*known_names(), *(each.name for each in store.scenes(KEPT))]
+        raise StudyError("scene", which.scene, one_of(which.scene, names))
     requested = which.model_dump(exclude_none=True)
     for name in requested.keys() - {*PLAIN}:
-        if name not in known:
-            raise StudyError(name, requested[name], one_of(name, (*PLAIN, *known)))
-        requested[name] = _value(name, requested[name], known[name])
+        read = [store.scene(each.id, whole=False) for each in posted if name in each.parameters]
+        known = [parameters_of(scene) for scene in (*scenes, *filter(None, read))]
+        if not any(name in each for each in known):
+            names = [*PLAIN, *chain(*known, *(each.parameters for each in posted))]
+            raise StudyError(name, requested[name], one_of(name, names))
+        fitting = [each[name] for each in known if name in each]
+        requested[name] = _value(name, requested[name], fitting)
     return requested
 
 

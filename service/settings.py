@@ -61,6 +61,11 @@ class Settings(BaseSettings):
     max_scene_bytes: int = Field(
         default=20_000_000, ge=1, description="largest scene file with its meshes"
     )
+    max_scenes_bytes: int = Field(
+        default=10_000_000_000,
+        ge=0,
+        description="size of all posted scenes above which none is kept",
+    )
     connections: int = Field(default=500, ge=1, description="most connections at a time")
     arrival_seconds: float = Field(
         default=20.0, gt=0, description="time in which a request, head and body, must arrive"

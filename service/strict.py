@@ -10,6 +10,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
 from studies import StudyError
+from studies.toml import DEEPEST, too_deep
 
 
 class StrictRequest(Request):
@@ -17,7 +18,10 @@ class StrictRequest(Request):
 
     async def json(self) -> Any:
         """Return the body, read as JSON."""
-        return json.loads(await self.body(), object_pairs_hook=_distinct)
+        content = json.loads(await self.body(), object_pairs_hook=_distinct)
+        if too_deep(content):
+            raise StudyError("body", None, f"must have lists and objects at most {DEEPEST} deep")
+        return content
 
 
 class StrictRoute(APIRoute):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from studies.errors import (
     CatalogueDamaged,
+    FileDamaged,
     GridLost,
-    RunUnreadable,
     StoreBusy,
     StoreFull,
     StudyError,
@@ -57,10 +57,10 @@ __all__ = [
     "Case",
     "CatalogueDamaged",
     "Estimate",
+    "FileDamaged",
     "GridLost",
     "Limits",
     "LoadingPath",
-    "RunUnreadable",
     "Store",
     "StoreBusy",
     "StoreFull",

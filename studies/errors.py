@@ -6,8 +6,19 @@ import difflib
 import re
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any
+
+MOST_MISTAKES, MOST_NAMES, COMPARED = 20, 10, 500
+"""Number of mistakes and of names that a message lists, and of names compared with a wrong one."""
+
+LONGEST_FIELD, LONGEST_TEXT = 200, 2000
+"""Number of characters of a field, and of what is allowed, in a message."""
+
+
+def cut(text: str, longest: int) -> str:
+    """Return a text, or its beginning of this length."""
+    return text if len(text) <= longest else f"{text[:longest]}…"
 
 
 class StudyError(ValueError):
@@ -22,6 +33,7 @@ class StudyError(ValueError):
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
         field = field.encode("utf-8", "backslashreplace").decode()  # JSON may hold lone surrogates
+        field, allowed = cut(field, LONGEST_FIELD), cut(allowed, LONGEST_TEXT)
         super().__init__(f"{field} = {reprlib.repr(value)}: {allowed}")
         self.field = field
         self.value = value
@@ -32,23 +44,35 @@ class StudyError(ValueError):
 
 
 class SceneError(StudyError):
-    """A scene file with mistakes: all of them, each with its field, value and what is allowed.
+    """A scene file with mistakes: the first 20 of them, each with field, value, what is allowed.
 
     Parameters
     ----------
     name : of the file
     mistakes : one or more
+    count : number of all mistakes, if there are more
     """
 
-    def __init__(self, name: str, mistakes: Sequence[StudyError]) -> None:
-        count = f"{len(mistakes)} mistakes" if len(mistakes) > 1 else "a mistake"
-        listed = "".join(f"\n  {each}" for each in mistakes)
-        super().__init__("scene", name, f"has {count}:{listed}")
+    def __init__(self, name: str, mistakes: Sequence[StudyError], count: int = 0) -> None:
         self.name = name
-        self.mistakes = tuple(mistakes)
+        self.mistakes = tuple(mistakes[:MOST_MISTAKES])
+        self.count = max(count, len(mistakes))
+        ValueError.__init__(self, name)
+        self.field, self.value = "scene", name
+        number = f"{self.count} mistakes" if self.count > 1 else "a mistake"
+        self.allowed = f"has {number}:" + "".join(f"\n  {each}" for each in self.listed)
 
-    def __reduce__(self) -> tuple[type[SceneError], tuple[str, tuple[StudyError, ...]]]:  # type: ignore[override]
-        return type(self), (self.name, self.mistakes)
+    def __str__(self) -> str:
+        return f"scene = {self.name!r}: {self.allowed}"
+
+    @property
+    def listed(self) -> list[str]:
+        """The mistakes as text; the last one tells how many more there are."""
+        more = self.count - len(self.mistakes)
+        return [*map(str, self.mistakes), *([f"and {more} more"] if more else [])]
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[str, tuple[StudyError, ...], int]]:  # type: ignore[override]
+        return type(self), (self.name, self.mistakes, self.count)
 
 
 class Unusable(StudyError):
@@ -75,22 +99,25 @@ class StoreFull(RuntimeError):
         return f"no room is left in {self.directory}"
 
 
-class RunUnreadable(RuntimeError):
-    """The file of a run is absent, damaged, or not the file of this run.
+class FileDamaged(RuntimeError):
+    """A stored file is absent, damaged, or another one than its name says.
 
     Parameters
     ----------
-    run_id : of the run
-    reason : what is wrong with its file
+    path : of the file
+    name : what it should be, such as ``run <id>``
+    reason : what is wrong with it
+    state : of the file that was read, see `studies.storage.seal.state_of`; None if it is absent
     """
 
-    def __init__(self, run_id: str, reason: str) -> None:
-        super().__init__(run_id, reason)
-        self.run_id = run_id
-        self.reason = reason
+    def __init__(
+        self, path: Path, name: str, reason: str, state: tuple[int, ...] | None = None
+    ) -> None:
+        super().__init__(path, name, reason, state)
+        self.path, self.name, self.reason, self.state = path, name, reason, state
 
     def __str__(self) -> str:
-        return f"run {self.run_id} cannot be read: {self.reason}"
+        return f"{self.name} cannot be read: {self.reason}"
 
 
 class FileDiffers(RuntimeError):
@@ -124,13 +151,16 @@ class GridLost(ConnectionError):
 def one_of(name: Any, names: Iterable[str]) -> str:
     """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
     known = list(dict.fromkeys(names))
-    return f"must be one of {', '.join(known) or '(there is none)'}{nearest(name, known)}"
+    listed = ", ".join(cut(each, LONGEST_FIELD) for each in known[:MOST_NAMES])
+    more = len(known) - MOST_NAMES
+    listed += f" and {more} more" if more > 0 else ""
+    return f"must be one of {listed or '(there is none)'}{nearest(name, known)}"
 
 
 def nearest(name: Any, names: Iterable[str]) -> str:
     """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
-    matches = difflib.get_close_matches(str(name), list(names), n=1)
-    return f"; did you mean {matches[0]}?" if matches else ""
+    matches = difflib.get_close_matches(str(name), list(names)[:COMPARED], n=1)
+    return f"; did you mean {cut(matches[0], LONGEST_FIELD)}?" if matches else ""
 
 
 _PATH = re.compile(r"""(?<![^\s'"(\[<=,])(?:(?<=')/[^']+|(?<=")/[^"]+|/[\w.][^\s'",;:)\]>]*)""")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import stat
 import tomllib
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from studies.errors import StudyError
 
 LARGEST = 50_000_000
 """Largest size of a file that a user names [bytes]."""
+
+DEEPEST = 50
+"""Largest number of tables and lists inside one another."""
 
 
 def read_bytes(path: Path | str, field: str) -> bytes:
@@ -32,6 +36,16 @@ def read_bytes(path: Path | str, field: str) -> bytes:
         return Path(path).read_bytes()
     except OSError as error:
         raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
+
+
+def too_deep(content: Any) -> bool:
+    """Whether lists and tables are more than `DEEPEST` inside one another."""
+    level = [content]
+    for _ in range(DEEPEST + 1):
+        level = [each for each in level if isinstance(each, dict | list)]
+        inside = (each.values() if isinstance(each, dict) else each for each in level)
+        level = list(chain.from_iterable(inside))
+    return bool(level)
 
 
 def read_toml(path: Path | str, field: str) -> dict[str, Any]:
@@ -93,6 +107,8 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
     """
     try:
         tables = tomllib.loads(data.decode("utf-8-sig"))
+        if too_deep(tables):
+            raise ValueError(f"it has tables or lists more than {DEEPEST} deep")
         plain: dict[str, Any] = json.loads(json.dumps(tables, default=str))
     except (ValueError, RecursionError) as error:
         raise StudyError(field, name, f"must be valid TOML: {error}") from None

@@ -7,17 +7,20 @@ from typing import Literal
 
 from fastapi import APIRouter, Response
 
-from service.dependencies import TheCaller, TheJobs, TheProbe, TheRunner, TheSettings
+from service.dependencies import TheCaller, TheJobs, TheProbe, TheRunner, TheStore
 from service.schemas import Health
 
 router = APIRouter(tags=["health"])
 
 
+WELL = ("data_writable", "queue_readable", "catalogue_readable", "executor_alive")
+
+
 @router.get("/health", responses={503: {"model": Health}}, response_model_exclude_unset=True)
 async def health(
-    settings: TheSettings,
     runner: TheRunner,
     jobs: TheJobs,
+    store: TheStore,
     probe: TheProbe,
     caller: TheCaller,
     response: Response,
@@ -26,19 +29,11 @@ async def health(
 
     Without a key, where keys are required, the answer is the status alone.
     """
-    writable, waiting = await probe.check(settings.data, jobs)
-    ready = writable and waiting is not None and runner.alive
-    if not ready:
-        response.status_code = HTTPStatus.SERVICE_UNAVAILABLE
-    status: Literal["ready", "waiting", "failing"] = "waiting" if waiting else "ready"
-    if not ready:
-        status = "failing"
+    found = await probe.check(store, jobs) | {"executor_alive": runner.alive}
+    well = {name: found.get(name, False) for name in WELL}
+    status: Literal["ready", "waiting", "failing"] = "waiting" if found.get("waiting") else "ready"
+    if not all(well.values()):
+        response.status_code, status = HTTPStatus.SERVICE_UNAVAILABLE, "failing"
     if caller is None:
         return Health(status=status)
-    return Health(
-        status=status,
-        data_writable=writable,
-        queue_readable=waiting is not None,
-        executor_alive=runner.alive,
-        waiting=waiting or {},
-    )
+    return Health(status=status, waiting=found.get("waiting", {}), **well)

@@ -20,7 +20,6 @@ from service.schemas import MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
 from solver.results.export import vtu_of
 from studies import StudyError
-from studies.storage.runfile import verify
 from studies.storage.ugrid import read
 
 VTU = "application/xml"
@@ -43,14 +42,13 @@ def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
 
     Beside the queries named below, every parameter of the scenes is one: `?traction=0.75`.
     """
-    rows, total = store.catalogue.runs(**conditions(which, store.directory))
+    rows, total = store.catalogue.runs(**conditions(which, store))
     return RunPage(total=total, items=[Run(**row) for row in rows])
 
 
 @router.get("/{run_id}.nc", responses=NETCDF)
 def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     """Return the data set of a run."""
-    verify(store.run_path(run["id"]))
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
 
 
@@ -62,9 +60,7 @@ def fetch_mesh(run: TheRun, store: TheStore, stage: str | None = None) -> Respon
     """
     from studies import open_netcdf  # xarray takes half a second to import
 
-    path = store.run_path(run["id"])
-    verify(path)
-    with open_netcdf(path) as dataset:
+    with open_netcdf(store.run_path(run["id"])) as dataset:
         fields = read(dataset)
     if stage is not None and stage not in fields.stages:
         raise StudyError("stage", stage, f"must be one of {', '.join(fields.stages)}")

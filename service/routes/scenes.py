@@ -6,16 +6,14 @@ import asyncio
 from http import HTTPStatus
 from typing import Annotated, Any
 
-from fastapi import APIRouter, File, Request, Response, UploadFile
+from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
-from service.dependencies import TheInspector, TheStore
+from service.dependencies import TheInspector, TheKeeper, TheStore
 from service.errors import REFUSED, NotFound
-from service.schemas import KeptScene, SceneSummary
-from solver.scenes import Scene
+from service.schemas import ContentId, KeptScene, SceneSummary, Window
 from studies import StudyError, scene_schema
-from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes, scene_named
-from studies.storage.shelf import newest
+from studies.scenes.scene import FileScene
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
@@ -24,18 +22,19 @@ FIRST_WORDS = (
     "were first posted"
 )
 
-LISTED = 100
-"""Number of posted scenes that are listed, the newest first."""
-
 
 @router.get("")
-def list_scenes(store: TheStore) -> list[SceneSummary]:
+def list_scenes(which: Annotated[Window, Query()], store: TheStore) -> list[SceneSummary]:
     """List the scenes: those of the product, of installed packages, then the latest posted ones."""
-    listed: list[tuple[str | None, Scene]] = [(None, scene) for scene in known_scenes()]
-    listed += [(scene.id, scene) for scene in newest(store.directory, LISTED)]
-    return [
-        SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch, id=scene_id)
-        for scene_id, scene in listed
+    known = [*known_scenes()]
+    shown = [
+        SceneSummary(name=scene.name, summary=scene.summary, branch=scene.branch)
+        for scene in known[which.offset : which.offset + which.limit]
+    ]
+    posted = store.scenes(which.limit - len(shown), max(which.offset - len(known), 0))
+    return shown + [
+        SceneSummary(name=each.name, summary=each.summary, branch=each.branch, id=each.id)
+        for each in posted
     ]
 
 
@@ -43,6 +42,7 @@ def list_scenes(store: TheStore) -> list[SceneSummary]:
 async def post_scene(
     scene: Annotated[UploadFile, File(description="a scene file, in TOML")],
     inspector: TheInspector,
+    keeper: TheKeeper,
     store: TheStore,
     request: Request,
     response: Response,
@@ -62,15 +62,14 @@ async def post_scene(
         if not each.filename or each.filename in files:
             raise StudyError("meshes", each.filename, "must have file names of their own")
         files[each.filename] = await each.read()
-    found = await inspector.inspect(await scene.read(), files)
-    known = await asyncio.to_thread(_kept, store, found.id)
-    await asyncio.to_thread(store.save_scene, found)
-    kept = known or found
-    if known:
+    found, content = await inspector.inspect(await scene.read(), files)
+    known = await asyncio.to_thread(store.scene, found.id, whole=False)
+    if not await asyncio.to_thread(keeper.keep_scene, found.id, content):
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
-    note = FIRST_WORDS if kept.description.content != found.description.content else ""
-    return KeptScene(id=kept.id, name=kept.name, summary=kept.summary, note=note)
+    if not isinstance(known, FileScene) or known.description.content == content.content:
+        return found
+    return KeptScene(id=found.id, name=known.name, summary=known.summary, note=FIRST_WORDS)
 
 
 @router.get("/{name}")
@@ -79,18 +78,17 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
     `name` is that of a scene, or the id of a posted one.
     """
-    kept = _kept(store, name) if is_id(name) else None
-    if kept:
-        entry = {"id": kept.id, "name": kept.name, "summary": kept.summary}
+    if kept := store.scene(name, whole=False):
+        entry = {"id": name, "name": kept.name, "summary": kept.summary}
         return scene_schema(kept) | entry
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
     return scene_schema(scene_named(name))
 
 
-def _kept(store: TheStore, scene_id: str) -> Any:
-    """Return a posted scene; None where it is not kept, or cannot be read any more."""
-    try:
-        return store.scene(scene_id)
-    except StudyError:
-        return None
+@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)
+def delete_scene(name: ContentId, keeper: TheKeeper, store: TheStore) -> None:
+    """Delete a posted scene that no study names; `name` is its id."""
+    if store.scene(name, whole=False) is None:
+        raise NotFound(f"no posted scene has the id {name}")
+    keeper.delete_scene(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -24,12 +25,13 @@ from service.dependencies import (
     TheSettings,
     TheStore,
 )
-from service.errors import REFUSED, NotFound, QueueLost
+from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, netcdf
+from service.job import StudyState
 from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
 from service.strict import StrictRoute
 from studies import Study, StudyError
-from studies.errors import StoreFull
+from studies.errors import FileDamaged, StoreFull
 
 log = logging.getLogger(__name__)
 
@@ -133,11 +135,11 @@ def retry(study_id: ContentId, jobs: TheJobs) -> StudySummary:
 
 @router.get("/{study_id}/events", response_class=EventSourceResponse)
 async def events(
-    job: TheJob, jobs: TheJobs, runner: TheRunner, settings: TheSettings
+    job: TheJob, jobs: TheJobs, runner: TheRunner, settings: TheSettings, request: Request
 ) -> AsyncIterator[ServerSentEvent]:
-    """Send where a study stands at every change, until its end."""
+    """Send where a study stands at every change, until its end or that of the caller's key."""
     shown: StudySummary | None = None
-    while runner.alive:
+    while runner.alive and await request.state.admitted():
         now = shown
         try:
             now = overview.summary(await asyncio.to_thread(jobs.get, job.id))
@@ -154,11 +156,16 @@ async def events(
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
-def dataset(job: TheJob, store: TheStore) -> FileResponse:
+def dataset(job: TheJob, jobs: TheJobs, store: TheStore) -> FileResponse:
     """Return the combined data set of a study, as its last end left it."""
-    path = store.dataset_path(job.id)
-    if not path.is_file():
-        raise NotFound(
-            f"no data set yet: it is written when the work ends, and the study is {job.state}"
-        )
-    return netcdf(path, f"{job.name}.nc")
+    try:
+        return netcdf(store.dataset(job.id), f"{job.name}.nc")
+    except FileDamaged as error:
+        held = error.state is not None or job.state is StudyState.SUCCESSFUL
+    if held and job.state.final and job.state is not StudyState.DISMISSED:
+        with suppress(Conflict):
+            jobs.retry(job.id, failed=False)
+        raise Busy("the data set was lost or damaged, and is made again from the runs: ask later")
+    raise NotFound(
+        f"no data set yet: it is written when the work ends, and the study is {job.state}"
+    )

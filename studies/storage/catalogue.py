@@ -10,15 +10,15 @@ has no checksums, so each row has its own.
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
+from studies.errors import CatalogueDamaged, StoreBusy
+from studies.storage.database import Database, WrongContent, check
 
 _COLUMNS = (
     "id", "scene", "status", "message", "parameters", "scalars", "path", "created",
@@ -26,8 +26,6 @@ _COLUMNS = (
 )  # fmt: skip
 _ALL = ", ".join((*_COLUMNS, "checksum"))
 _JSON = ("parameters", "scalars")
-_WAIT = 30.0
-"""Seconds a connection waits for another one's lock."""
 
 _TABLE = """runs (
     id TEXT PRIMARY KEY, scene TEXT NOT NULL, status TEXT NOT NULL, message TEXT NOT NULL,
@@ -40,7 +38,7 @@ _INDICES = {"runs_by_time": "created, id", "runs_by_scene": "scene, status"}
 Row = dict[str, Any]
 
 
-class Catalogue:
+class Catalogue(Database):
     """Rows of runs in an SQLite file.
 
     Every method raises `CatalogueDamaged` if the file is damaged, `StoreFull` if the disk is full,
@@ -49,14 +47,13 @@ class Catalogue:
     Parameters
     ----------
     path : the file; the first write creates it
+    of : directory of the files it lists: where there are some, a missing catalogue is damage
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def run(self, run_id: str) -> Row | None:
-        """Return the row of one run, or None."""
-        return self.rows([run_id]).get(run_id)
+    def __init__(self, path: Path, of: Path | None = None) -> None:
+        again = "it is made again by the service, or when a study is computed here"
+        super().__init__(path, lambda reason: CatalogueDamaged(f"{reason}; {again}"), StoreBusy)
+        self.of = of
 
     def runs(
         self,
@@ -133,19 +130,6 @@ class Catalogue:
                 [*(f"$.{name}" for name in names), scene, status, limit],
             ).fetchall()
 
-    def changes(self) -> tuple[int, int]:
-        """Return a value that changes with every change of the catalogue: file and change counter.
-
-        SQLite counts the transactions in the head of its file: https://sqlite.org/fileformat.html,
-        section 1.3.7.
-        """
-        try:
-            with self.path.open("rb") as file:
-                file.seek(24)
-                return os.fstat(file.fileno()).st_ino, int.from_bytes(file.read(4))
-        except OSError:
-            return 0, 0
-
     def put(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Insert or replace rows in one transaction."""
         marks = ", ".join("?" for _ in (*_COLUMNS, "checksum"))
@@ -158,29 +142,21 @@ class Catalogue:
         with self._writing() as connection:
             connection.executemany("DELETE FROM runs WHERE id = ?", [[each] for each in run_ids])
 
-    def ids(self) -> set[str]:
-        """Return the ids of all runs."""
-        with self._reading() as connection:
-            return {row[0] for row in connection.execute("SELECT id FROM runs")}
-
     def stamps(self) -> dict[str, tuple[int | None, int | None]]:
         """Return, by id, the recorded length and time of change [ns] of each run's file.
 
         The whole catalogue is read and compared with its checksums, which detects damage.
         """
         with self._reading() as connection:
-            for (finding,) in connection.execute("PRAGMA integrity_check(1)"):
-                if finding != "ok":
-                    raise CatalogueDamaged(f"{self.path.name} is damaged: {finding}")
+            check(connection)
             every = map(_values, connection.execute(f"SELECT {_ALL} FROM runs"))
             return {values[0]: (values[-2], values[-1]) for values in every}
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
         """Give a connection that sees one state; without a file the table is empty."""
-        there = self.path.exists()
-        address = f"{self.path.resolve().as_uri()}?mode=rw" if there else ":memory:"
-        with self._connection(address, "BEGIN") as connection:
+        mode = "rw" if self.path.exists() else "memory"
+        with self.connection("BEGIN", mode) as connection:
             if not self._made(connection):
                 connection.execute(f"CREATE TEMP TABLE {_TABLE}")
             yield connection
@@ -188,8 +164,7 @@ class Catalogue:
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """Give a connection for one transaction, which creates the table if needed."""
-        address = self.path.resolve().as_uri()
-        with self._connection(address, "BEGIN IMMEDIATE") as connection, connection:
+        with self.connection("BEGIN IMMEDIATE", "rwc") as connection:
             if not self._made(connection):
                 connection.execute(f"CREATE TABLE {_TABLE}")
             for name, columns in _INDICES.items():
@@ -197,43 +172,13 @@ class Catalogue:
             yield connection
 
     def _made(self, connection: sqlite3.Connection) -> bool:
-        """Whether there is a table; raise `CatalogueDamaged` for one of another version."""
+        """Whether there is a table; raise `WrongContent` if it is lost, or of another version."""
         found = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         if found and found[0] != f"CREATE TABLE {_TABLE}":
-            raise CatalogueDamaged(f"{self.path.name} has the columns of another version")
+            raise WrongContent("it has the columns of another version")
+        if not found and self.of and any(self.of.glob("*.nc")):
+            raise WrongContent("it is missing")
         return bool(found)
-
-    @contextmanager
-    def _connection(self, address: str, begin: str) -> Iterator[sqlite3.Connection]:
-        try:
-            connection = sqlite3.connect(address, uri=True, timeout=_WAIT, isolation_level=None)
-            with closing(connection):
-                connection.execute(begin)
-                yield connection
-        except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
-            raise  # a programming error, not damage of the file
-        except (sqlite3.DatabaseError, _WrongRow) as error:
-            raise self._translated(error) from error
-
-    def _translated(self, error: Exception) -> Exception:
-        """Return the error of this package for an error of SQLite."""
-        reason = f"{self.path.name} cannot be used: {error}"
-        # A write past a quota or past the allowed size of a file is an I/O error to SQLite.
-        full = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE}
-        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)
-        if code in full:
-            return StoreFull(str(self.path.parent))
-        if code & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
-            return StoreBusy(f"{reason}; another process holds it")
-        # A plain error is unexpected content, such as text that is not JSON.
-        damaged = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR}
-        if code & 0xFF in damaged or self.path.is_dir():
-            return CatalogueDamaged(f"{reason}; it is made again when a study is computed here")
-        return OSError(reason)
-
-
-class _WrongRow(ValueError):
-    """A row does not agree with its checksum."""
 
 
 def _select(connection: sqlite3.Connection, rest: str, values: list[Any]) -> list[Row]:
@@ -258,7 +203,7 @@ def _values(stored: Sequence[Any]) -> list[Any]:
     """Return the values of a row that agree with their checksum."""
     *values, checksum = stored
     if _checksum(values) != checksum:
-        raise _WrongRow(f"the row of run {values[0]!r} is damaged")
+        raise WrongContent(f"the row of run {values[0]!r} is damaged")
     return values
 
 

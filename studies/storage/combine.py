@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import h5netcdf
@@ -13,8 +14,9 @@ from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, SYMMETRIC
-from studies.errors import RunUnreadable
+from studies.errors import FileDamaged
 from studies.storage import dataset as layout
+from studies.storage import seal
 from studies.storage.appearing import appearing
 from studies.storage.frame import Frame
 from studies.storage.held import Combined
@@ -41,8 +43,8 @@ def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
         found = {key: at for key, at in places.items() if store.run_path(key).exists()}
         try:
             return _combined(study, store, found, [key for key in places if key not in found])
-        except RunUnreadable as error:  # the data set has parts of it: begin again
-            store.set_aside(error)
+        except FileDamaged as error:  # the data set has parts of it: begin again
+            store.set_aside(error, "the run will be computed again")
 
 
 def _combined(
@@ -68,20 +70,24 @@ def _combined(
             if SYMMETRIC in run.attrs:  # a run without a record lacks it
                 halves.add(int(run.attrs[SYMMETRIC].item()))
     attrs = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
-    store.clear_directory(target)
-    with needs_room(store.directory), appearing(target) as part, Reservoir(part) as disk:
-        with h5netcdf.File(disk, "w") as file:
-            file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})
-            frame.create_axes(file)
-            frame.create_fields(file)
-            frame.write_small(file)
-        disk.check()
-        with h5py.File(disk, "r+") as file:
-            for run_id, at in places.items():
-                with opened(store.run_path(run_id)) as run:
-                    frame.fill(file, run, at)
-                disk.check()
-        disk.check()
+    attrs |= seal.SEALED
+    with suppress(FileDamaged):
+        store.dataset(study.id)  # a damaged or foreign one is set aside, not lost
+    with needs_room(store.directory), appearing(target) as part:
+        with Reservoir(part) as disk:
+            with h5netcdf.File(disk, "w") as file:
+                file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})
+                frame.create_axes(file)
+                frame.create_fields(file)
+                frame.write_small(file)
+            disk.check()
+            with h5py.File(disk, "r+") as file:
+                for run_id, at in places.items():
+                    with opened(store.run_path(run_id)) as run:
+                        frame.fill(file, run, at)
+                    disk.check()
+            disk.check()
+        seal.seal(part, f"dataset {study.id}")
     counts = Counter([status for status, _ in outcomes.values()] + [MISSING] * len(missing))
     return Combined(
         path=target,

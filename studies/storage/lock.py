@@ -1,38 +1,44 @@
-"""The lock of a directory: one process writes there at a time."""
+"""The lock of a directory: one process computes there at a time, and one service works there."""
 
 from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import time
+from contextlib import suppress
 from pathlib import Path
-from typing import TextIO
 
 from studies.errors import StoreBusy
 
 
-@contextmanager
-def locked(directory: Path, file: TextIO) -> Iterator[None]:
-    """Lock a directory by its lock file, which contains the id of the process.
+def lock(path: Path, busy: str, patience: float = 0.0) -> int:
+    """Return the descriptor of a lock, valid until its last copy is closed.
+
+    Parameters
+    ----------
+    path : the lock file, which contains the id of the process
+    busy : what another one does in the directory, and what helps, for the error
+    patience : how long to wait for another owner of the lock [s]
 
     Raises
     ------
     StoreBusy
-        if another process has the lock; with its process id
+        if the lock is not released; with the id of the process
     """
-    with file:
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    deadline = time.monotonic() + patience
+    while True:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            file.seek(0)
-            number = file.read(20).strip()
+            if time.monotonic() < deadline:
+                time.sleep(0.1)
+                continue
+            number = os.read(descriptor, 20).decode(errors="replace").strip()
+            os.close(descriptor)
             who = f"another process (id {number})" if number.isdecimal() else "another process"
-            raise StoreBusy(
-                f"{directory}: {who} computes here; "
-                "wait until it has ended, or name another directory"
-            ) from None
+            raise StoreBusy(f"{path.parent}: {who} {busy}") from None
         with suppress(OSError):  # a full disk is reported when results are written
-            os.ftruncate(file.fileno(), 0)
-            os.write(file.fileno(), f"{os.getpid()}\n".encode())
-        yield
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, f"{os.getpid()}\n".encode())
+        return descriptor

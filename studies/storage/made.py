@@ -7,9 +7,7 @@ after any change of this project's sources or of the libraries that write and dr
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
-import json
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -17,8 +15,10 @@ from typing import Any
 
 from studies.definition.identity import sources
 from studies.definition.study import Study
+from studies.errors import FileDamaged
 from studies.storage.appearing import appearing
 from studies.storage.room import needs_room
+from studies.storage.seal import content_of, digest, digest_of, sealed_json
 from studies.storage.store import Store
 
 _LIBRARIES = ("h5netcdf", "matplotlib", "xarray")
@@ -35,69 +35,56 @@ class Made:
     def __init__(self, study: Study, store: Store) -> None:
         self._study, self._store = study, store
         self._directory = store.study_directory(study.id)
-        self._file = self._directory / "made.json"
+        self._file, self._name = self._directory / "made.json", f"made {study.id}"
 
     def kept(self, result: str, of: str) -> list[Path] | None:
         """Return the files of a result if it was made of the inputs ``of``, else None."""
         try:
             entry = self._entries()[result]
-            files = {self._directory / name: digest for name, digest in entry["files"].items()}
+            files = {self._directory / name: noted for name, noted in entry["files"].items()}
             same = entry["of"] == self._made_of(of)
         except (AttributeError, KeyError, TypeError):
             return None
-        if same and all(_digest(path) == digest for path, digest in files.items()):
+        if same and all(digest(path) == noted for path, noted in files.items()):
             return list(files)
         return None
 
     def digest(self, name: str) -> str:
         """Return the digest of a file, as an input of other results; empty if it is missing."""
-        return str(_digest(self._directory / name))
+        return digest(self._directory / name)
 
     def note(self, result: str, of: str, names: Iterable[str]) -> None:
         """Record the inputs of files, while no other process writes them."""
-        self._note(result, of, {name: _digest(self._directory / name) for name in names})
+        self._note(result, of, {name: self.digest(name) for name in names})
 
     def write(self, result: str, of: str, contents: Mapping[str, bytes]) -> list[Path]:
         """Write files with these contents, record their inputs, and return their paths."""
         for name, content in contents.items():
             self._write(self._directory / name, content)
-        self._note(result, of, {name: _hex(content) for name, content in contents.items()})
+        self._note(result, of, {name: digest_of(content) for name, content in contents.items()})
         return [self._directory / name for name in contents]
 
-    def _note(self, result: str, of: str, files: Mapping[str, str | None]) -> None:
+    def _note(self, result: str, of: str, files: Mapping[str, str]) -> None:
         entries = self._entries() | {result: {"of": self._made_of(of), "files": files}}
-        self._write(self._file, (json.dumps(entries, indent=2) + "\n").encode())
+        self._write(self._file, sealed_json(self._name, entries))
 
     def _entries(self) -> dict[str, Any]:
         try:
-            content = json.loads(self._file.read_bytes())
-        except (OSError, ValueError):
+            return content_of(self._file, self._name)
+        except FileDamaged as error:
+            self._store.set_aside(error, "what it tells of is made again")
             return {}
-        return content if isinstance(content, dict) else {}
 
     def _write(self, path: Path, content: bytes) -> None:
-        self._store.clear_directory(path)
+        self._store.clear(path)
         with needs_room(self._store.directory), appearing(path) as part:
             part.write_bytes(content)
 
     def _made_of(self, of: str) -> str:
-        return _hex("\n".join([of, *self._makers]).encode())
+        return digest_of("\n".join([of, *self._makers]).encode())
 
     @cached_property
     def _makers(self) -> list[str]:
         """Digests of the sources, and versions of libraries."""
-        found = [_hex(path.read_bytes()) for path in sources(self._study.problem)]
+        found = [digest_of(path.read_bytes()) for path in sources(self._study.problem)]
         return found + [importlib.metadata.version(name) for name in _LIBRARIES]
-
-
-def _digest(path: Path) -> str | None:
-    """Return the digest of a file; None if it cannot be read."""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return None
-
-
-def _hex(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -1,15 +1,7 @@
-"""The file of a run: its last line is a checksum of the whole file, verified at every reading.
-
-The line is after the end of the HDF5 data, so that every netCDF reader can open the file. It covers
-each byte and the id. HDF5's own checksums, which the arrays also have, do not cover names,
-attributes and texts, and HDF5 may end the process when it reads damaged ones.
-"""
+"""The file of a run: a sealed netCDF file, made in memory and checked at every reading."""
 
 from __future__ import annotations
 
-import errno
-import hashlib
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -19,34 +11,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.errors import RunUnreadable, StoreFull
 from studies.storage import dataset as layout
-from studies.storage import ugrid
+from studies.storage import seal, ugrid
 
 if TYPE_CHECKING:
     import h5py
     import netCDF4
 
-SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
-"""Attribute of a file that has the line; an older file has neither."""
-
-_LINE = re.compile(rb"\nrun ([0-9a-f]{32}) sha256 ([0-9a-f]{64})\n")
-_LENGTH = 110
-_DIGEST = 65
-"""Length of the line in bytes; the checksum covers everything before it."""
 _FIRST_BYTES = 1 << 16
 """Initial size of a file in memory, which grows."""
 _ORDER = "variables"
 """Attribute with the names of the variables in order, except those of the mesh; netCDF loses the
 order in memory."""
-_NO_FILE = frozenset({errno.ENOENT, errno.EISDIR, errno.EIO})
 _LOCK = Lock()
 
 
 def sealed(run: layout.RunContent) -> bytes:
-    """Return the content of a run's file: its netCDF, and the last line."""
-    begun = _packed(run) + f"\nrun {run.attrs['id']} sha256 ".encode()
-    return begun + hashlib.sha256(begun).hexdigest().encode() + b"\n"
+    """Return the content of a run's file: its netCDF, and the seal."""
+    return seal.sealed(f"run {run.attrs['id']}", _packed(run))
 
 
 def _packed(run: layout.RunContent) -> bytes:
@@ -57,7 +39,7 @@ def _packed(run: layout.RunContent) -> bytes:
     with _one_writer():
         file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
         try:
-            file.setncatts({**run.attrs, **SEALED, _ORDER: " ".join(order)})
+            file.setncatts({**run.attrs, **seal.SEALED, _ORDER: " ".join(order)})
             for name, variable in run.variables.items():
                 _write(file, str(name), variable)
         finally:
@@ -87,52 +69,19 @@ def _one_writer() -> Iterator[None]:
         yield
 
 
-def verify(path: Path) -> bool:
-    """Verify the checksum of a file; return False for an older file without one.
-
-    Raises
-    ------
-    RunUnreadable
-        if the file is missing, damaged, or that of another run
-    """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        if error.errno not in _NO_FILE:
-            raise
-        raise RunUnreadable(path.stem, str(error.strerror)) from None
-    line = _LINE.fullmatch(content, max(len(content) - _LENGTH, 0))
-    if line is None:
-        if SEALED["checksum"].encode() in content:
-            raise RunUnreadable(path.stem, "its end is damaged")
-        return False
-    whole = hashlib.sha256(memoryview(content)[:-_DIGEST]).hexdigest()
-    if whole.encode() != line[2]:
-        raise RunUnreadable(path.stem, "its checksum is wrong")
-    _compare(line[1].decode(), path)
-    return True
+def verify(path: Path) -> None:
+    """Raise `FileDamaged` if a file is missing, damaged, or not the run of its name."""
+    seal.check(path, f"run {path.stem}")
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """Give the file of a run, verified and open.
-
-    An error while a file without checksum is read counts as damage of that file. An error with a
-    verified file does not.
-    """
+    """Give the file of a run, verified and open."""
     import h5py
 
-    vouched = verify(path)
-    try:
-        with h5py.File(path, "r") as run:
-            _compare(_text(run.attrs["id"]), path)
-            yield run
-    except (MemoryError, RunUnreadable, StoreFull):
-        raise
-    except Exception as error:  # h5py raises OSError, KeyError, RuntimeError …
-        if vouched:
-            raise
-        raise RunUnreadable(path.stem, f"{type(error).__name__}: {error}") from None
+    verify(path)
+    with h5py.File(path, "r") as run:
+        yield run
 
 
 def global_attributes(run: h5py.File) -> dict[str, Any]:
@@ -171,8 +120,3 @@ def row(path: Path) -> dict[str, Any]:
         if not isinstance(values["status"], str):  # a number in files of earlier versions
             values["status"] = _text(run["status"].attrs["flag_meanings"]).split()[values["status"]]
         return layout.summary(global_attributes(run), values) | stamp(path)
-
-
-def _compare(run_id: str, path: Path) -> None:
-    if run_id != path.stem:
-        raise RunUnreadable(path.stem, f"it is the run {run_id}")

@@ -1,80 +1,145 @@
-"""Scenes from files, stored beside the runs: ``scenes/<scene id>/`` with scene.json and meshes."""
+"""Scenes from files, stored beside the runs: ``scenes/<scene id>/`` with scene.json and meshes.
+
+The index ``scenes.sqlite`` has what lists and searches need, so that a scene is read once for them,
+and otherwise when it is used. It follows the files.
+"""
 
 from __future__ import annotations
 
 import json
-from contextlib import suppress
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from solver.scenes import Scene
-from studies.errors import StudyError
+from studies.definition.parameters import parameters_of
+from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
 from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.appearing import appearing
+from studies.storage.database import Database
+from studies.storage.seal import content_of, sealed_json, state_of
 
 _FILE = "scene.json"
+_COLUMNS = "id, name, summary, branch, parameters"
+_TABLE = f"CREATE TABLE IF NOT EXISTS scenes ({_COLUMNS}, state, added, PRIMARY KEY (id))"
 
 
-def keep(directory: Path, scene: Scene) -> None:
-    """Store the content of a scene, if it comes from a file that is not part of the package."""
-    if not (isinstance(scene, FileScene) and scene.posted):
-        return
-    folder = directory / "scenes" / scene.id
-    with suppress(StudyError):  # a damaged one is written again
-        if kept(directory, scene.id):
-            return
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A scene in the index: its content id, name, summary, branch, and names of parameters."""
+
+    id: str
+    name: str
+    summary: str
+    branch: str
+    parameters: list[str]
+
+
+def keep(directory: Path, scene_id: str, description: Description) -> None:
+    """Store a scene of this content id."""
+    folder = directory / "scenes" / scene_id
     folder.mkdir(parents=True, exist_ok=True)
-    meshes = scene.description.meshes or {}
-    written = {name: mesh.data for name, mesh in meshes.items()}
-    content = {"file": scene.description.file, "content": scene.description.content}
-    written |= {_FILE: (json.dumps(content, indent=2) + "\n").encode()}  # last: then all is there
+    written = {name: mesh.data for name, mesh in (description.meshes or {}).items()}
+    content = {"file": description.file, "content": description.content}
+    written |= {_FILE: sealed_json(f"scene {scene_id}", content)}  # last: then all is there
     for name, data in written.items():
         with appearing(folder / name) as part:
             part.write_bytes(data)
 
 
-def kept(directory: Path, scene_id: str) -> FileScene | None:
+def described(directory: Path, scene_id: str) -> Scene | None:
+    """Return the scene of this id without its meshes, None if it is not stored.
+
+    It has parameters, but no model can be built of it.
+
+    Raises
+    ------
+    FileDamaged
+        if scene.json is damaged
+    """
+    return _made(directory, scene_id, _light)
+
+
+def kept(directory: Path, scene_id: str) -> Scene | None:
     """Return the scene of this id, None if it is not stored.
 
     Raises
     ------
-    StudyError
+    FileDamaged
         if the stored content does not have this id
     """
-    folder = directory / "scenes" / scene_id
-    path = folder / _FILE
-    if len(Path(scene_id).parts) != 1 or not path.is_file():
-        return None
-    try:
-        saved = json.loads(path.read_bytes())
-        names = mesh_names(saved["content"])
-        meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
-        scene = file_scene(Description(saved["file"], saved["content"], meshes))
-    except (OSError, ValueError, KeyError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise StudyError("scene", scene_id, f"is stored damaged, post it again: {reason}") from None
-    if scene.id != scene_id:
-        allowed = "is stored damaged, post it again: its content has changed"
-        raise StudyError("scene", scene_id, allowed)
+    scene = _made(directory, scene_id, _whole)
+    if scene is not None and scene.id != scene_id:
+        folder = directory / "scenes" / scene_id
+        raise FileDamaged(folder, f"scene {scene_id}", "its content has changed", state_of(folder))
     return scene
 
 
-def named(directory: Path, name: str) -> list[FileScene]:
-    """Return the stored scenes of this name, without those that cannot be read."""
-    word, found = json.dumps(name).encode(), []
-    for file in sorted((directory / "scenes").glob(f"*/{_FILE}")):
-        with suppress(OSError, StudyError):
-            if word in file.read_bytes():  # else its meshes need not be read
-                found.append(kept(directory, file.parent.name))
-    return [scene for scene in found if scene and scene.name == name]
+def _light(saved: Mapping[str, Any], folder: Path) -> FileScene:
+    del folder
+    return file_scene(Description(saved["file"], saved["content"], None))
 
 
-def newest(directory: Path, count: int) -> list[FileScene]:
-    """Return the latest stored scenes, newest first, without those that cannot be read."""
-    files = sorted((directory / "scenes").glob(f"*/{_FILE}"), key=lambda f: -f.stat().st_mtime_ns)
-    found = []
-    for each in files[:count]:
-        with suppress(StudyError):
-            found.append(kept(directory, each.parent.name))
-    return [scene for scene in found if scene]
+def _whole(saved: Mapping[str, Any], folder: Path) -> FileScene:
+    names = mesh_names(saved["content"])
+    meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
+    return file_scene(Description(saved["file"], saved["content"], meshes))
+
+
+def _made(
+    directory: Path, scene_id: str, make: Callable[[Mapping[str, Any], Path], FileScene]
+) -> FileScene | None:
+    """Return a scene made from the content of its file."""
+    folder = directory / "scenes" / scene_id
+    state = state_of(folder / _FILE) and state_of(folder)
+    if state is None:
+        return None
+    try:
+        return make(content_of(folder / _FILE, f"scene {scene_id}"), folder)
+    except (FileDamaged, OSError, ValueError, AttributeError, LookupError, TypeError) as error:
+        reason = error.reason if isinstance(error, FileDamaged) else f"{error}".partition("\n")[0]
+        raise FileDamaged(folder, f"scene {scene_id}", reason, state) from None
+
+
+class Index(Database):
+    """The index of the scenes of a directory."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__(directory / "scenes.sqlite", CatalogueDamaged, StoreBusy)
+        self.scenes = directory / "scenes"
+
+    def follow(self, read: Callable[[str], Scene | None]) -> None:
+        """Bring the index to the files; ``read`` gives a new scene, or None for a damaged one."""
+        paths = {path.parent.name: state_of(path) for path in self.scenes.glob(f"*/{_FILE}")}
+        there = {name: (repr(state), state[2]) for name, state in paths.items() if state}
+        mode = "rwc" if self.path.exists() or there else "memory"
+        with self.connection("BEGIN", mode) as connection:
+            connection.execute(_TABLE)
+            known = dict(connection.execute("SELECT id, state FROM scenes").fetchall())
+        fresh = [name for name, (state, _) in there.items() if known.get(name) != state]
+        rows = [
+            (name, scene.name, scene.summary, scene.branch,
+             json.dumps([*parameters_of(scene)]), *there[name])
+            for name in fresh if (scene := read(name))
+        ]  # fmt: skip
+        gone = known.keys() - there.keys()
+        if rows or gone:
+            with self.connection("BEGIN IMMEDIATE", "rw") as connection:
+                connection.executemany("DELETE FROM scenes WHERE id = ?", [[each] for each in gone])
+                connection.executemany(
+                    "INSERT OR REPLACE INTO scenes VALUES (?, ?, ?, ?, ?, ?, ?)", rows
+                )
+
+    def page(self, limit: int, offset: int = 0, name: str | None = None) -> list[Entry]:
+        """Return a page of the scenes, or of those of a name, the latest first."""
+        with self.connection("BEGIN", "rw" if self.path.exists() else "memory") as connection:
+            connection.execute(_TABLE)
+            rows = connection.execute(
+                f"SELECT {_COLUMNS} FROM scenes WHERE ? IN (name, '') "
+                "ORDER BY added DESC, id LIMIT ? OFFSET ?",
+                [name or "", limit, offset],
+            )
+            return [Entry(i, n, text, at, json.loads(names)) for i, n, text, at, names in rows]

@@ -7,41 +7,46 @@ studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it
 catalogue.sqlite              made again from the files if it is missing or damaged
-unreadable/                   files that were damaged or in a wrong place
+scenes.sqlite                 index of the scenes, likewise
+unreadable/                   what was damaged or in a wrong place
 ```
 A file gets its name only when it is complete; that of a run, only after it has been read back and
-compared with the results. It is valid if its checksum is correct and its id is its name. It is
-verified in full when a study uses it, and when its length or time of change differs from the
-catalogue.
+compared with the results. Each has a seal (`studies.storage.seal`), which is checked whenever it is
+read. What fails is moved to ``unreadable/``, told in one line, and made again where it can be.
 """
 
 from __future__ import annotations
 
-import itertools
-import json
 import logging
+import os
+import shutil
 import tempfile
 import time
 import uuid
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import chain, islice
 from pathlib import Path
+from typing import Any
 
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.errors import CatalogueDamaged, RunUnreadable, Unusable
+from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError, Unusable
+from studies.scenes.description import Description
+from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
-from studies.storage import runfile, shelf
+from studies.storage import runfile, seal, shelf
 from studies.storage.appearing import appearing
 from studies.storage.catalogue import Catalogue, Row
-from studies.storage.lock import locked
+from studies.storage.lock import lock
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
 
+_STUDY = "study.json"
 _BATCH = 500
 """Number of runs that are verified before their rows are written."""
 
@@ -65,7 +70,7 @@ class Store:
     def __init__(self, directory: Path | str, held: bool = False) -> None:
         self.directory = Path(directory)
         self.held = held
-        self.catalogue = Catalogue(self.directory / "catalogue.sqlite")
+        self.catalogue = Catalogue(self.directory / "catalogue.sqlite", self.directory / "runs")
 
     def run_path(self, run_id: str) -> Path:
         """Return the path of the file of a run."""
@@ -79,36 +84,124 @@ class Store:
         """Return the path of the combined data set of a study."""
         return self.study_directory(study_id) / "dataset.nc"
 
-    def scene(self, scene_id: str) -> Scene | None:
-        """Return the scene from a file that is stored here under this id, or None."""
-        return shelf.kept(self.directory, scene_id) if is_id(scene_id) else None
+    def scene(self, scene_id: str, whole: bool = True) -> Scene | None:
+        """Return the scene from a file that is stored here under this id, or None.
+
+        One that is not ``whole`` has no meshes, so that it takes little time and memory.
+        """
+        read = shelf.kept if whole else shelf.described
+        try:
+            return read(self.directory, scene_id) if is_id(scene_id) else None
+        except FileDamaged as error:
+            self.set_aside(error, "post the scene again")
+            return None
+
+    def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:
+        """Return a page of the scenes that are stored here, or of those of a name, newest first."""
+        index = shelf.Index(self.directory)
+        try:
+            with suppress(StoreFull):  # then the latest ones are missing
+                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+            return index.page(limit, offset, name)
+        except CatalogueDamaged as error:
+            self.put_aside(index.path, str(error.__cause__), "it is made again from the scenes")
+            return self.scenes(limit, offset, name) if not index.path.exists() else []
 
     def save_scene(self, scene: Scene) -> None:
         """Store a scene from a file, so that studies can name it by its id."""
-        with self._writable():
-            shelf.keep(self.directory, scene)
+        if isinstance(scene, FileScene) and scene.posted:
+            self.keep_scene(scene.id, scene.description)
+
+    def keep_scene(self, scene_id: str, description: Description) -> bool:
+        """Store a scene of this content id; return whether it is new."""
+        folder, meshes = self.directory / "scenes" / scene_id, description.meshes or {}
+        wrong = [n for n, m in meshes.items() if seal.digest(folder / n) != seal.digest_of(m.data)]
+        if wrong:
+            self.put_aside(folder, f"{wrong[0]} is missing or has changed", "it is written again")
+        new = self.scene(scene_id, whole=False) is None
+        if new:
+            with self._writable():
+                shelf.keep(self.directory, scene_id, description)
+        return new
+
+    def discard_scene(self, scene_id: str) -> None:
+        """Delete a scene."""
+        with suppress(FileNotFoundError):
+            shutil.rmtree(self.directory / "scenes" / _checked(scene_id))
+
+    def dataset(self, study_id: str) -> Path:
+        """Return the path of the data set of a study, checked.
+
+        Raises
+        ------
+        FileDamaged
+            if it is missing (`state` is None) or was damaged, and is now set aside
+        """
+        path = self.dataset_path(study_id)
+        try:
+            seal.check(path, f"dataset {study_id}")
+        except FileDamaged as error:
+            if error.reason == seal.NO_SEAL and _noted(path, study_id):
+                before = path.stat()
+                seal.seal(path, f"dataset {study_id}")
+                os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))  # it is not newer now
+                return path
+            self.set_aside(error, "it is made again from the runs")
+            raise
+        return path
 
     def outcomes(self, study_id: str) -> Counter[str]:
         """Return the number of runs by status in the data set of a study."""
         import h5py
 
         try:
-            with h5py.File(self.dataset_path(study_id), "r") as file:
+            with h5py.File(self.dataset(study_id), "r") as file:
                 return Counter(file["status"].asstr()[...].ravel().tolist())
-        except (OSError, KeyError, TypeError, RuntimeError):
+        except FileDamaged:
             return Counter()
+
+    def study(self, study_id: str) -> Study:
+        """Return the study of this id, as it was saved.
+
+        Raises
+        ------
+        FileDamaged
+            if its file is missing (`state` is None) or was damaged, and is now set aside
+        StudyError
+            if another version of the solver computed it, or the scene has changed
+        """
+        path = self.study_directory(study_id) / _STUDY
+        try:
+            study = Study.known(seal.content_of(path, f"study {study_id}"), self.scene)
+        except FileDamaged as error:
+            self.set_aside(error, "it is written again where the study is known")
+            raise
+        if study.id != study_id:
+            allowed = "was computed by another version of the solver"
+            raise StudyError("study", study_id, allowed)
+        return study
 
     def save_study(self, study: Study) -> Path:
         """Store the definition of the study and its scene, and return its directory."""
         self.save_scene(study.problem)
-        directory = self.study_directory(study.id)
-        path = directory / "study.json"
-        if not _holds_json(path):
+        return self.save_definition(study.id, study.to_dict())
+
+    def save_definition(self, study_id: str, content: Mapping[str, Any]) -> Path:
+        """Store the content of a study, unless it is stored, and return its directory."""
+        directory = self.study_directory(study_id)
+        path, name = directory / _STUDY, f"study {study_id}"
+        text = seal.sealed_json(name, content)
+        try:
+            seal.check(path, name)
+        except FileDamaged as error:
+            with suppress(FileDamaged):  # one of an earlier version has no seal
+                if seal.sealed_json(name, seal.content_of(path, name)) == text:
+                    error.state = None
+            self.set_aside(error, "it is written again")
             with self._writable():
                 directory.mkdir(parents=True, exist_ok=True)
-                self.clear_directory(path)
                 with appearing(path) as part:
-                    part.write_text(json.dumps(study.to_dict(), indent=2) + "\n", encoding="utf-8")
+                    part.write_bytes(text)
         return directory
 
     def write_run(self, case: Case, outcome: Record | str, keep: str = "") -> Row:
@@ -138,18 +231,8 @@ class Store:
                 row = verified(part, case, outcome, keep)
             return row | runfile.stamp(path)
 
-    def read_row(self, run_id: str) -> Row:
-        """Return the catalogue's row of a run, read from its file.
-
-        Raises
-        ------
-        RunUnreadable
-            if the file is missing, damaged, or that of another run
-        """
-        return runfile.row(self.run_path(run_id))
-
     def found(self, run_id: str, known: Row | None = None) -> Row | None:
-        """Return the row of a run from its file; an unreadable file is moved to ``unreadable/``.
+        """Return the row of a run from its file; None if it has none, or one that is set aside.
 
         Parameters
         ----------
@@ -158,12 +241,17 @@ class Store:
         """
         path = self.run_path(run_id)
         try:
-            if known and runfile.verify(path) and known | runfile.stamp(path) == known:
+            runfile.verify(path)
+            if known and known | runfile.stamp(path) == known:
                 return known
-            return self.read_row(run_id)
-        except RunUnreadable as error:
-            self.set_aside(error)
+            return runfile.row(path)
+        except FileDamaged as error:
+            self.set_aside(error, "the run will be computed again")
             return None
+
+    def run(self, run_id: str) -> Row | None:
+        """Return the row of a run whose file is valid; the catalogue is updated to the file."""
+        return self._sound([run_id]).get(run_id)
 
     def sound(self, run_ids: Iterable[str]) -> dict[str, Row]:
         """Return, by id, the rows of the runs whose file exists and is valid.
@@ -189,11 +277,26 @@ class Store:
             self.catalogue.put(fresh)
         return rows
 
-    def set_aside(self, error: RunUnreadable) -> None:
-        """Move an unreadable file to ``unreadable/``, so that the run is computed again."""
-        path = self.run_path(error.run_id)
-        if path.exists():
-            self._move(path, f"{error.reason}; the run will be computed again")
+    def set_aside(self, error: FileDamaged, then: str) -> None:
+        """Move what is damaged to ``unreadable/``, unless it is gone or another one by now."""
+        if error.state is not None and seal.state_of(error.path) == error.state:
+            self.put_aside(error.path, error.reason, then)
+
+    def put_aside(self, path: Path, reason: str, then: str) -> None:
+        """Move a file or directory, if there is one, to ``unreadable/``, and log it in one line."""
+        if not path.exists():
+            return
+        here = path.relative_to(self.directory)
+        target = self.directory / "unreadable" / ".".join(here.parts[1:] or here.parts)
+        try:
+            target.parent.mkdir(exist_ok=True)
+            if target.exists():
+                target = target.with_name(f"{target.name}.{uuid.uuid4().hex}")
+            path.rename(target)
+            now = f"is now {target.relative_to(self.directory)}"
+        except OSError as failed:
+            now = f"stays, because it cannot be moved ({failed.strerror})"
+        _LOG.warning("%s cannot be read and %s: %s; %s", here, now, reason, then)
 
     def modified(self, run_ids: Iterable[str]) -> dict[str, int]:
         """Return, by id, the time of change [ns] of the files of runs that exist."""
@@ -209,20 +312,28 @@ class Store:
             self.run_path(run_id).unlink(missing_ok=True)
         self.catalogue.remove(run_ids)
 
-    def delete_run(self, run_id: str) -> None:
-        """Delete a run: its file and its row."""
-        self.discard([run_id])
-
     def reconcile(self) -> None:
-        """Update the catalogue to the files that exist and can be read."""
+        """Update the catalogue to the files that exist and can be read.
+
+        One that is missing or damaged is made again beside it, and appears when it is complete.
+        """
+        path = self.catalogue.path
         try:
             known = self.catalogue.stamps()
         except CatalogueDamaged as error:
-            for damaged in self.directory.glob(f"{self.catalogue.path.name}*"):  # and its journal
-                self.clear_directory(damaged)
-                damaged.unlink(missing_ok=True)
-            _LOG.warning("%s", error)
-            known = {}
+            anew = Store(self.directory, held=True)
+            with self._writable(), appearing(path) as part:
+                anew.catalogue = Catalogue(part)
+                anew._follow({})
+                for old in (path, path.with_name(f"{path.name}-journal")):
+                    self.put_aside(old, str(error.__cause__), "it is made again from the runs")
+            _LOG.warning("%s has been made again from the files of the runs", path.name)
+            known = self.catalogue.stamps()
+        self.catalogue.damaged = False
+        self._follow(known)  # after it was made again, what was stored meanwhile
+
+    def _follow(self, known: Mapping[str, tuple[int | None, int | None]]) -> None:
+        """Update the catalogue, in which these runs have these stamps, to the files."""
         there = {
             path.stem: tuple(runfile.stamp(path).values())
             for path in (self.directory / "runs").glob("*.nc")
@@ -230,8 +341,8 @@ class Store:
         }
         self.catalogue.remove(known.keys() - there.keys())
         changed = iter([run_id for run_id, state in there.items() if known.get(run_id) != state])
-        while batch := list(itertools.islice(changed, _BATCH)):
-            self.sound(batch)
+        while batch := list(islice(changed, _BATCH)):
+            self._sound(batch)
 
     @contextmanager
     def writing(self, tidy: bool = True) -> Iterator[None]:
@@ -255,13 +366,16 @@ class Store:
                 (self.directory / name).mkdir(parents=True, exist_ok=True)
                 with tempfile.TemporaryFile(dir=self.directory / name):
                     pass  # a directory may exist and still not be writable
-            file = (self.directory / ".lock").open("a+", encoding="ascii")
-        with locked(self.directory, file):
-            parts = self.directory.glob("*/**/*.part") if tidy else ()  # keys are next to them
-            for part in filter(_left, parts):
+            busy = "computes here; wait until it has ended, or name another directory"
+            held = lock(self.directory / ".lock", busy)
+        try:
+            patterns = ("*/**/*.part", "catalogue*.part") if tidy else ()  # not those of keys
+            for part in filter(_left, chain.from_iterable(map(self.directory.glob, patterns))):
                 part.unlink(missing_ok=True)
             self.reconcile()
             yield
+        finally:
+            os.close(held)
 
     @contextmanager
     def _writable(self) -> Iterator[None]:
@@ -273,21 +387,10 @@ class Store:
             allowed = f"must be a directory to write in ({error.strerror})"
             raise Unusable("directory", str(self.directory), allowed) from None
 
-    def clear_directory(self, path: Path) -> None:
-        """Move a directory that has the name of a file to ``unreadable/``."""
+    def clear(self, path: Path) -> None:
+        """Set a directory aside that has the name of a file."""
         if path.is_dir():
-            self._move(path, "it is a directory instead of a file")
-
-    def _move(self, path: Path, reason: str) -> None:
-        """Move a file or directory to ``unreadable/``, and log it in one line."""
-        target = self.directory / "unreadable" / path.name
-        with self._writable():
-            target.parent.mkdir(exist_ok=True)
-            if target.exists():
-                target = target.with_name(f"{path.name}.{uuid.uuid4().hex}")
-            path.rename(target)
-        here, there = (each.relative_to(self.directory) for each in (path, target))
-        _LOG.warning("%s cannot be read and is now %s: %s", here, there, reason)
+            self.put_aside(path, "it is a directory", "a file takes its place")
 
 
 def _left(part: Path) -> bool:
@@ -298,12 +401,18 @@ def _left(part: Path) -> bool:
         return False
 
 
-def _holds_json(path: Path) -> bool:
+def _noted(dataset: Path, study_id: str) -> bool:
+    """Whether an earlier version, which sealed no data sets, noted this one in ``made.json``."""
+    import h5py
+
     try:
-        json.loads(path.read_bytes())
-    except (OSError, ValueError):
+        made = seal.content_of(dataset.with_name("made.json"), f"made {study_id}")
+        if made["data set"]["files"][dataset.name] != seal.digest(dataset):
+            return False
+        with h5py.File(dataset, "r") as file:
+            return runfile.global_attributes(file)["id"] == study_id
+    except (FileDamaged, LookupError, OSError, TypeError):
         return False
-    return True
 
 
 def _checked(content_id: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,8 +10,9 @@ import xarray as xr
 
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, STATUSES
-from studies.errors import StudyError
+from studies.errors import FileDamaged, StudyError
 from studies.storage.frame import FRACTION
+from studies.storage.seal import content_of
 from studies.storage.store import Store
 from studies.views.columns import counted
 from studies.views.reading import find_study, open_netcdf
@@ -148,7 +148,11 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
     if found.name != "dataset.nc" or not beside.is_file():
         return found
     store = Store(found.resolve().parents[2])
-    study = Study.known(json.loads(beside.read_text(encoding="utf-8")), store.scene)
+    try:
+        content = content_of(beside, f"study {found.parent.name}")
+    except FileDamaged as error:
+        raise StudyError("path", str(path), f"holds a damaged file: {error}") from None
+    study = Study.known(content, store.scene)
     if study.id != found.parent.name:  # then the ids of its runs differ too
         allowed = "was computed by another version of the solver: give the file of a run"
         raise StudyError("path", str(path), allowed)

@@ -10,8 +10,10 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.errors import StudyError
+from studies.errors import FileDamaged, StudyError
+from studies.storage import seal
 from studies.storage.frame import FRACTION
 from studies.storage.store import Store
 
@@ -46,7 +48,10 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
 
 
 def find_study(path: Path | str, name: str | None = None) -> Path:
-    """Return the path of the data set that `open_study` opens."""
+    """Return the path of the data set that `open_study` opens.
+
+    One in a store is checked: it must be what was written there.
+    """
     found = find_datasets(path)
     names = {each: _name(each) for each in found}
     known = ", ".join(sorted(set(names.values())))
@@ -57,7 +62,15 @@ def find_study(path: Path | str, name: str | None = None) -> Path:
     elif len(set(names.values())) > 1:
         allowed = f"holds several studies: give the directory of one, or its name ({known})"
         raise StudyError("path", str(path), allowed)
-    return max(found, key=lambda each: each.stat().st_mtime)
+    latest = max(found, key=lambda each: each.stat().st_mtime)
+    if latest.name == "dataset.nc" and is_id(study_id := latest.absolute().parent.name):
+        try:
+            seal.check(latest, f"dataset {study_id}")
+        except FileDamaged as error:
+            if error.reason != seal.NO_SEAL:  # one of an earlier version has none
+                allowed = f"was damaged or replaced, compute its study again: {error.reason}"
+                raise StudyError("path", str(path), allowed) from None
+    return latest
 
 
 def _fetched(url: str) -> xr.Dataset:
@@ -164,12 +177,12 @@ def _progress(file: Path) -> str:
     """Return the name of a study and the number of its finished runs."""
     study, store = None, Store(file.parents[2])
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = seal.content_of(file, f"study {file.parent.name}")
         name = content["name"]
         study = Study.known(content, store.scene)
     except StudyError:  # such as a parameter that the scene no longer has
         pass
-    except (OSError, ValueError, TypeError, KeyError):
+    except (FileDamaged, KeyError):
         return f"{file.parent.name}: its {file.name} cannot be read"
     if study is None or study.id != file.parent.name:
         return f"{name}: begun with another version of the solver"

@@ -6,6 +6,7 @@ import io
 import json
 import math
 import os
+import shutil
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -133,14 +134,13 @@ def test_a_study_of_another_solver_is_told_as_such(
 ) -> None:
     study = fake_study("first")
     store.save_study(study)
-    other = store.study_directory(study.id).with_name("0" * 32)
-    store.study_directory(study.id).rename(other)
+    other = store.save_definition("0" * 32, study.to_dict())
+    shutil.rmtree(store.study_directory(study.id))
     assert main(["show", str(store.directory)]) == 0
     told = "first: begun with another version of the solver; no data set yet"
     assert told in capsys.readouterr().out
-    stored = json.loads((other / "study.json").read_text())
-    stored["parameters"]["gone"] = 1
-    (other / "study.json").write_text(json.dumps(stored))
+    shutil.rmtree(other)
+    store.save_definition("0" * 32, study.to_dict() | {"parameters": {"gone": 1}})
     assert main(["show", str(store.directory)]) == 0
     assert told in capsys.readouterr().out
 

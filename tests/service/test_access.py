@@ -75,6 +75,7 @@ def keyed(tmp_path: Path) -> tuple[Ask, dict[str, dict[str, str]]]:
         ("DELETE", f"/studies/{UNKNOWN}?purge=true", "admin"),
         ("DELETE", f"/studies/{UNKNOWN}?%70urge=true", "admin"),
         ("DELETE", f"/runs/{UNKNOWN}", "admin"),
+        ("DELETE", f"/scenes/{UNKNOWN}", "admin"),
         ("PUT", "/studies", "admin"),
         ("POST", "/something/new", "admin"),
         ("DELETE", f"/studies/{UNKNOWN}%0a", "submit"),

@@ -248,7 +248,7 @@ def refusal(data: Path, **settings: str) -> str:
 
 def test_a_second_service_on_the_same_directory_is_refused(lively: Server) -> None:
     line = refusal(lively.data, RESIDUA_LOCK_SECONDS="0.2")
-    assert "another service uses this directory" in line
+    assert "has a service in this directory; stop it" in line
     assert lively.client.get("/health").status_code == 200
 
 
@@ -265,9 +265,9 @@ def test_a_damaged_queue_is_named_kept_and_made_anew(
     queue = tmp_path / "jobs.sqlite"
     queue.write_text("no queue" * 1000)
     create_app(Settings(data=tmp_path))
-    (line,) = [record.getMessage() for record in caplog.records if record.levelname == "ERROR"]
-    assert "jobs.sqlite is missing or damaged" in line and "kept as jobs.sqlite.damaged" in line
-    assert (tmp_path / "jobs.sqlite.damaged").read_text() == "no queue" * 1000
+    (line,) = [r.getMessage() for r in caplog.records if r.levelname == "WARNING"]
+    assert "jobs.sqlite cannot be read and is now unreadable/jobs.sqlite" in line
+    assert (tmp_path / "unreadable" / "jobs.sqlite").read_text() == "no queue" * 1000
     assert Jobs(queue).page(limit=1, offset=0) == ([], 0)
 
 
@@ -278,4 +278,4 @@ def test_a_damaged_catalogue_is_made_anew_from_the_runs(tmp_path: Path) -> None:
     store.write_run(case, "reason")
     store.catalogue.path.write_text("no catalogue" * 1000)
     create_app(Settings(data=tmp_path))
-    assert store.catalogue.ids() == {case.id}
+    assert set(store.catalogue.stamps()) == {case.id}

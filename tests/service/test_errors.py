@@ -325,6 +325,7 @@ def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI
         "status": "failing",
         "data_writable": True,
         "queue_readable": True,
+        "catalogue_readable": True,
         "executor_alive": False,
         "waiting": {},
     }

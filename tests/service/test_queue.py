@@ -6,6 +6,7 @@ import json
 import os
 import sqlite3
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -16,9 +17,10 @@ import pytest
 from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import StudyState
 from service.jobs import Jobs
-from service.lock import DirectoryInUse, lock_directory
 from service.recovery import open_queue
-from studies import Store, Study, StudyError
+from studies import Store, StoreBusy, Study, StudyError
+from studies.storage.lock import lock
+from studies.storage.seal import seal
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
 
@@ -163,7 +165,7 @@ def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
     content[8 * 4096 : 9 * 4096] = b"\xff" * 4096
     path.write_bytes(content)
     assert open_queue(path, Store(tmp_path), None).page(limit=9, offset=0) == ([], 0)
-    assert (tmp_path / "jobs.sqlite.damaged").read_bytes() == content
+    assert (tmp_path / "unreadable" / "jobs.sqlite").read_bytes() == content
 
 
 STEPS = {"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}}
@@ -185,7 +187,7 @@ def test_a_queue_that_is_lost_is_made_anew(tmp_path: Path, damage: str) -> None:
     store.save_study(study)
     (job,), _ = open_queue(path, store, None).page(limit=9, offset=0)
     assert (job.id, job.state) == (study.id, StudyState.ACCEPTED)
-    assert (tmp_path / "jobs.sqlite.damaged").exists() == (damage != "deleted")
+    assert (tmp_path / "unreadable" / "jobs.sqlite").exists() == (damage != "deleted")
 
 
 def test_a_study_computed_without_the_service_is_found_when_it_starts(tmp_path: Path) -> None:
@@ -198,6 +200,7 @@ def test_a_study_computed_without_the_service_is_found_when_it_starts(tmp_path: 
         store.save_study(study)
     with h5py.File(store.dataset_path(ended.id), "w") as file:
         file["status"] = ["ok"]
+    seal(store.dataset_path(ended.id), f"dataset {ended.id}")
     for _ in range(2):
         jobs, total = open_queue(path, store, None).page(limit=9, offset=0)
         assert total == 2
@@ -225,7 +228,8 @@ def test_a_retry_that_is_computed_forgets_its_old_end_in_a_queue_made_anew(
     store = Store(tmp_path)
     study = Study.from_dict({"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}})
     store.save_study(study)
-    monkeypatch.setattr(Store, "outcomes", lambda self, study_id: {end: 1})
+    monkeypatch.setattr(Store, "outcomes", lambda self, study_id: Counter({end: 1}))
+    store.write_run(next(study.cases()), "reason")
     jobs = open_queue(tmp_path / "jobs.sqlite", store, None, [study.id])
     job = jobs.get(study.id)
     assert (job.state, job.message, job.progress) == (StudyState.RUNNING, "", 0)
@@ -323,12 +327,13 @@ def test_of_many_simultaneous_acceptances_one_is_new(jobs: Jobs) -> None:
 
 
 def test_a_directory_has_one_owner_at_a_time(tmp_path: Path) -> None:
-    lock = lock_directory(tmp_path, 0.0)
-    with pytest.raises(DirectoryInUse, match="another service"):
-        lock_directory(tmp_path, 0.2)
-    heirloom = os.dup(lock)
-    os.close(lock)
-    with pytest.raises(DirectoryInUse):
-        lock_directory(tmp_path, 0.0)
+    path = tmp_path / "service.lock"
+    held = lock(path, "is here")
+    with pytest.raises(StoreBusy, match=rf"another process \(id {os.getpid()}\) is here"):
+        lock(path, "is here", 0.2)
+    heirloom = os.dup(held)
+    os.close(held)
+    with pytest.raises(StoreBusy):
+        lock(path, "is here")
     os.close(heirloom)
-    os.close(lock_directory(tmp_path, 0.0))
+    os.close(lock(path, "is here"))

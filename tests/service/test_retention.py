@@ -31,6 +31,7 @@ class Place:
 
     def __init__(self, directory: Path) -> None:
         self.store = Store(directory)
+        self.store.reconcile()
         self.jobs = Jobs(directory / "jobs.sqlite")
         self.stopping: set[str] = set()
 
@@ -54,7 +55,7 @@ class Place:
     def runs(self) -> set[str]:
         """Return the runs that are there, in the catalogue and as files."""
         files = {path.stem for path in (self.store.directory / "runs").iterdir()}
-        assert files == self.store.catalogue.ids()
+        assert files == set(self.store.catalogue.stamps())
         return files
 
     def there(self, study: Study) -> bool:

@@ -58,7 +58,7 @@ def carried_out(
         jobs.retry("a")
     settings = Settings(**{"data": data, "attempts": 2, "poll_seconds": 0.01, **limits})
     pool = Pool.of(settings, lock=0)
-    runner = Scripted(settings, jobs, pool, Starter("none", 0), lambda _: jobs, script=list(script))
+    runner = Scripted(settings, jobs, pool, Starter("none", 0), lambda _: None, script=list(script))
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -112,7 +112,7 @@ def test_a_frozen_process_is_told_of_and_ended(
     settings = Settings(
         data=tmp_path, attempts=2, poll_seconds=0.02, stall_seconds=0.5, grace_seconds=0.1
     )
-    runner = Frozen(settings, jobs, Pool.of(settings, lock=0), Starter("none", 0), lambda _: jobs)
+    runner = Frozen(settings, jobs, Pool.of(settings, lock=0), Starter("none", 0), lambda _: None)
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -139,7 +139,7 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
         connection.execute("UPDATE job SET study = '{' WHERE id = 'bad'")
     settings = Settings(data=tmp_path, poll_seconds=0.01, scheduler="tcp://127.0.0.1:1")
-    runner = Runner(settings, jobs, Pool.of(settings, lock=0), Starter("none", 0), lambda _: jobs)
+    runner = Runner(settings, jobs, Pool.of(settings, lock=0), Starter("none", 0), lambda _: None)
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():

@@ -55,7 +55,7 @@ def wounded(catalogue: Catalogue) -> Catalogue:
 
 
 READERS: dict[str, Callable[[Catalogue], Any]] = {
-    "run": lambda catalogue: [catalogue.run("0")],
+    "run": lambda catalogue: [catalogue.rows(["0"]).get("0")],
     "runs": lambda catalogue: catalogue.runs()[0],
     "rows": lambda catalogue: list(catalogue.rows(["0", "1"]).values()),
 }
@@ -67,7 +67,7 @@ def test_the_first_reader_after_a_killed_writer_sees_what_was_committed(
     wounded: Catalogue, read: Callable[[Catalogue], Any]
 ) -> None:
     assert read(wounded) == [row("0")]
-    assert wounded.ids() == {"0"}
+    assert set(wounded.stamps()) == {"0"}
 
 
 @pytest.mark.processes
@@ -82,7 +82,7 @@ def test_many_first_readers_after_a_killed_writer_all_see_what_was_committed(
 @pytest.mark.processes
 def test_a_writer_goes_on_after_a_killed_one(wounded: Catalogue) -> None:
     wounded.put([row("1")])
-    assert wounded.ids() == {"0", "1"}
+    assert set(wounded.stamps()) == {"0", "1"}
 
 
 def test_a_catalogue_that_cannot_be_written_to_is_read(catalogue: Catalogue) -> None:
@@ -93,10 +93,10 @@ def test_a_catalogue_that_cannot_be_written_to_is_read(catalogue: Catalogue) -> 
 
 def empty(catalogue: Catalogue) -> bool:
     return (
-        catalogue.run("0") is None
+        catalogue.rows(["0"]).get("0") is None
         and catalogue.runs(scene="fake") == ([], 0)
         and catalogue.rows(["0"]) == {}
-        and catalogue.ids() == set()
+        and catalogue.stamps() == {}
     )
 
 
@@ -110,7 +110,7 @@ def test_a_file_whose_first_writer_was_killed_is_no_run(catalogue: Catalogue) ->
     assert empty(catalogue)
     assert catalogue.path.stat().st_size == 0
     catalogue.put([row("0")])
-    assert catalogue.ids() == {"0"}
+    assert set(catalogue.stamps()) == {"0"}
 
 
 def test_readers_of_the_very_first_write_see_all_of_it_or_nothing(tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_readers_of_the_very_first_write_see_all_of_it_or_nothing(tmp_path: Path
 def test_what_is_no_catalogue_is_named_as_such(catalogue: Catalogue) -> None:
     catalogue.path.write_text("something else, and long enough to be a page of a database" * 20)
     with pytest.raises(CatalogueDamaged, match=r"catalogue\.sqlite .* not a database"):
-        catalogue.ids()
+        set(catalogue.stamps())
 
 
 def test_the_last_page_of_a_hundred_thousand_runs_costs_no_more_than_a_fifth_of_a_second(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import os
 import random
 import shutil
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +19,10 @@ import xarray as xr
 
 from studies import (
     CatalogueDamaged,
-    RunUnreadable,
+    FileDamaged,
     Store,
     Study,
+    StudyError,
     open_study,
     run_study,
 )
@@ -26,6 +30,7 @@ from studies.definition.identity import solver_hash
 from studies.execution.task import PathTask, walk
 from studies.storage.combine import combine
 from studies.storage.dataset import run_content
+from studies.storage.runfile import row
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, record
 
@@ -78,10 +83,10 @@ def test_no_flipped_byte_of_a_run_goes_unnoticed(damaged: ComputedStudy) -> None
         flipped = bytearray(whole)
         flipped[at] ^= draw.randrange(1, 256)
         path.write_bytes(flipped)
-        with pytest.raises(RunUnreadable, match=path.stem):
-            store.read_row(path.stem)
+        with pytest.raises(FileDamaged, match=path.stem):
+            row(path)
     path.write_bytes(whole)
-    assert store.read_row(path.stem)["status"] == "ok"
+    assert row(path)["status"] == "ok"
 
 
 def flip(study: Study, store: Store) -> None:
@@ -127,7 +132,7 @@ def test_a_damaged_run_is_told_set_aside_and_computed_again(
     study, store = damaged
     damage(study, store)
     if quietly:  # as the disk damages it; the catalogue notices no change
-        row = store.catalogue.run(first(study))
+        row = store.catalogue.rows([first(study)]).get(first(study))
         assert row is not None
         state = store.run_path(first(study)).stat()
         store.catalogue.put([row | {"size": state.st_size, "modified": state.st_mtime_ns}])
@@ -166,14 +171,14 @@ def test_rows_without_files_are_missing(store: Store, monkeypatch: pytest.Monkey
     outcome = run_study(study, store)
     assert outcome.counts == {"missing": 4}
     assert not outcome.ok
-    assert store.catalogue.ids() == set()
+    assert store.catalogue.stamps() == {}
 
 
 def test_a_file_deleted_in_mid_study_is_missing(
     damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, store = damaged
-    failed = store.catalogue.run(first(study))
+    failed = store.catalogue.rows([first(study)]).get(first(study))
     assert failed is not None
     store.catalogue.put([failed | {"status": "error"}])  # so that there is something to compute
     last = list(study.cases())[-1].id
@@ -185,15 +190,50 @@ def test_a_file_deleted_in_mid_study_is_missing(
     assert not outcome.ok
 
 
-def test_an_older_file_without_checksum_is_read(damaged: ComputedStudy) -> None:
+def test_a_run_without_its_seal_is_unknown_and_computed_again(
+    damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may hold any number: here that of another run."""
     study, store = damaged
-    path = store.run_path(first(study))
-    case = next(study.cases())
-    older = run_content(FAKE, case, record(case.parameters))
-    xr.Dataset(older.variables, attrs=older.attrs).to_netcdf(path, engine="h5netcdf")
+    case, *_, other = study.cases()
+    wrong = run_content(FAKE, case, record(other.parameters))
+    whole = xr.Dataset(wrong.variables, attrs=wrong.attrs)
+    whole.to_netcdf(store.run_path(case.id), engine="h5netcdf")
     store.reconcile()
-    assert store.catalogue.ids() == {case.id for case in study.cases()}
-    assert combine(study, store, list(study.cases())).counts == {"ok": 4}
+    assert store.catalogue.rows([case.id]).get(case.id) is None
+    assert repeat(study, store, monkeypatch) == [case.id]
+    true_numbers(study, store)
+
+
+def test_a_data_set_of_an_earlier_version_is_kept_if_it_is_what_was_noted(
+    damaged: ComputedStudy,
+) -> None:
+    study, store = damaged
+    path = store.dataset_path(study.id)
+    content = path.read_bytes()
+    unsealed = content[: content.rindex(b"\ndataset ")]
+    for there, outcomes in ((unsealed, {"ok": 4}), (unsealed + b"0", {})):
+        path.write_bytes(there)
+        noted = {"data set": {"of": "", "files": {path.name: sha256(unsealed).hexdigest()}}}
+        path.with_name("made.json").write_text(json.dumps(noted))
+        os.utime(path, (1e9, 1e9))
+        assert store.outcomes(study.id) == outcomes
+        assert not outcomes or path.stat().st_mtime == 1e9, "it is not the latest of its name now"
+    assert (store.directory / "unreadable" / f"{study.id}.dataset.nc").read_bytes() == there
+
+
+def test_a_data_set_that_was_changed_or_replaced_is_not_opened(damaged: ComputedStudy) -> None:
+    study, store = damaged
+    path = store.dataset_path(study.id)
+    whole = path.read_bytes()
+    other = fake_study("other")
+    compute_here(other, store)
+    for wrong in (whole.replace(b"fake", b"fume", 1), store.dataset_path(other.id).read_bytes()):
+        path.write_bytes(wrong)
+        with pytest.raises(StudyError, match="compute its study again"):
+            open_study(path.parent)
+    assert run_study(study, store).ok
+    true_numbers(study, store)
 
 
 def test_numbers_have_checksums_that_every_reader_verifies(computed: ComputedStudy) -> None:
@@ -288,9 +328,9 @@ def test_a_damaged_file_of_a_study_is_written_anew(
 
 def test_a_run_that_is_deleted_is_gone_with_its_row(damaged: ComputedStudy) -> None:
     study, store = damaged
-    store.delete_run(first(study))
+    store.discard([first(study)])
     assert not store.run_path(first(study)).exists()
-    assert store.catalogue.run(first(study)) is None
+    assert store.catalogue.rows([first(study)]).get(first(study)) is None
     assert store.catalogue.runs()[1] == 3
 
 
@@ -350,7 +390,7 @@ def test_a_repeat_that_is_stopped_keeps_a_data_set_that_holds_more(
     damaged: ComputedStudy,
 ) -> None:
     study, store = damaged
-    store.delete_run(first(study))
+    store.discard([first(study)])
     stopped = run_study(study, store, workers=1, should_stop=lambda: True)
     assert stopped.stopped and stopped.counts == {"ok": 4}
     true_numbers(study, store)

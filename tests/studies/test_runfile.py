@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from studies import Store, Study, open_netcdf
-from studies.storage import runfile
+from studies.storage import runfile, seal
 
 RUN_ID = "0" * 32
 NAMES = ("wide", "deep", "a", "zeta", "beta", "mu", "omega", "kappa", "b", "c")
@@ -36,6 +36,7 @@ def test_variables_keep_their_order(tmp_path: Path) -> None:
 def test_a_file_that_does_not_tell_their_order_is_read(tmp_path: Path) -> None:
     path = tmp_path / f"{RUN_ID}.nc"
     run().to_netcdf(path, engine="netcdf4")
+    seal.seal(path, f"run {RUN_ID}")
     assert sorted(names_in(path)) == sorted(NAMES)
 
 

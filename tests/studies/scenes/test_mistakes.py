@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import tomllib
 from collections.abc import Iterator
 from functools import cache
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from studies import Study
-from studies.errors import SceneError, StudyError
+from studies.errors import SceneError, StudyError, one_of
 from studies.scenes.description import Description
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
@@ -141,3 +142,23 @@ def test_a_date_is_text_and_a_mark_of_byte_order_is_nothing(tmp_path: Path) -> N
     path = tmp_path / "scene.toml"
     path.write_bytes(b"\xef\xbb\xbfsummary = 1979-05-27\n")
     assert Description.read(path).content == {"summary": "1979-05-27"}
+
+
+def test_of_thousands_of_mistakes_twenty_are_told_in_a_short_text() -> None:
+    """Each of them could list thousands of names, so that 110 kB made a text of 402 MB."""
+    tables = blocks()
+    tables["derived"] = {f"d{k}": f"$q{k}" for k in range(1000)}
+    with pytest.raises(SceneError) as caught:
+        built(tables)
+    error = pickle.loads(pickle.dumps(caught.value))
+    assert len(error.mistakes) == 20 and error.count >= 1000
+    assert f"and {error.count - 20} more" in str(error)
+    assert len(str(error)) < 50_000
+
+
+def test_of_thousands_of_names_ten_are_told() -> None:
+    names = [f"name{k}" for k in range(6500)] + ["x" * 100_000]
+    told = one_of("nam3", names)
+    assert "name9 and 6491 more; did you mean name3?" in told
+    assert len(one_of("y", names[::-1])) < 500
+    assert len(str(StudyError("z" * 100_000, "w" * 100_000, "must be " + "v" * 100_000))) < 2500

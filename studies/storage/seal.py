@@ -1,0 +1,163 @@
+"""What is stored says what it is and has a digest, and both are checked whenever it is read.
+
+The last line of a file is its seal: a name, such as ``run <id>``, and the SHA-256 of all before the
+digest. It is after the end of the HDF5 data, so that every netCDF reader can open the file; in JSON
+it is the last entry, ``seal``. HDF5's own checksums, which arrays also have, do not cover names,
+attributes and texts, and HDF5 may end the process when it reads damaged ones.
+
+A result is kept until inode, length or a time of the file changes. `Store` moves a file that fails
+to ``unreadable/``.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import re
+import stat
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from studies.errors import FileDamaged
+from studies.toml import too_deep
+
+SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
+"""Attribute of netCDF files that have the line."""
+
+LARGEST = 50_000_000
+"""Largest size of a JSON file that is read [bytes]."""
+
+NO_SEAL = "it has no seal"
+
+_LINE = re.compile(rb'([a-z]+ [\w.-]+) sha256 ([0-9a-f]{64})(?:"\n\})?\n\Z')
+_LONGEST = 256
+"""Length of the end of a file in which the line is searched [bytes]."""
+_NO_FILE = frozenset({errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EIO, errno.ELOOP})
+
+State = tuple[int, int, int, int]
+
+
+def sealed(name: str, content: bytes) -> bytes:
+    """Return the content of a file with its seal."""
+    begun = content + f"\n{name} sha256 ".encode()
+    return begun + digest_of(begun).encode() + b"\n"
+
+
+def sealed_json(name: str, content: Mapping[str, Any]) -> bytes:
+    """Return the text of a JSON object with its seal."""
+    entries = {**content, "seal": f"{name} sha256 "}
+    begun = json.dumps(entries, indent=2).removesuffix('"\n}').encode()
+    return begun + digest_of(begun).encode() + b'"\n}\n'
+
+
+def seal(path: Path, name: str) -> None:
+    """Write the seal at the end of a file."""
+    line = f"\n{name} sha256 ".encode()
+    with path.open("r+b") as file:
+        whole = hashlib.file_digest(file, "sha256")
+        whole.update(line)
+        file.write(line + whole.hexdigest().encode() + b"\n")
+
+
+def state_of(path: Path) -> State | None:
+    """Return inode, length and times of change [ns] of a path; None if there is nothing."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        if error.errno not in _NO_FILE:
+            raise
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+
+
+def check(path: Path, name: str) -> None:
+    """Raise `FileDamaged` unless a file is sealed under this name and has not changed since."""
+    found, reason, _ = _looked(path, name)
+    if reason or found != name:
+        raise FileDamaged(path, name, reason or f"it is the {found}", state_of(path))
+
+
+def digest(path: Path) -> str:
+    """Return the SHA-256 of a whole file; empty if it cannot be read."""
+    try:
+        return _looked(path, path.name)[2]
+    except (FileDamaged, OSError):
+        return ""
+
+
+def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
+    """Return the object in a JSON file, without its seal.
+
+    One without a seal is of an earlier version; the caller compares its content with the name.
+
+    Raises
+    ------
+    FileDamaged
+        if the file is missing, larger than `largest` bytes, no JSON object, or not what was sealed
+    """
+    state = _state_of_file(path, name)
+    try:
+        if state[1] > largest:
+            raise ValueError(f"it has more than {largest} bytes")
+        text = path.read_bytes()
+        content = json.loads(text)
+        if not isinstance(content, dict) or too_deep(content):
+            raise ValueError("it is no JSON object of tables and lists")
+        if content.pop("seal", None) is not None or _looked(path, name)[1] != NO_SEAL:
+            check(path, name)
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else f"{error}"
+        raise FileDamaged(path, name, str(reason), state) from None
+    return content
+
+
+def _looked(path: Path, name: str) -> tuple[str, str, str]:
+    """Return the name in the seal of a file, what is wrong, and the digest of the whole file."""
+    state = _state_of_file(path, name)
+    try:
+        return _read(path, state)
+    except OSError as error:
+        if error.errno not in _NO_FILE:
+            raise
+        raise FileDamaged(path, name, str(error.strerror), state) from None
+
+
+def _state_of_file(path: Path, name: str) -> State:
+    """Return the state of a regular file; anything else, such as a pipe, is not opened."""
+    state = state_of(path)
+    if state is None:
+        raise FileDamaged(path, name, "there is no such file", None)
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise FileDamaged(path, name, "it is not a file", state)
+    return state
+
+
+@lru_cache(maxsize=4096)
+def _read(path: Path, state: State) -> tuple[str, str, str]:
+    size = state[1]
+    with path.open("rb") as file:
+        file.seek(max(size - _LONGEST, 0))
+        end = file.read()
+        line = _LINE.search(end)
+        file.seek(0)
+        covered = _fed(hashlib.sha256(), file, size - len(end) + line.start(2) if line else 0)
+        whole = _fed(covered.copy(), file, size)
+    if line is None:
+        return "", NO_SEAL, whole.hexdigest()
+    wrong = "" if covered.hexdigest() == line[2].decode() else "its checksum is wrong"
+    return line[1].decode(), wrong, whole.hexdigest()
+
+
+def _fed(digest: Any, file: BinaryIO, up_to: int) -> Any:
+    """Feed a digest with a file up to a place."""
+    while piece := file.read(min(max(up_to - file.tell(), 0), 1 << 20)):
+        digest.update(piece)
+    return digest
+
+
+def digest_of(content: bytes) -> str:
+    """Return the SHA-256 of the content of a file."""
+    return hashlib.sha256(content).hexdigest()
