@@ -87,8 +87,7 @@ def _posted(store: Store, name: str) -> Scene | None:
     found = store.scenes(limit=LISTED + 1, name=name)
     if len(found) > 1:
         ids = ", ".join(each.id for each in found[:LISTED])
-        more = " and more" if len(found) > LISTED else ""
-        raise StudyError(
-            "scene", name, f"is the name of several posted scenes: give an id, one of {ids}{more}"
-        )
+        count, more = (f"over {LISTED}", " and more") if len(found) > LISTED else (len(found), "")
+        allowed = f"is the name of {count} posted scenes: give an id, one of {ids}{more}"
+        raise StudyError("scene", name, allowed)
     return store.scene(found[0].id) if found else None
