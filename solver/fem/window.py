@@ -6,7 +6,7 @@ stiffness of the rest, the rest exerts on the nodes of the window
 
     r_b - K_bi K_ii^-1 r_i - S (u - u0)_b,      S = K_bb - K_bi K_ii^-1 K_ib
 
-An increment then costs as much as its window: stress, tangent, factor and solves.
+An iteration then costs as much as its window: stress, tangent, factor and solves.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from solver.materials import PlasticState, Response
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Region:
     """Where a body may yield and touch.
 
@@ -147,10 +147,13 @@ class Windowed(Discretisation):
         K = whole.elastic_matrix()
         inside = np.setdiff1d(whole.free, self.kept)
         self._schur = SchurComplement(K, self.kept, inside, linear_solver)
-        self._edge = edge = self._schur.boundary
+        self._edge = edge = np.flatnonzero(np.isin(self.kept, whole.dofs[~self.elements]))
         every = self.kept[edge]
         own = self.elastic_matrix()[edge][:, edge]
-        self._rest = (K[every][:, every] - own).toarray() - self._schur.taken
+        self._rest = (K[every][:, every] - own).toarray()
+        # not on the boundary of what is condensed: nodes whose elements outside are held elsewhere
+        at = np.searchsorted(edge, self._schur.boundary)
+        self._rest[np.ix_(at, at)] -= self._schur.taken
 
     def at(self, u: NDArray[np.float64], plastic: PlasticState, time: float) -> Windowed:
         """Return the window for an increment from displacements and a state of the whole body."""

@@ -24,8 +24,9 @@ def gmres(
 ) -> tuple[Vector, bool]:
     """Return a solution x (n,) of A x = b, and whether its residual is small enough.
 
-    It begins with x = 0 and does not restart. `scipy.sparse.linalg.gmres` takes one product more,
-    to check the residual; for a solution to one digit that is a fifth of the work.
+    It begins with x = 0, does not restart, and ends before a product that is not finite.
+    `scipy.sparse.linalg.gmres` takes one product more, to check the residual; for a solution to one
+    digit that is a fifth of the work.
 
     Parameters
     ----------
@@ -43,8 +44,10 @@ def gmres(
     basis, H = [b / size], np.zeros((most + 1, most))
     y, small = np.zeros(0), False
     for k in range(most):
-        w = np.array(product(basis[k]))
+        w = np.array(product(basis[k]), dtype=float)
         longest = float(np.linalg.norm(w))
+        if not np.isfinite(longest):
+            break
         for i, v in enumerate(basis):
             H[i, k] = ddot(v, w)
             daxpy(v, w, a=-H[i, k])

@@ -110,13 +110,9 @@ def narrowed(
 def _expanded(
     system: System, start: State, time: float, parts: tuple[Part, ...], found: Balanced
 ) -> Balanced:
-    """Return an iterate of windows as one of the whole bodies."""
+    """Return an iterate of windows as one of the whole bodies, with the contact of these."""
     expanded = zip(parts, found.u, strict=True)
     u = tuple(p.expand(v, time) if isinstance(p, Windowed) else v for p, v in expanded)
-    rows = tuple(
-        replace(row, dofs=part.kept[row.dofs]) if isinstance(part, Windowed) and row else row
-        for part, row in zip(parts, found.candidates.rows, strict=True)
-    )
     each = zip(system.parts, u, start.plastic, strict=True)
     responses = tuple(part.respond(ui, plastic, time) for part, ui, plastic in each)
     forces = zip(system.parts, u, responses, strict=True)
@@ -125,7 +121,7 @@ def _expanded(
         u=u,
         responses=responses,
         residuals=tuple(part.residual(time, ui, response) for part, ui, response in forces),
-        candidates=replace(found.candidates, rows=rows),
+        candidates=find_candidates(system, start, u, found.contacts, time - start.time),
     )
 
 

@@ -142,6 +142,7 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     mean, bend = math.sqrt(contact.widest * contact.along), float(curvature.max())
     # columns of the zone that turn with the surface must not meet
     deepest = h * math.floor(_DEEPEST / bend / h) if bend > 0 else math.inf
+    depth = min(whole(reach * _DEPTH * mean, h), max(deepest, 2 * h))
     return RailGeometry(
         profile=p.rail_profile,
         cant=p.cant,
@@ -150,9 +151,9 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         elasticity=(p.youngs_modulus, p.poisson_ratio),
         at=at,
         half_width=half_width,
-        depth=min(whole(reach * _DEPTH * mean, h), max(deepest, 2 * h)),
+        depth=depth,
         size=h,
-        split=split_rows(p, mean, h),
+        split=min(split_rows(p, mean, h), round(depth / h)),
         spacing=p.spacing,
         reach=whole(reach * (_REACH * contact.along + contact.ahead), p.spacing),
     )

@@ -43,6 +43,18 @@ def test_too_few_products_are_told() -> None:
     assert np.linalg.norm(b - A @ x) < np.linalg.norm(b)
 
 
+@pytest.mark.parametrize("good", [0, 2])
+def test_a_product_that_is_not_finite_ends_it(good: int) -> None:
+    made = iter(range(9))
+
+    def product(v: Array) -> Array:
+        return v[::-1] + v if next(made) < good else np.full_like(v, np.nan)
+
+    x, small = gmres(product, np.arange(4.0), 1e-9, 5)
+    assert not small
+    assert np.isfinite(x).all()
+
+
 def test_a_right_hand_side_of_zeros_needs_no_product() -> None:
     x, solved = gmres(lambda v: pytest.fail("a product was asked for"), np.zeros(3), 0.1, 5)
     assert solved
