@@ -54,7 +54,8 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if nothing yields, if windows would be large, or if the increment fails in them.
+    None if nothing yields, if windows would be large, if a body comes loose, or if the increment
+    fails in them.
 
     Parameters
     ----------
@@ -92,6 +93,8 @@ def narrowed(
             ).approach()
         except (IncrementFailed, Singular):
             return None
+        if _loose(system, found):
+            return None
         count += (found.iterations, found.pivoted, found.blended)
         found = _expanded(system, start, time, parts, found)
         at, elastic_first = replace(at, u=found.u, contacts=found.contacts), False
@@ -105,6 +108,12 @@ def narrowed(
             return converged and replace(converged, windows=windows)
         needed = _needed(system, at, start, time, found.responses)
     return None
+
+
+def _loose(system: System, found: Balanced) -> bool:
+    """Whether nothing holds a body any more: it stays where it is with whole bodies alone."""
+    pairs = zip(system.interfaces, found.contacts, strict=True)
+    return any(interface.floating and not state.normal.any() for interface, state in pairs)
 
 
 def _expanded(

@@ -281,7 +281,7 @@ def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.Monkey
     monkeypatch.setattr(probe, "SECONDS", 0.2)
     asked: list[Any] = []
     monkeypatch.setattr(
-        probe, "check_directory", lambda *given: (asked.append(given), (hanging.wait(20.0), {}))[1]
+        probe, "look", lambda *given: (asked.append(given), (hanging.wait(20.0), {}))[1]
     )
 
     async def twice() -> list[bool]:

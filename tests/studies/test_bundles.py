@@ -122,6 +122,8 @@ def test_a_path_is_not_blamed_for_the_time_of_one_that_was_completed_meanwhile(
 ) -> None:
     """The first path of a bundle is complete when a limit on the time of a path is exceeded."""
     study = study_of({"half_width": [10.0, 11.0, 12.0]})
+    store.save_study(study)
+    store.reconcile()
     work = _Work(study, store, set(study.run_ids()), Limits(), 0, lambda event: None)
     paths = tuple(study.paths())
     work._walking.update({path.id: (1, 0.0) for path in paths})

@@ -341,7 +341,7 @@ def test_a_file_that_is_not_utf8_or_not_there_is_one_clear_error(tmp_path: Path)
         Study.from_toml(tmp_path / "latin.toml")
     with pytest.raises(StudyError, match="cannot be read"):
         Study.from_toml(tmp_path / "absent.toml")
-    with pytest.raises(StudyError, match="cannot be read"):
+    with pytest.raises(StudyError, match="must be a file"):
         Study.from_toml(tmp_path)
 
 

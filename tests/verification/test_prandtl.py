@@ -133,14 +133,14 @@ def test_tresca_that_hardens_a_little_has_no_limit_load():
 @pytest.mark.parametrize("share", [0.5, 0.9])
 def test_an_accident_below_the_limit_load_is_none(share, monkeypatch):
     """All increments fail from some load on."""
-    solved = Increment.solve
+    solved = Increment._iterate
 
     def broken(self):
         if self.time > share + 1e-9:
             raise IncrementFailed("broken on purpose")
         return solved(self)
 
-    monkeypatch.setattr(Increment, "solve", broken)
+    monkeypatch.setattr(Increment, "_iterate", broken)
     for law in (tresca(), steel(YIELD, 0.45)):
         pressure = LIMITS["plane_strain"] * (1.0 if law.has_corners else 2 / np.sqrt(3))
         with pytest.raises(NotConverged) as outcome:
@@ -151,14 +151,14 @@ def test_an_accident_below_the_limit_load_is_none(share, monkeypatch):
 
 def test_an_accident_far_below_a_proven_limit_is_none(monkeypatch):
     """An increment to 1.5 times the limit load proves it; its parts fail for no reason."""
-    solved = Increment.solve
+    solved = Increment._iterate
 
     def broken(self):
         if 0.3 < self.time < 1.4:
             raise IncrementFailed("broken on purpose")
         return solved(self)
 
-    monkeypatch.setattr(Increment, "solve", broken)
+    monkeypatch.setattr(Increment, "_iterate", broken)
     with pytest.raises(NotConverged) as outcome:
         pressed(tresca(), "plane_strain", LIMITS["plane_strain"], step=1.5)
     assert not isinstance(outcome.value, LimitLoad)

@@ -11,13 +11,12 @@ import pytest
 
 from solver.contact.system import System
 from solver.scenes import SCENES
-from studies import Study, StudyError
+from studies import Store, Study, StudyError
 from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.registry import attributes, name_of, scene_named, scene_of
 from studies.scenes.scene import FileScene, file_scene, read_scene
 from studies.scenes.shipped import SHIPPED
-from studies.storage.shelf import keep, kept
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -120,5 +119,6 @@ def test_nobody_else_gives_a_scene_its_name(tmp_path: Path) -> None:
 def test_a_store_keeps_no_copy_of_it(tmp_path: Path) -> None:
     scene = scene_named("rigid_punch")
     assert isinstance(scene, FileScene)
-    keep(tmp_path, scene)
-    assert kept(tmp_path, scene.id) is None
+    store = Store(tmp_path)
+    store.save_scene(scene)
+    assert store.scene(scene.id) is None
