@@ -109,11 +109,11 @@ def test_workers_are_forks_of_one_process_and_have_the_environment_of_their_own_
         return dict(os.environ)
 
     found = []
-    for change in ({"RESIDUA_LINEAR_SOLVER": "superlu"}, {}):
+    for change in ({"RESIDUA_LINEAR_SOLVER": "superlu"}, {"OMP_NUM_THREADS": "4"}):
         with monkeypatch.context() as patch:
             for name, value in change.items():
                 patch.setenv(name, value)
-            expected = {**os.environ, **change}
+            expected = {**os.environ, "OMP_NUM_THREADS": "1"}
             with own_workers(1) as access, connect(access) as client:
                 (worker,) = workers()[-1:]
                 found.append(worker.ppid())
