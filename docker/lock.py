@@ -2,11 +2,13 @@
 
 ``python docker/lock.py`` asks the package index, and installs nothing. The versions are those of
 ``constraints.txt``. A package has the digest of its wheel for each machine: Linux, Python 3.11.
+pip decides by the Python that runs it which packages a system needs, so that this must be the same.
 """
 
 from __future__ import annotations
 
 import json
+import platform
 import subprocess
 import sys
 import tempfile
@@ -18,8 +20,19 @@ ROOT = Path(__file__).parents[1]
 MACHINES = ("x86_64", "aarch64")
 HEAD = "# Made by `make lock`: {}; Python 3.11, Linux {}.\n"
 
+SYSTEM = ("3.11", "Linux", "x86_64")
+"""Version of Python, system and machine where pip finds what the image needs."""
+
 Lock = dict[str, set[str]]
 """Pinned package -> digests."""
+
+
+def check_system() -> None:
+    """End with an error where pip would find what another system needs."""
+    here = (platform.python_version().rpartition(".")[0], platform.system(), platform.machine())
+    if here != SYSTEM:
+        text = "docker/lock.py: Python {} on {} {}: must be Python {} on {} {}, as in the image"
+        raise SystemExit(text.format(*here, *SYSTEM))
 
 
 def resolved(requirements: list[str], machine: str) -> dict[str, str]:
@@ -47,7 +60,9 @@ def resolved(requirements: list[str], machine: str) -> dict[str, str]:
 
 
 def written(lock: Lock, path: Path, what: str, machines: tuple[str, ...]) -> None:
-    """Write a lock: a package a line, in alphabetical order."""
+    """Write a lock: a package a line, in alphabetical order; an empty one is an error."""
+    if not lock:
+        raise SystemExit(f"docker/lock.py: pip found no package for {path.name}: it is kept")
     lines = [
         " ".join((pin, *(f"--hash=sha256:{digest}" for digest in sorted(lock[pin]))))
         for pin in sorted(lock, key=str.lower)
@@ -58,6 +73,7 @@ def written(lock: Lock, path: Path, what: str, machines: tuple[str, ...]) -> Non
 
 def main() -> None:
     """Write both files."""
+    check_system()
     given = tomllib.loads((ROOT / "pyproject.toml").read_text())
     own = given["build-system"]["requires"] + given["project"]["dependencies"]
     lock: Lock = defaultdict(set)

@@ -30,9 +30,13 @@ DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
 def copy_kernels() -> None:
-    """Copy the compiled kernels of the image, if it has any."""
+    """Copy the compiled kernels of the image, if it has any and there is room for them."""
     if KERNELS.is_dir() and (target := os.environ.get("NUMBA_CACHE_DIR")):
-        shutil.copytree(KERNELS, target, dirs_exist_ok=True)
+        try:
+            shutil.copytree(KERNELS, target, dirs_exist_ok=True)
+        except OSError as error:  # copytree's own error lists every file
+            reason = error.strerror or f"{len(error.args[0])} files cannot be written"
+            print(f"{target}: no compiled kernels: {reason}", file=sys.stderr)
 
 
 def answers(url: str) -> bool:

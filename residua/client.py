@@ -9,8 +9,8 @@ from typing import Any
 
 import httpx
 
+from studies.appearing import appearing
 from studies.errors import StudyError
-from studies.storage.appearing import appearing
 from studies.toml import read_study
 
 _WAIT = 60.0

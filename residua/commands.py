@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -22,6 +21,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
+    from studies.execution.forking import variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
@@ -47,7 +47,8 @@ def run(options: argparse.Namespace) -> int:
             preparing.start()
         progress(event)
 
-    with _interruption() as interrupted, _safe_path():
+    # Before a worker knows the module path of this process, it would look in the current directory.
+    with _interruption() as interrupted, variables({"PYTHONSAFEPATH": "1"}):
         outcome = run_study(
             study,
             store,
@@ -200,23 +201,6 @@ def _interruption() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, before)
 
 
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let processes that are started meanwhile run no file of the current directory.
-
-    Before a worker knows the module path of this process, it would look there for Python's modules.
-    """
-    name = "PYTHONSAFEPATH"
-    before = os.environ.get(name)
-    os.environ[name] = "1"
-    try:
-        yield
-    finally:
-        del os.environ[name]
-        if before is not None:
-            os.environ[name] = before
-
-
 def _save(drawn: Any, path: Path) -> None:
     """Write a figure in the format given by the ending of the file name."""
     kinds = drawn.canvas.get_supported_filetypes()
@@ -230,7 +214,7 @@ def _save(drawn: Any, path: Path) -> None:
 @contextmanager
 def _written(option: str, path: Path) -> Iterator[Path]:
     """Give a path to write to, for the file that an option names."""
-    from studies.storage.appearing import appearing
+    from studies.appearing import appearing
     from studies.storage.room import needs_room
 
     try:

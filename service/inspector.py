@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Mapping
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
+
+from anyio import CancelScope
+from anyio.to_thread import run_sync as run_in_thread
 
 from service.guarded import Guarded
 from service.schemas import KeptScene
@@ -52,15 +56,30 @@ class Inspector:
             if not (FILE_NAME.fullmatch(name) and name.lower().endswith(FORMATS)):
                 allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
                 raise StudyError("meshes", name, allowed)
-        async with self.process.turn():
-            with scratch() as folder:
-                for name, data in {**meshes, _FILE: text}.items():
-                    (folder / name).write_bytes(data)
-                found = json.loads(await self.process.call(inspected, str(folder), name=_FILE))
+        async with self.process.turn(), _written({**meshes, _FILE: text}) as folder:
+            found = json.loads(await self.process.call(inspected, str(folder), name=_FILE))
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
+
+
+@asynccontextmanager
+async def _written(files: Mapping[str, bytes]) -> AsyncIterator[Path]:
+    """Give a temporary folder with these files; a disk may be slow, so threads work on it."""
+    kept = ExitStack()
+
+    def write() -> Path:
+        folder = kept.enter_context(scratch())
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
+        return folder
+
+    try:
+        yield await run_in_thread(write)
+    finally:
+        with CancelScope(shield=True):
+            await run_in_thread(kept.close)
 
 
 def inspected(folder: str) -> str:

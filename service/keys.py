@@ -21,7 +21,7 @@ from pathlib import Path
 from pydantic import BaseModel, TypeAdapter
 
 from studies import FileDamaged, Store, StudyError
-from studies.storage.appearing import appearing
+from studies.appearing import appearing
 from studies.storage.seal import State, content_of, sealed_json, state_of
 
 

@@ -10,7 +10,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
 from studies import StudyError
-from studies.toml import DEEPEST, too_deep
+from studies.toml import DEEPEST, depth
 
 
 class StrictRequest(Request):
@@ -19,8 +19,9 @@ class StrictRequest(Request):
     async def json(self) -> Any:
         """Return the body, read as JSON."""
         content = json.loads(await self.body(), object_pairs_hook=_distinct)
-        if too_deep(content):
-            raise StudyError("body", None, f"must have lists and objects at most {DEEPEST} deep")
+        if (levels := depth(content)) > DEEPEST:
+            allowed = f"must have lists and objects at most {DEEPEST} deep"
+            raise StudyError("body", f"{levels} deep", allowed)
         return content
 
 

@@ -39,7 +39,11 @@ def scratch() -> Iterator[Path]:
 
 def remove_left() -> None:
     """Remove the folders of this user that a killed process has left."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+    try:
+        left = list(Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"))
+    except OSError:  # there is no folder for temporary files
+        return
+    for folder in left:
         with contextlib.suppress(OSError):  # of another user, in use, or gone
             descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
             try:

@@ -38,14 +38,15 @@ def read_bytes(path: Path | str, field: str) -> bytes:
         raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
 
 
-def too_deep(content: Any) -> bool:
-    """Whether lists and tables are more than `DEEPEST` inside one another."""
-    level = [content]
-    for _ in range(DEEPEST + 1):
-        level = [each for each in level if isinstance(each, dict | list)]
-        inside = (each.values() if isinstance(each, dict) else each for each in level)
+def depth(content: Any) -> int:
+    """Return how many lists and tables are inside one another; an empty one counts for nothing."""
+    found, level = -1, [content]
+    while level:
+        found += 1
+        tables = [each for each in level if isinstance(each, dict | list)]
+        inside = (each.values() if isinstance(each, dict) else each for each in tables)
         level = list(chain.from_iterable(inside))
-    return bool(level)
+    return found
 
 
 def read_toml(path: Path | str, field: str) -> dict[str, Any]:
@@ -107,8 +108,8 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
     """
     try:
         tables = tomllib.loads(data.decode("utf-8-sig"))
-        if too_deep(tables):
-            raise ValueError(f"it has tables or lists more than {DEEPEST} deep")
+        if (levels := depth(tables)) > DEEPEST:
+            raise ValueError(f"it has tables or lists {levels} deep; at most {DEEPEST} are allowed")
         plain: dict[str, Any] = json.loads(json.dumps(tables, default=str))
     except (ValueError, RecursionError) as error:
         raise StudyError(field, name, f"must be valid TOML: {error}") from None

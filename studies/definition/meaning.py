@@ -13,13 +13,14 @@ import ast
 import gc
 import hashlib
 import json
-import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
+
+from studies.appearing import appearing
 
 _NO_MEANING = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
 """Fields of Python's grammar that follow from the position of a node, or come from comments."""
@@ -58,11 +59,10 @@ def _kept(path: Path, maker: str) -> Mapping[str, str]:
 
 
 def _keep(path: Path, maker: str, digests: Mapping[str, str]) -> None:
-    part = path.with_suffix(f".{os.getpid()}")
     with suppress(OSError):  # such as a directory that only its owner may write to
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(json.dumps({"maker": maker, "digests": digests}), encoding="ascii")
-        part.replace(path)
+        with appearing(path) as part:
+            part.write_text(json.dumps({"maker": maker, "digests": digests}), encoding="ascii")
 
 
 def meaning(source: bytes | str) -> str:

@@ -14,7 +14,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
-from studies.storage.appearing import appearing
+from studies.appearing import appearing
 
 _LIFE = timedelta(days=3650)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import threading
 import time
@@ -14,7 +15,7 @@ from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError, Unusable
-from studies.execution.forking import beginning, prepare
+from studies.execution.forking import prepare
 from studies.execution.script import GUARD, check_script
 from studies.scratch import scratch
 
@@ -151,10 +152,7 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
         from distributed import LocalCluster, Security
 
         distributed.utils._forkserver_preload_set = True  # or dask would load pandas everywhere
-        started = {
-            "distributed.worker.multiprocessing-method": method,
-            "distributed.worker.preload": [beginning(_FROM_THE_START)],
-        }
+        started = {"distributed.worker.multiprocessing-method": method}
         security = Security.temporary()
         with scratch() as folder, dask.config.set({**CONFIGURATION, **_CLOSED, **started}):
             try:
@@ -169,6 +167,7 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
                     local_directory=str(folder),
+                    env={**os.environ, **_FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
                     **({"memory_limit": memory} if memory else {}),
                 ).result()

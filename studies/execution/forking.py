@@ -9,7 +9,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 from solver.parts import own_files
 
@@ -23,8 +24,13 @@ NEEDED = (
     "solver.scenes.punch",
     "studies.execution.grid",
     "studies.execution.task",
+    "studies.execution.loaded",
 )
 """Modules that are loaded before a worker is forked; with them all that they import."""
+
+
+FORK_SERVER = "_RESIDUA_FORK_SERVER"
+"""Environment variable that tells `studies.execution.loaded` that forks follow."""
 
 
 def prepare(settings: Mapping[str, object]) -> str:
@@ -43,22 +49,29 @@ def prepare(settings: Mapping[str, object]) -> str:
 
     multiprocessing.get_context("forkserver").set_forkserver_preload(list(NEEDED))
     # The modules are found where this process finds them, before anything in its directory.
-    found = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "PYTHONSAFEPATH": "1"}
-    before = os.environ.copy()
-    os.environ.update({**_texts(settings), **before, **found})
-    try:
+    found = {
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+        "PYTHONSAFEPATH": "1",
+        FORK_SERVER: "1",
+    }
+    with variables({**settings, **found}):
         ensure_running()
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
     return "forkserver"
 
 
-def beginning(settings: Mapping[str, object]) -> str:
-    """Return what a worker runs first: it takes its environment from this process."""
-    environment = {**_texts(settings), **os.environ}
-    return f"import os\nos.environ.clear()\nos.environ.update({environment!r})\n"
+@contextmanager
+def variables(changes: Mapping[str, object]) -> Iterator[None]:
+    """Set environment variables for the processes that are started meanwhile.
 
-
-def _texts(settings: Mapping[str, object]) -> dict[str, str]:
-    return {name: str(value) for name, value in settings.items()}
+    Other variables are left alone, because other threads may read them.
+    """
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update({name: str(value) for name, value in changes.items()})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

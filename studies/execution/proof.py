@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.storage.appearing import appearing
+from studies.appearing import appearing
 from studies.storage.store import Store
 
 _PATIENCE = 2.0

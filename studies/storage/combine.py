@@ -11,13 +11,13 @@ import h5netcdf
 import h5py
 
 from solver.scenes import Scene
+from studies.appearing import appearing
 from studies.definition.cases import Case
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, SYMMETRIC
 from studies.errors import FileDamaged
 from studies.storage import dataset as layout
 from studies.storage import seal
-from studies.storage.appearing import appearing
 from studies.storage.frame import Frame
 from studies.storage.held import Combined
 from studies.storage.provenance import provenance, together, what_ran

@@ -13,10 +13,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from studies.appearing import appearing
 from studies.definition.identity import sources
 from studies.definition.study import Study
 from studies.errors import FileDamaged
-from studies.storage.appearing import appearing
 from studies.storage.room import needs_room
 from studies.storage.seal import content_of, digest, digest_of, sealed_json
 from studies.storage.store import Store

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from studies.errors import FileDamaged
-from studies.toml import too_deep
+from studies.toml import DEEPEST, depth
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of netCDF files that have the line."""
@@ -104,7 +104,7 @@ def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
             raise ValueError(f"it has more than {largest} bytes")
         text = path.read_bytes()
         content = json.loads(text)
-        if not isinstance(content, dict) or too_deep(content):
+        if not isinstance(content, dict) or depth(content) > DEEPEST:
             raise ValueError("it is no JSON object of tables and lists")
         if content.pop("seal", None) is not None or _looked(path, name)[1] != NO_SEAL:
             check(path, name)

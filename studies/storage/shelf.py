@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from solver.scenes import Scene
+from studies.appearing import appearing
 from studies.definition.parameters import parameters_of
 from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
 from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
-from studies.storage.appearing import appearing
 from studies.storage.database import Database
 from studies.storage.seal import content_of, sealed_json, state_of
 

@@ -32,6 +32,7 @@ from typing import Any
 
 from solver.results.record import Record
 from solver.scenes import Scene
+from studies.appearing import appearing
 from studies.definition.cases import Case
 from studies.definition.identity import is_id
 from studies.definition.study import Study
@@ -40,7 +41,6 @@ from studies.scenes.description import Description
 from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
-from studies.storage.appearing import appearing
 from studies.storage.catalogue import Catalogue, Row
 from studies.storage.lock import lock
 from studies.storage.readback import verified

@@ -18,7 +18,8 @@ LAYERS = {
         "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
     ),
     "studies": (
-        "errors", "toml", "scratch", "scenes", "definition", "storage", "execution", "views",
+        "errors", "toml", "appearing", "scratch", "scenes", "definition", "storage", "execution",
+        "views",
     ),
     "residua": (
         "neighbours", "status", "client", "cost", "progress", "keys", "commands", "arguments",

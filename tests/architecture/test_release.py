@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import runpy
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -118,3 +119,15 @@ def test_make_targets_named_in_a_page_exist(page: Path) -> None:
 
 def test_readme_starts_with_run_and_test() -> None:
     assert {"run", "test"} <= set(re.findall(r"`make ([a-z]+)`", (ROOT / "README.md").read_text()))
+
+
+def test_a_lock_is_made_where_the_image_is_at_home_and_never_empty(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = runpy.run_path(str(ROOT / "docker" / "lock.py"))
+    monkeypatch.setattr("platform.machine", lambda: "arm64")
+    with pytest.raises(SystemExit, match=r" arm64: must be Python 3\.11 on Linux x86_64"):
+        module["main"]()
+    with pytest.raises(SystemExit, match=r"no package for a\.lock"):
+        module["written"]({}, tmp_path / "a.lock", "", ())
+    assert not list(tmp_path.iterdir())

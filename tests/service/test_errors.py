@@ -13,7 +13,8 @@ from fastapi import FastAPI
 
 from service.app import create_app
 from service.settings import Settings
-from studies import Study
+from service.strict import StrictRequest
+from studies import Study, StudyError
 from tests.service.servers import Server, fake_study
 
 UNKNOWN = "0" * 32
@@ -111,6 +112,20 @@ def test_a_body_that_is_not_json_is_refused(service: Server, body: bytes) -> Non
     answer = service.client.post("/studies", content=body, headers=JSON)
     (error,) = problem(answer, 400)["errors"]
     assert error["field"] == "body" and "JSON" in error["allowed"]
+
+
+@pytest.mark.parametrize("levels", [50, 51, 80])
+def test_the_depth_of_a_body_is_limited_and_told(levels: int) -> None:
+    async def receive() -> dict[str, object]:
+        body = b'{"a": ' + b"[" * (levels - 1) + b"1" + b"]" * (levels - 1) + b"}"
+        return {"type": "http.request", "body": body}
+
+    read = StrictRequest({"type": "http", "headers": []}, receive).json()
+    if levels == 50:
+        assert list(asyncio.run(read)) == ["a"]
+    else:
+        with pytest.raises(StudyError, match=f"{levels} deep.* at most 50 deep"):
+            asyncio.run(read)
 
 
 @pytest.mark.parametrize("body", [b"", b"[]", b'"text"', b"3", b"null"])

@@ -87,3 +87,24 @@ def test_kernels_of_the_image_are_copied_to_where_the_compiler_looks_for_them(
     for _ in range(2):  # a container that starts again
         copy()
         assert (cache / "sweep" / "flow.nbi").read_bytes() == b"compiled"
+
+
+def test_a_file_system_that_takes_no_kernels_ends_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = runpy.run_path(str(ROOT / "docker" / "watched.py"))["copy_kernels"]
+    monkeypatch.setitem(copy.__globals__, "KERNELS", tmp_path)
+    (tmp_path / "flow.nbi").write_bytes(b"compiled")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/proc/kernels")
+    copy()
+    told = capsys.readouterr().err
+    assert told.startswith("/proc/kernels: no compiled kernels: ")
+    assert told.count("\n") == 1
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "cache" / "flow.nbi").symlink_to("/proc/none/flow.nbi")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setitem(copy.__globals__, "KERNELS", tmp_path / "kernels")
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels" / "flow.nbi").write_bytes(b"compiled")
+    copy()
+    assert "cache: no compiled kernels: 1 files cannot be written" in capsys.readouterr().err

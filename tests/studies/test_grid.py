@@ -12,11 +12,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import dask
 import psutil
 import pytest
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
 from studies.execution.cluster import connect
+from studies.execution.forking import variables
 from studies.execution.grid import Finished, Grid, Message
 from studies.execution.watch import Waiting
 from tests.studies.chores import chatter, freeze, nap, need
@@ -109,19 +111,32 @@ def test_workers_are_forks_of_one_process_and_have_the_environment_of_their_own_
         return dict(os.environ)
 
     found = []
-    for change in ({"RESIDUA_LINEAR_SOLVER": "superlu"}, {}):
+    for change in ({"RESIDUA_LINEAR_SOLVER": "superlu"}, {"OMP_NUM_THREADS": "4"}):
         with monkeypatch.context() as patch:
             for name, value in change.items():
                 patch.setenv(name, value)
-            expected = {**os.environ, **change}
+            expected = {**os.environ, "OMP_NUM_THREADS": "1"}
             with own_workers(1) as access, connect(access) as client:
                 (worker,) = workers()[-1:]
                 found.append(worker.ppid())
                 (seen,) = client.run(environment).values()
+                preloads = dask.config.get("distributed.worker.preload")
+                assert preloads == [], "its text is a file that others can read"
         assert {name: seen.get(name) for name in expected} == expected
         assert seen.get("RESIDUA_LINEAR_SOLVER") == change.get("RESIDUA_LINEAR_SOLVER")
         assert seen["MALLOC_TRIM_THRESHOLD_"] == str(2**28)
     assert found[0] == found[1] != os.getpid()
+
+
+def test_variables_are_set_for_a_while_and_others_are_left_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    before = dict(os.environ)
+    with variables({"OMP_NUM_THREADS": 1, "MKL_NUM_THREADS": 1}):
+        assert dict(os.environ) == {**before, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    assert dict(os.environ) == before
 
 
 def test_certificates_that_are_missing_or_bad_are_told(tmp_path: Path) -> None:

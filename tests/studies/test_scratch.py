@@ -63,3 +63,17 @@ def test_a_folder_of_a_killed_process_is_removed_by_the_next(folders: Path) -> N
         "residua-results",
     }
     assert (ROOT / "pyproject.toml").exists()
+
+
+def test_no_folder_for_temporary_files_leaves_nothing_to_remove(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def none() -> str:
+        asked.append(1)
+        raise FileNotFoundError("No usable temporary directory found")
+
+    monkeypatch.setattr(tempfile, "gettempdir", none)
+    remove_left()
+    assert asked

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from studies import CatalogueDamaged, Store, StoreBusy, Study, run_study
-from studies.storage.appearing import appearing
+from studies.appearing import appearing
 from tests.studies.conftest import compute_here, fake_study
 
 pytestmark = pytest.mark.usefixtures("one_worker")
