@@ -411,7 +411,7 @@ def _noted(dataset: Path, study_id: str) -> bool:
             return False
         with h5py.File(dataset, "r") as file:
             return runfile.global_attributes(file)["id"] == study_id
-    except (FileDamaged, LookupError, OSError, TypeError):
+    except (FileDamaged, LookupError, TypeError):
         return False
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import logging
 import os
@@ -24,7 +25,7 @@ from service.app import create_app
 from service.errors import Conflict
 from service.job import StudyState
 from service.jobs import Jobs
-from service.keys import Keys, Scope
+from service.keys import Keys, KeysError, Scope
 from service.probe import look
 from service.recovery import Mender, open_queue
 from service.settings import Settings
@@ -414,6 +415,30 @@ def test_keys_of_an_earlier_version_count_and_a_damaged_file_is_set_aside_by_the
     Keys(tmp_path).add("bert", Scope.ADMIN)
     assert list(Keys(tmp_path).all()) == ["bert"]
     assert (tmp_path / "unreadable" / "keys.json").read_text() == "{"
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EACCES, errno.ENOMEM, errno.EIO])
+def test_keys_that_the_system_cannot_read_now_are_not_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    Keys(tmp_path).add("anna", Scope.READ)
+    for failing in ("pathlib.Path.read_bytes", "studies.storage.seal._stat"):
+        with monkeypatch.context() as patch:
+            patch.setattr(failing, partial(refuse, number))
+            for change in (lambda keys: keys.add("bert", Scope.READ), lambda k: k.remove("anna")):
+                with pytest.raises(KeysError, match="cannot be read"):
+                    change(Keys(tmp_path))
+    assert list(Keys(tmp_path).all()) == ["anna"]
+    assert not (tmp_path / "unreadable").exists()
+    (tmp_path / "keys.json").write_text("{")
+    with pytest.raises(KeysError, match="damaged"):
+        Keys(tmp_path).remove("anna")
+    assert (tmp_path / "keys.json").read_text() == "{"
+
+
+def refuse(number: int, *given: Any, **named: Any) -> None:
+    """Fail as the system does when it has no descriptor, no right or no memory."""
+    raise OSError(number, os.strerror(number))
 
 
 def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
