@@ -96,7 +96,7 @@ def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
     FileDamaged
         if the file is missing, larger than `largest` bytes, no JSON object, or not what was sealed
     """
-    text, state = whole(path, name, largest)
+    text, state = bytes_of(path, name, largest)
     try:
         content = json.loads(text)
         if not isinstance(content, dict) or too_deep(content):
@@ -108,7 +108,7 @@ def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
     return content
 
 
-def whole(path: Path, name: str, largest: int = LARGEST) -> tuple[bytes, State]:
+def bytes_of(path: Path, name: str, largest: int = LARGEST) -> tuple[bytes, State]:
     """Return the bytes of a file and its state.
 
     Raises

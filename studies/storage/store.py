@@ -70,6 +70,7 @@ class Store:
     def __init__(self, directory: Path | str, held: bool = False) -> None:
         self.directory = Path(directory)
         self.held = held
+        self._refused: set[str] = set()
         self.catalogue = Catalogue(self.directory / "catalogue.sqlite", self.directory / "runs")
 
     def run_path(self, run_id: str) -> Path:
@@ -87,6 +88,8 @@ class Store:
     def scene(self, scene_id: str, whole: bool = True) -> Scene | None:
         """Return the scene from a file that is stored here under this id, or None.
 
+        A damaged one is set aside. One that this version does not allow stays, and is told once.
+
         One that is not ``whole`` has no meshes, so that it takes little time and memory.
         """
         read = shelf.kept if whole else shelf.described
@@ -94,6 +97,12 @@ class Store:
             return read(self.directory, scene_id) if is_id(scene_id) else None
         except FileDamaged as error:
             self.set_aside(error, "post the scene again")
+            return None
+        except ValueError as error:
+            if scene_id not in self._refused:
+                self._refused.add(scene_id)
+                reason = f"{error}".replace("\n", " ")
+                _LOG.warning("scenes/%s is not allowed in this version: %s", scene_id, reason)
             return None
 
     def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:

@@ -29,7 +29,8 @@ from service.keys import Keys, KeysError, Scope
 from service.probe import look
 from service.recovery import Mender, open_queue
 from service.settings import Settings
-from studies import FileDamaged, Store, Study, open_netcdf
+from studies import FileDamaged, Store, Study, StudyError, open_netcdf
+from studies.errors import SceneError
 from studies.scenes.scene import read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
@@ -299,6 +300,35 @@ def test_a_damaged_scene_is_set_aside_and_spoils_nothing_else(
     assert (tmp_path / "unreadable" / pin.id / "scene.json").read_text() == content
     store.save_scene(pin)
     assert store.scene(pin.id) is not None
+
+
+def test_a_scene_that_a_later_version_refuses_stays_and_is_not_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    pin = read_scene(ROOT / "data/scenes/pin.toml")
+    Store(tmp_path).save_scene(pin)
+    store, wrong = Store(tmp_path), StudyError("clearance", 0.01, "must be larger")
+    for each in (SceneError("pin.toml", [wrong]), ValueError("a stricter rule")):
+        with monkeypatch.context() as patch:
+            patch.setattr(shelf, "file_scene", lambda description, each=each: raised(each))
+            assert [store.scenes(9), store.scenes(9), store.scene(pin.id)] == [[], [], None]
+    assert len(warned(caplog, f"scenes/{pin.id} is not allowed in this version: ")) == 1
+    assert not (tmp_path / "unreadable").exists()
+    assert [each.id for each in store.scenes(9)] == [pin.id]
+
+
+def raised(error: Exception) -> None:
+    raise error
+
+
+def test_a_pipe_in_place_of_a_mesh_is_damage(tmp_path: Path) -> None:
+    pin, store = read_scene(ROOT / "data/scenes/pin.toml"), Store(tmp_path)
+    store.save_scene(pin)
+    mesh = tmp_path / "scenes" / pin.id / "pin.msh"
+    mesh.unlink()
+    os.mkfifo(mesh)
+    assert store.scene(pin.id) is None
+    assert (tmp_path / "unreadable" / pin.id / "pin.msh").is_fifo()
 
 
 @pytest.mark.parametrize("content", [None, "", "[]", "{}", '{"name": "other"}'])
