@@ -106,15 +106,28 @@ class Store:
             return None
 
     def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:
-        """Return a page of the scenes that are stored here, or of those of a name, newest first."""
+        """Return a page of the scenes that are stored here, or of those of a name, newest first.
+
+        Raises
+        ------
+        CatalogueDamaged
+            if the index is damaged again after it was made again, or cannot be set aside
+        """
         index = shelf.Index(self.directory)
+        state = seal.state_of(index.path)
         try:
-            with suppress(StoreFull):  # then the latest ones are missing
-                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
-            return index.page(limit, offset, name)
+            return self._listed(index, limit, offset, name)
         except CatalogueDamaged as error:
-            self.put_aside(index.path, str(error.__cause__), "it is made again from the scenes")
-            return self.scenes(limit, offset, name) if not index.path.exists() else []
+            damaged = FileDamaged(index.path, index.path.name, str(error.__cause__), state)
+            self.set_aside(damaged, "it is made again from the scenes")
+        return self._listed(index, limit, offset, name)
+
+    def _listed(
+        self, index: shelf.Index, limit: int, offset: int, name: str | None
+    ) -> list[shelf.Entry]:
+        with suppress(StoreFull):  # then the latest ones are missing
+            index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+        return index.page(limit, offset, name)
 
     def save_scene(self, scene: Scene) -> None:
         """Store a scene from a file, so that studies can name it by its id."""

@@ -9,6 +9,7 @@ import logging
 import os
 import random
 import shutil
+import sqlite3
 import threading
 import time
 from collections.abc import Callable
@@ -30,7 +31,7 @@ from service.probe import look
 from service.recovery import Mender, open_queue
 from service.settings import Settings
 from studies import FileDamaged, Store, Study, StudyError, open_netcdf
-from studies.errors import SceneError
+from studies.errors import CatalogueDamaged, SceneError
 from studies.scenes.scene import read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
@@ -546,6 +547,23 @@ def test_scenes_are_read_once_for_lists_and_searches(
     (store.directory / "scenes.sqlite").write_text("no index" * 100)
     assert set(listed("?limit=1000")) == set(ids)
     assert (store.directory / "unreadable" / "scenes.sqlite").exists()
+
+
+@pytest.mark.parametrize("begun", [False, True], ids=["missing", "damaged"])
+def test_an_index_of_scenes_that_cannot_be_made_again_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begun: bool
+) -> None:
+    store = Store(tmp_path)
+    store.save_scene(read_scene(ROOT / "data/scenes/pin.toml"))
+    if begun:
+        (tmp_path / "scenes.sqlite").write_text("no index" * 100)
+        monkeypatch.setattr(Path, "rename", partial(refuse, errno.EROFS))
+    else:  # as in a directory that is read-only
+        cannot_open = sqlite3.OperationalError("unable to open database file")
+        cannot_open.sqlite_errorcode = sqlite3.SQLITE_CANTOPEN
+        monkeypatch.setattr(sqlite3, "connect", lambda *given, **named: raised(cannot_open))
+    with pytest.raises(CatalogueDamaged if begun else OSError, match=r"scenes\.sqlite"):
+        store.scenes(9)
 
 
 def page(ask: Ask, offset: int) -> list[dict[str, Any]]:
