@@ -160,6 +160,15 @@ def test_a_run_damaged_in_mid_study_is_missing_and_computed_by_the_next_repeat(
     assert repeat(study, store, monkeypatch) == [first(study)]
 
 
+def test_a_damaged_run_that_cannot_be_moved_is_missing(
+    damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = damaged
+    flip(study, store)
+    monkeypatch.setattr(Store, "put_aside", lambda *given: None)
+    assert combine(study, store, list(study.cases())).counts == {"missing": 1, "ok": 3}
+
+
 def test_rows_without_files_are_missing(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers that see another directory report runs that are not here."""
     study = fake_study()
