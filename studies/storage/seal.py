@@ -20,6 +20,7 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -76,6 +77,17 @@ def check(path: Path, name: str) -> None:
     found, reason, _ = _looked(path, name)
     if reason or found != name:
         raise FileDamaged(path, name, reason or f"it is the {found}", state_of(path))
+
+
+def lost(path: Path) -> bool:
+    """Whether a file without a seal had one: it has the attribute `SEALED`.
+
+    The bytes are searched, because HDF5 may end the process when it reads a damaged file.
+    """
+    if not path.stat().st_size:
+        return False
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        return content.find(SEALED["checksum"].encode()) >= 0
 
 
 def digest(path: Path) -> str:

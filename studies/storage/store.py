@@ -164,9 +164,6 @@ class Store:
             seal.check(path, f"dataset {study_id}")
         except FileDamaged as error:
             if error.reason == seal.NO_SEAL and _noted(path, study_id):
-                before = path.stat()
-                seal.seal(path, f"dataset {study_id}")
-                os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))  # it is not newer now
                 return path
             self.set_aside(error, "it is made again from the runs")
             raise
