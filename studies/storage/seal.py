@@ -31,7 +31,7 @@ SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of netCDF files that have the line."""
 
 LARGEST = 50_000_000
-"""Largest size of a JSON file that is read [bytes]."""
+"""Largest size of a JSON file or a mesh that is read [bytes]."""
 
 NO_SEAL = "it has no seal"
 

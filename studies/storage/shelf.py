@@ -1,7 +1,8 @@
 """Scenes from files, stored beside the runs: ``scenes/<scene id>/`` with scene.json and meshes.
 
-The index ``scenes.sqlite`` has what lists and searches need, so that a scene is read once for them,
-and otherwise when it is used. It follows the files.
+The index ``scenes.sqlite`` has what lists need, and the names of parameters for searches. It
+follows the files. A scene is read once for it, and otherwise when it is used, or when a search
+names one of its parameters.
 """
 
 from __future__ import annotations
