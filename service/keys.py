@@ -95,36 +95,40 @@ class Keys:
         return fits[0].scope if fits else None
 
     def add(self, name: str, scope: Scope) -> str:
-        """Make a key and return its text, which is not stored; the name must be new."""
+        """Make a key and return its text, which is not stored; the name must be new.
+
+        A damaged file is set aside; raise `KeysError` if the system cannot read the file.
+        """
         if not re.fullmatch(r"(?!seal$)[\w.-]{1,64}", name, re.ASCII):
             allowed = "must be 1 to 64 letters, digits, '.', '_' or '-', and not 'seal'"
             raise StudyError("name", name, allowed)
         text = f"residua_{secrets.token_urlsafe(32)}"  # no dash first; a leaked key is recognised
-        with self._changing() as keys:
+        with self._changing(anew=True) as keys:
             if name in keys:
                 raise StudyError("name", name, "must be new: there is a key of this name")
             keys[name] = Key(scope=scope, sha256=_digest(text), created=datetime.now(UTC))
         return text
 
     def remove(self, name: str) -> None:
-        """Delete the key of this name."""
+        """Delete the key of this name; raise `KeysError` if the keys cannot be read."""
         with self._changing() as keys:
             if keys.pop(name, None) is None:
                 names = ", ".join(keys) or "none"
                 raise StudyError("name", name, f"must be the name of a key; there are: {names}")
 
     @contextmanager
-    def _changing(self) -> Iterator[dict[str, Key]]:
-        """Give the keys for a change, then replace the file, which only its owner may read."""
+    def _changing(self, anew: bool = False) -> Iterator[dict[str, Key]]:
+        """Give the keys for a change, then replace the file, which only its owner may read.
+
+        With `anew`, a damaged file is set aside first.
+        """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         lock = os.open(self.path.parent, os.O_RDONLY)  # simultaneous commands wait for each other
         try:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            try:
-                keys = self._kept()
-            except FileDamaged as error:
-                Store(self.path.parent).set_aside(error, "make all keys again")
-                keys = {}
+            if anew:
+                self._set_damaged_aside()
+            keys = self.all()
             yield keys
             with appearing(self.path) as part:
                 part.touch(mode=0o600)
@@ -134,6 +138,15 @@ class Keys:
                     os.chown(part, owner.st_uid, owner.st_gid)
         finally:
             os.close(lock)
+
+    def _set_damaged_aside(self) -> None:
+        """Set the file aside if what it holds is damaged, not if the system cannot read it."""
+        try:
+            self._kept()
+        except FileDamaged as error:
+            Store(self.path.parent).set_aside(error, "make all keys again")
+        except OSError:
+            pass  # told when the keys are used
 
 
 def _digest(text: str) -> str:

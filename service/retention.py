@@ -22,6 +22,7 @@ from service.errors import Conflict, NotFound
 from service.jobs import Jobs
 from studies import FileDamaged, Store
 from studies.scenes.description import Description
+from studies.storage.seal import content_of
 
 log = logging.getLogger(__name__)
 
@@ -40,8 +41,8 @@ class Keeper:
     ----------
     jobs, store : the queue and the store
     computes : (study id) -> whether a process may still work on it
-    days, size : age [days] and total size [bytes] beyond which studies that have ended are deleted,
-        the oldest first; None for no limit
+    days, size : age [days], and total size of runs and studies [bytes], beyond which studies that
+        have ended are deleted, the oldest first; None for no limit
     scenes : largest size of all posted scenes [bytes]; None for no limit
     """
 
@@ -82,7 +83,12 @@ class Keeper:
         return self.store.keep_scene(scene_id, description)
 
     def delete_scene(self, scene_id: str) -> None:
-        """Delete a posted scene; raise `Conflict` if a study in the queue names it."""
+        """Delete a posted scene; raise `Conflict` if a study, of the queue or not, names it."""
+        for path in (self.store.directory / "studies").glob("*/study.json"):
+            study_id = path.parent.name
+            with suppress(FileDamaged):
+                if content_of(path, f"study {study_id}").get("scene") == scene_id:
+                    raise Conflict(f"the study {study_id} needs this scene: delete it first")
         with self.jobs.transaction() as queue:
             user = queue.execute("SELECT id FROM job WHERE scene = ?", (scene_id,)).fetchone()
             if user:
@@ -137,8 +143,7 @@ class Keeper:
                 " AND finished IS NOT NULL ORDER BY finished, turn"
             ).fetchall()
         oldest = datetime.now(UTC) - timedelta(days=self.days) if self.days else None
-        scenes = size(self.store.directory / "scenes")  # no study that is deleted frees these
-        used = size(self.store.directory) - scenes
+        used = sum(size(self.store.directory / name) for name in ("runs", "studies"))
         excess = used - self.size if self.size is not None else 0
         for job in ended:
             old = oldest is not None and datetime.fromisoformat(job["finished"]) < oldest

@@ -13,6 +13,7 @@ from studies.errors import StudyError
 from studies.execution.cluster import Access
 from studies.execution.estimate import Bounds
 from studies.execution.limits import Limits
+from studies.toml import LARGEST
 
 
 def _words(given: Any) -> Any:
@@ -59,7 +60,7 @@ class Settings(BaseSettings):
     )
     max_body_bytes: int = Field(default=1_000_000, ge=1, description="largest request body")
     max_scene_bytes: int = Field(
-        default=20_000_000, ge=1, description="largest scene file with its meshes"
+        default=20_000_000, ge=1, le=LARGEST, description="largest scene file with its meshes"
     )
     max_scenes_bytes: int = Field(
         default=10_000_000_000,

@@ -25,9 +25,12 @@ def scratch() -> Iterator[Path]:
     remove_left()
     while True:
         folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
-        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            descriptor = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # another process has removed it before it was opened
+            continue
         fcntl.flock(descriptor, fcntl.LOCK_EX)
-        if folder.exists():  # else another process has found it before it was locked
+        if folder.exists():  # else the same before it was locked
             break
         os.close(descriptor)
     try:

@@ -39,12 +39,15 @@ def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
     without a record are NaN.
     """
     places = {case.id: case.index for case in cases}
+    damaged: set[str] = set()
     while True:
-        found = {key: at for key, at in places.items() if store.run_path(key).exists()}
+        left = {key: at for key, at in places.items() if key not in damaged}
+        found = {key: at for key, at in left.items() if store.run_path(key).exists()}
         try:
             return _combined(study, store, found, [key for key in places if key not in found])
         except FileDamaged as error:  # the data set has parts of it: begin again
             store.set_aside(error, "the run will be computed again")
+            damaged.add(error.path.stem)  # it may be there still, if it cannot be moved
 
 
 def _combined(

@@ -60,13 +60,14 @@ class Database:
         except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
             raise  # a programming error, not damage of the file
         except (sqlite3.DatabaseError, WrongContent) as error:
-            raise self._translated(error) from error
+            raise self._translated(error, mode) from error
 
-    def _translated(self, error: Exception) -> Exception:
+    def _translated(self, error: Exception, mode: str) -> Exception:
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)
         if code in _FULL:
             return StoreFull(str(self.path.parent))
-        if code & 0xFF in _DAMAGE or not self.path.is_file():
+        to_create = mode == "rwc" and not self.path.exists()  # and it could not be created
+        if code & 0xFF in _DAMAGE or not (to_create or self.path.is_file()):
             self.damaged = True
             return self._lost(f"{self.path.name} is missing or damaged ({error})")
         reason = f"{self.path.name} cannot be used now: {error}"

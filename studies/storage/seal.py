@@ -14,10 +14,13 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import os
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -28,14 +31,15 @@ SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of netCDF files that have the line."""
 
 LARGEST = 50_000_000
-"""Largest size of a JSON file that is read [bytes]."""
+"""Largest size of a JSON file or a mesh that is read [bytes]."""
 
 NO_SEAL = "it has no seal"
 
 _LINE = re.compile(rb'([a-z]+ [\w.-]+) sha256 ([0-9a-f]{64})(?:"\n\})?\n\Z')
 _LONGEST = 256
 """Length of the end of a file in which the line is searched [bytes]."""
-_NO_FILE = frozenset({errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EIO, errno.ELOOP})
+_NO_FILE = frozenset({errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP})
+"""Errors of the system that tell that there is no such file; others say nothing about it."""
 
 State = tuple[int, int, int, int]
 
@@ -64,13 +68,8 @@ def seal(path: Path, name: str) -> None:
 
 def state_of(path: Path) -> State | None:
     """Return inode, length and times of change [ns] of a path; None if there is nothing."""
-    try:
-        found = path.stat()
-    except OSError as error:
-        if error.errno not in _NO_FILE:
-            raise
-        return None
-    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+    found = _stat(path)
+    return None if found is None else _state(found)
 
 
 def check(path: Path, name: str) -> None:
@@ -80,11 +79,22 @@ def check(path: Path, name: str) -> None:
         raise FileDamaged(path, name, reason or f"it is the {found}", state_of(path))
 
 
+def lost(path: Path) -> bool:
+    """Whether a file without a seal had one: it has the attribute `SEALED`.
+
+    The bytes are searched, because HDF5 may end the process when it reads a damaged file.
+    """
+    if not path.stat().st_size:
+        return False
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        return content.find(SEALED["checksum"].encode()) >= 0
+
+
 def digest(path: Path) -> str:
-    """Return the SHA-256 of a whole file; empty if it cannot be read."""
+    """Return the SHA-256 of a whole file; empty if there is no such file."""
     try:
         return _looked(path, path.name)[2]
-    except (FileDamaged, OSError):
+    except FileDamaged:
         return ""
 
 
@@ -98,27 +108,45 @@ def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
     FileDamaged
         if the file is missing, larger than `largest` bytes, no JSON object, or not what was sealed
     """
-    state = _state_of_file(path, name)
+    text, state = bytes_of(path, name, largest)
     try:
-        if state[1] > largest:
-            raise ValueError(f"it has more than {largest} bytes")
-        text = path.read_bytes()
         content = json.loads(text)
         if not isinstance(content, dict) or depth(content) > DEEPEST:
             raise ValueError("it is no JSON object of tables and lists")
         if content.pop("seal", None) is not None or _looked(path, name)[1] != NO_SEAL:
             check(path, name)
-    except (OSError, ValueError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) else f"{error}"
-        raise FileDamaged(path, name, str(reason), state) from None
+    except (ValueError, RecursionError) as error:
+        raise FileDamaged(path, name, f"{error}", state) from None
     return content
+
+
+def bytes_of(path: Path, name: str, largest: int = LARGEST) -> tuple[bytes, State]:
+    """Return the bytes of a file and its state.
+
+    Raises
+    ------
+    FileDamaged
+        if it is missing, no file, or larger than `largest` bytes
+    """
+    state = _state_of_file(path, name)
+    if state[1] > largest:
+        raise FileDamaged(path, name, f"it has more than {largest} bytes", state)
+    with _missing_is_damage(path, name, state):
+        return path.read_bytes(), state
 
 
 def _looked(path: Path, name: str) -> tuple[str, str, str]:
     """Return the name in the seal of a file, what is wrong, and the digest of the whole file."""
     state = _state_of_file(path, name)
-    try:
+    with _missing_is_damage(path, name, state):
         return _read(path, state)
+
+
+@contextmanager
+def _missing_is_damage(path: Path, name: str, state: State) -> Iterator[None]:
+    """Raise `FileDamaged` if a file is gone; other errors of the system may pass."""
+    try:
+        yield
     except OSError as error:
         if error.errno not in _NO_FILE:
             raise
@@ -127,12 +155,25 @@ def _looked(path: Path, name: str) -> tuple[str, str, str]:
 
 def _state_of_file(path: Path, name: str) -> State:
     """Return the state of a regular file; anything else, such as a pipe, is not opened."""
-    state = state_of(path)
-    if state is None:
+    found = _stat(path)
+    if found is None:
         raise FileDamaged(path, name, "there is no such file", None)
-    if not stat.S_ISREG(path.stat().st_mode):
-        raise FileDamaged(path, name, "it is not a file", state)
-    return state
+    if not stat.S_ISREG(found.st_mode):
+        raise FileDamaged(path, name, "it is not a file", _state(found))
+    return _state(found)
+
+
+def _stat(path: Path) -> os.stat_result | None:
+    try:
+        return path.stat()
+    except OSError as error:
+        if error.errno not in _NO_FILE:
+            raise
+        return None
+
+
+def _state(found: os.stat_result) -> State:
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 @lru_cache(maxsize=4096)

@@ -1,16 +1,16 @@
 """Scenes from files, stored beside the runs: ``scenes/<scene id>/`` with scene.json and meshes.
 
-The index ``scenes.sqlite`` has what lists and searches need, so that a scene is read once for them,
-and otherwise when it is used. It follows the files.
+The index ``scenes.sqlite`` has what lists need, and the names of parameters for searches. It
+follows the files. A scene is read once for it, and otherwise when it is used, or when a search
+names one of its parameters.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from solver.scenes import Scene
 from studies.appearing import appearing
@@ -20,7 +20,7 @@ from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.database import Database
-from studies.storage.seal import content_of, sealed_json, state_of
+from studies.storage.seal import bytes_of, content_of, sealed_json, state_of
 
 _FILE = "scene.json"
 _COLUMNS = "id, name, summary, branch, parameters"
@@ -59,8 +59,10 @@ def described(directory: Path, scene_id: str) -> Scene | None:
     ------
     FileDamaged
         if scene.json is damaged
+    ValueError
+        if it is not, and this version does not allow the scene
     """
-    return _made(directory, scene_id, _light)
+    return _made(directory, scene_id, whole=False)
 
 
 def kept(directory: Path, scene_id: str) -> Scene | None:
@@ -70,38 +72,29 @@ def kept(directory: Path, scene_id: str) -> Scene | None:
     ------
     FileDamaged
         if the stored content does not have this id
+    ValueError
+        if it has, and this version does not allow the scene
     """
-    scene = _made(directory, scene_id, _whole)
-    if scene is not None and scene.id != scene_id:
-        folder = directory / "scenes" / scene_id
-        raise FileDamaged(folder, f"scene {scene_id}", "its content has changed", state_of(folder))
-    return scene
+    return _made(directory, scene_id, whole=True)
 
 
-def _light(saved: Mapping[str, Any], folder: Path) -> FileScene:
-    del folder
-    return file_scene(Description(saved["file"], saved["content"], None))
-
-
-def _whole(saved: Mapping[str, Any], folder: Path) -> FileScene:
-    names = mesh_names(saved["content"])
-    meshes = {name: MeshFile(name, (folder / name).read_bytes()) for name in names}
-    return file_scene(Description(saved["file"], saved["content"], meshes))
-
-
-def _made(
-    directory: Path, scene_id: str, make: Callable[[Mapping[str, Any], Path], FileScene]
-) -> FileScene | None:
+def _made(directory: Path, scene_id: str, whole: bool) -> FileScene | None:
     """Return a scene made from the content of its file."""
-    folder = directory / "scenes" / scene_id
+    folder, name = directory / "scenes" / scene_id, f"scene {scene_id}"
     state = state_of(folder / _FILE) and state_of(folder)
     if state is None:
         return None
     try:
-        return make(content_of(folder / _FILE, f"scene {scene_id}"), folder)
-    except (FileDamaged, OSError, ValueError, AttributeError, LookupError, TypeError) as error:
+        saved = content_of(folder / _FILE, name)
+        names = mesh_names(saved["content"]) if whole else []
+        meshes = {each: MeshFile(each, bytes_of(folder / each, name)[0]) for each in names}
+        found = Description(saved["file"], saved["content"], meshes if whole else None)
+        if whole and found.digest != scene_id:
+            raise FileDamaged(folder, name, "its content has changed", state)
+        return file_scene(found)
+    except (FileDamaged, AttributeError, LookupError, TypeError) as error:
         reason = error.reason if isinstance(error, FileDamaged) else f"{error}".partition("\n")[0]
-        raise FileDamaged(folder, f"scene {scene_id}", reason, state) from None
+        raise FileDamaged(folder, name, reason, state) from None
 
 
 class Index(Database):
@@ -112,7 +105,7 @@ class Index(Database):
         self.scenes = directory / "scenes"
 
     def follow(self, read: Callable[[str], Scene | None]) -> None:
-        """Bring the index to the files; ``read`` gives a new scene, or None for a damaged one."""
+        """Bring the index to the files; ``read`` gives a new scene, or None for one without."""
         paths = {path.parent.name: state_of(path) for path in self.scenes.glob(f"*/{_FILE}")}
         there = {name: (repr(state), state[2]) for name, state in paths.items() if state}
         mode = "rwc" if self.path.exists() or there else "memory"

@@ -70,6 +70,7 @@ class Store:
     def __init__(self, directory: Path | str, held: bool = False) -> None:
         self.directory = Path(directory)
         self.held = held
+        self._refused: set[str] = set()
         self.catalogue = Catalogue(self.directory / "catalogue.sqlite", self.directory / "runs")
 
     def run_path(self, run_id: str) -> Path:
@@ -87,6 +88,8 @@ class Store:
     def scene(self, scene_id: str, whole: bool = True) -> Scene | None:
         """Return the scene from a file that is stored here under this id, or None.
 
+        A damaged one is set aside. One that this version does not allow stays, and is told once.
+
         One that is not ``whole`` has no meshes, so that it takes little time and memory.
         """
         read = shelf.kept if whole else shelf.described
@@ -95,17 +98,36 @@ class Store:
         except FileDamaged as error:
             self.set_aside(error, "post the scene again")
             return None
+        except ValueError as error:
+            if scene_id not in self._refused:
+                self._refused.add(scene_id)
+                reason = f"{error}".replace("\n", " ")
+                _LOG.warning("scenes/%s is not allowed in this version: %s", scene_id, reason)
+            return None
 
     def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:
-        """Return a page of the scenes that are stored here, or of those of a name, newest first."""
+        """Return a page of the scenes that are stored here, or of those of a name, newest first.
+
+        Raises
+        ------
+        CatalogueDamaged
+            if the index is damaged again after it was made again, or cannot be set aside
+        """
         index = shelf.Index(self.directory)
+        state = seal.state_of(index.path)
         try:
-            with suppress(StoreFull):  # then the latest ones are missing
-                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
-            return index.page(limit, offset, name)
+            return self._listed(index, limit, offset, name)
         except CatalogueDamaged as error:
-            self.put_aside(index.path, str(error.__cause__), "it is made again from the scenes")
-            return self.scenes(limit, offset, name) if not index.path.exists() else []
+            damaged = FileDamaged(index.path, index.path.name, str(error.__cause__), state)
+            self.set_aside(damaged, "it is made again from the scenes")
+        return self._listed(index, limit, offset, name)
+
+    def _listed(
+        self, index: shelf.Index, limit: int, offset: int, name: str | None
+    ) -> list[shelf.Entry]:
+        with suppress(StoreFull):  # then the latest ones are missing
+            index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+        return index.page(limit, offset, name)
 
     def save_scene(self, scene: Scene) -> None:
         """Store a scene from a file, so that studies can name it by its id."""
@@ -142,9 +164,6 @@ class Store:
             seal.check(path, f"dataset {study_id}")
         except FileDamaged as error:
             if error.reason == seal.NO_SEAL and _noted(path, study_id):
-                before = path.stat()
-                seal.seal(path, f"dataset {study_id}")
-                os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))  # it is not newer now
                 return path
             self.set_aside(error, "it is made again from the runs")
             raise
@@ -411,7 +430,7 @@ def _noted(dataset: Path, study_id: str) -> bool:
             return False
         with h5py.File(dataset, "r") as file:
             return runfile.global_attributes(file)["id"] == study_id
-    except (FileDamaged, LookupError, OSError, TypeError):
+    except (FileDamaged, LookupError, TypeError):
         return False
 
 

@@ -48,10 +48,7 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
 
 
 def find_study(path: Path | str, name: str | None = None) -> Path:
-    """Return the path of the data set that `open_study` opens.
-
-    One in a store is checked: it must be what was written there.
-    """
+    """Return the path of the data set that `open_study` opens."""
     found = find_datasets(path)
     names = {each: _name(each) for each in found}
     known = ", ".join(sorted(set(names.values())))
@@ -62,15 +59,7 @@ def find_study(path: Path | str, name: str | None = None) -> Path:
     elif len(set(names.values())) > 1:
         allowed = f"holds several studies: give the directory of one, or its name ({known})"
         raise StudyError("path", str(path), allowed)
-    latest = max(found, key=lambda each: each.stat().st_mtime)
-    if latest.name == "dataset.nc" and is_id(study_id := latest.absolute().parent.name):
-        try:
-            seal.check(latest, f"dataset {study_id}")
-        except FileDamaged as error:
-            if error.reason != seal.NO_SEAL:  # one of an earlier version has none
-                allowed = f"was damaged or replaced, compute its study again: {error.reason}"
-                raise StudyError("path", str(path), allowed) from None
-    return latest
+    return max(found, key=lambda each: each.stat().st_mtime)
 
 
 def _fetched(url: str) -> xr.Dataset:
@@ -108,19 +97,40 @@ def _name(dataset: Path) -> str:
 def open_netcdf(path: Path | str) -> xr.Dataset:
     """Open the file of a run or of a study; arrays are read when they are used.
 
+    One in a store is checked: it must be what was written there.
+
     If runs have grids of different length, ``depth`` is a coordinate over the sweep and
     ``depth_fraction`` is the index: ``dataset.sel(depth_fraction=0.1, method="nearest")``.
 
     Raises
     ------
     StudyError
-        if it is not a netCDF file
+        if it is not a netCDF file, or was damaged or replaced in its store
     """
+    _check(Path(path))
     try:
         dataset = xr.open_dataset(path, engine=ENGINE)
     except OSError as error:
         raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
     return _indexed(dataset)
+
+
+def _check(path: Path) -> None:
+    """Raise `StudyError` if a file in a store is not what its place says."""
+    whole = path.absolute()
+    if whole.name == "dataset.nc" and is_id(whole.parent.name):
+        name = f"dataset {whole.parent.name}"
+    elif whole.parent.name == "runs" and is_id(whole.stem):
+        name = f"run {whole.stem}"
+    else:
+        return
+    try:
+        seal.check(path, name)
+    except FileDamaged as error:
+        if error.state is None or (error.reason == seal.NO_SEAL and not seal.lost(path)):
+            return  # it is missing, or of an earlier version
+        allowed = f"was damaged or replaced, compute its study again: {error.reason}"
+        raise StudyError("path", str(path), allowed) from None
 
 
 def _indexed(dataset: xr.Dataset) -> xr.Dataset:

@@ -199,10 +199,11 @@ def test_the_oldest_go_until_the_data_fit(place: Place) -> None:
     found = [place.computed(f"study-{i}", [i / 10]) for i in range(3)]
     for study, days in zip(found, (1, 3, 2), strict=True):
         aged(place, study, days)
-    everything = sum(p.stat().st_size for p in place.store.directory.rglob("*") if p.is_file())
-    scenes = place.store.directory / "scenes"
-    scenes.mkdir()
-    (scenes / "large.msh").write_bytes(b" " * 100_000)  # stays: deleting a study does not free it
+    folders = [place.store.directory / name for name in ("runs", "studies")]
+    everything = sum(p.stat().st_size for f in folders for p in f.rglob("*") if p.is_file())
+    for name in ("scenes", "unreadable"):  # these stay: deleting a study does not free them
+        (place.store.directory / name).mkdir()
+        (place.store.directory / name / "large").write_bytes(b" " * 100_000)
     place.keeper(size=everything).sweep()
     assert all(place.there(study) for study in found)
     place.keeper(size=everything - 1).sweep()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import logging
 import os
 import random
 import shutil
+import sqlite3
 import threading
 import time
 from collections.abc import Callable
@@ -24,11 +26,12 @@ from service.app import create_app
 from service.errors import Conflict
 from service.job import StudyState
 from service.jobs import Jobs
-from service.keys import Keys, Scope
+from service.keys import Keys, KeysError, Scope
 from service.probe import look
 from service.recovery import Mender, open_queue
 from service.settings import Settings
-from studies import FileDamaged, Store, Study, open_netcdf
+from studies import FileDamaged, Store, Study, StudyError, open_netcdf
+from studies.errors import CatalogueDamaged, SceneError
 from studies.scenes.scene import read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
@@ -300,6 +303,35 @@ def test_a_damaged_scene_is_set_aside_and_spoils_nothing_else(
     assert store.scene(pin.id) is not None
 
 
+def test_a_scene_that_a_later_version_refuses_stays_and_is_not_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    pin = read_scene(ROOT / "data/scenes/pin.toml")
+    Store(tmp_path).save_scene(pin)
+    store, wrong = Store(tmp_path), StudyError("clearance", 0.01, "must be larger")
+    for each in (SceneError("pin.toml", [wrong]), ValueError("a stricter rule")):
+        with monkeypatch.context() as patch:
+            patch.setattr(shelf, "file_scene", lambda description, each=each: raised(each))
+            assert [store.scenes(9), store.scenes(9), store.scene(pin.id)] == [[], [], None]
+    assert len(warned(caplog, f"scenes/{pin.id} is not allowed in this version: ")) == 1
+    assert not (tmp_path / "unreadable").exists()
+    assert [each.id for each in store.scenes(9)] == [pin.id]
+
+
+def raised(error: Exception) -> None:
+    raise error
+
+
+def test_a_pipe_in_place_of_a_mesh_is_damage(tmp_path: Path) -> None:
+    pin, store = read_scene(ROOT / "data/scenes/pin.toml"), Store(tmp_path)
+    store.save_scene(pin)
+    mesh = tmp_path / "scenes" / pin.id / "pin.msh"
+    mesh.unlink()
+    os.mkfifo(mesh)
+    assert store.scene(pin.id) is None
+    assert (tmp_path / "unreadable" / pin.id / "pin.msh").is_fifo()
+
+
 @pytest.mark.parametrize("content", [None, "", "[]", "{}", '{"name": "other"}'])
 def test_the_definition_of_a_running_study_is_written_again(
     place: tuple[Study, Store, Jobs], content: str | None
@@ -416,6 +448,30 @@ def test_keys_of_an_earlier_version_count_and_a_damaged_file_is_set_aside_by_the
     assert (tmp_path / "unreadable" / "keys.json").read_text() == "{"
 
 
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EACCES, errno.ENOMEM, errno.EIO])
+def test_keys_that_the_system_cannot_read_now_are_not_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    Keys(tmp_path).add("anna", Scope.READ)
+    for failing in ("pathlib.Path.read_bytes", "studies.storage.seal._stat"):
+        with monkeypatch.context() as patch:
+            patch.setattr(failing, partial(refuse, number))
+            for change in (lambda keys: keys.add("bert", Scope.READ), lambda k: k.remove("anna")):
+                with pytest.raises(KeysError, match="cannot be read"):
+                    change(Keys(tmp_path))
+    assert list(Keys(tmp_path).all()) == ["anna"]
+    assert not (tmp_path / "unreadable").exists()
+    (tmp_path / "keys.json").write_text("{")
+    with pytest.raises(KeysError, match="damaged"):
+        Keys(tmp_path).remove("anna")
+    assert (tmp_path / "keys.json").read_text() == "{"
+
+
+def refuse(number: int, *given: Any, **named: Any) -> None:
+    """Fail as the system does when it has no descriptor, no right or no memory."""
+    raise OSError(number, os.strerror(number))
+
+
 def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
     keys = Keys(mortal.data)
     headers = {
@@ -493,6 +549,23 @@ def test_scenes_are_read_once_for_lists_and_searches(
     assert (store.directory / "unreadable" / "scenes.sqlite").exists()
 
 
+@pytest.mark.parametrize("begun", [False, True], ids=["missing", "damaged"])
+def test_an_index_of_scenes_that_cannot_be_made_again_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begun: bool
+) -> None:
+    store = Store(tmp_path)
+    store.save_scene(read_scene(ROOT / "data/scenes/pin.toml"))
+    if begun:
+        (tmp_path / "scenes.sqlite").write_text("no index" * 100)
+        monkeypatch.setattr(Path, "rename", partial(refuse, errno.EROFS))
+    else:  # as in a directory that is read-only
+        cannot_open = sqlite3.OperationalError("unable to open database file")
+        cannot_open.sqlite_errorcode = sqlite3.SQLITE_CANTOPEN
+        monkeypatch.setattr(sqlite3, "connect", lambda *given, **named: raised(cannot_open))
+    with pytest.raises(CatalogueDamaged if begun else OSError, match=r"scenes\.sqlite"):
+        store.scenes(9)
+
+
 def page(ask: Ask, offset: int) -> list[dict[str, Any]]:
     """Return a page of one scene."""
     found: list[dict[str, Any]] = ask("GET", f"/scenes?limit=1&offset={offset}").json()
@@ -509,6 +582,9 @@ def test_a_scene_is_deleted_unless_a_study_needs_it(tmp_path: Path) -> None:
     assert "needs this scene" in problem(ask("DELETE", f"/scenes/{pin.id}"), 409)["detail"]
     app.state.jobs.dismiss(study.id)
     assert ask("DELETE", f"/studies/{study.id}?purge=true").status_code == 204
+    folder = store.save_study(study)  # as the command line does: the queue does not know it
+    assert "needs this scene" in problem(ask("DELETE", f"/scenes/{pin.id}"), 409)["detail"]
+    shutil.rmtree(folder)
     assert ask("DELETE", f"/scenes/{pin.id}").status_code == 204
     problem(ask("DELETE", f"/scenes/{pin.id}"), 404)
     assert pin.id not in {each["id"] for each in ask("GET", "/scenes").json()}

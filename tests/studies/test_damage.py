@@ -23,6 +23,7 @@ from studies import (
     Store,
     Study,
     StudyError,
+    open_netcdf,
     open_study,
     run_study,
 )
@@ -160,6 +161,15 @@ def test_a_run_damaged_in_mid_study_is_missing_and_computed_by_the_next_repeat(
     assert repeat(study, store, monkeypatch) == [first(study)]
 
 
+def test_a_damaged_run_that_cannot_be_moved_is_missing(
+    damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = damaged
+    flip(study, store)
+    monkeypatch.setattr(Store, "put_aside", lambda *given: None)
+    assert combine(study, store, list(study.cases())).counts == {"missing": 1, "ok": 3}
+
+
 def test_rows_without_files_are_missing(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers that see another directory report runs that are not here."""
     study = fake_study()
@@ -218,7 +228,9 @@ def test_a_data_set_of_an_earlier_version_is_kept_if_it_is_what_was_noted(
         path.with_name("made.json").write_text(json.dumps(noted))
         os.utime(path, (1e9, 1e9))
         assert store.outcomes(study.id) == outcomes
-        assert not outcomes or path.stat().st_mtime == 1e9, "it is not the latest of its name now"
+        if outcomes:
+            assert path.stat().st_mtime == 1e9, "it is not the latest of its name now"
+            assert path.read_bytes() == unsealed, "to read it writes nothing"
     assert (store.directory / "unreadable" / f"{study.id}.dataset.nc").read_bytes() == there
 
 
@@ -228,10 +240,20 @@ def test_a_data_set_that_was_changed_or_replaced_is_not_opened(damaged: Computed
     whole = path.read_bytes()
     other = fake_study("other")
     compute_here(other, store)
-    for wrong in (whole.replace(b"fake", b"fume", 1), store.dataset_path(other.id).read_bytes()):
+    unsealed = whole[: whole.rindex(b"\ndataset ")]
+    for wrong in (
+        whole.replace(b"fake", b"fume", 1), store.dataset_path(other.id).read_bytes(), unsealed
+    ):  # fmt: skip
         path.write_bytes(wrong)
-        with pytest.raises(StudyError, match="compute its study again"):
-            open_study(path.parent)
+        for use in (open_study, open_netcdf):
+            with pytest.raises(StudyError, match="compute its study again"):
+                use(path)
+    run = store.run_path(first(study))
+    content = run.read_bytes()
+    run.write_bytes(content[:-1])
+    with pytest.raises(StudyError, match="compute its study again"):
+        open_netcdf(run)
+    run.write_bytes(content)
     assert run_study(study, store).ok
     true_numbers(study, store)
 

@@ -39,6 +39,22 @@ def test_a_folder_ends_with_its_context(folders: Path) -> None:
     assert list(folders.iterdir()) == []
 
 
+def test_a_folder_that_is_removed_before_it_is_opened_is_made_again(
+    folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make, made = tempfile.mkdtemp, []
+
+    def removed_first(**named: str) -> str:
+        made.append(make(**named))
+        if len(made) == 1:
+            Path(made[0]).rmdir()
+        return made[-1]
+
+    monkeypatch.setattr(tempfile, "mkdtemp", removed_first)
+    with scratch() as folder:
+        assert [folder] == [Path(each) for each in made[1:]] and folder.is_dir()
+
+
 @pytest.mark.processes
 def test_a_folder_of_a_killed_process_is_removed_by_the_next(folders: Path) -> None:
     holder = subprocess.Popen(
