@@ -83,7 +83,17 @@ class Keeper:
         return self.store.keep_scene(scene_id, description)
 
     def delete_scene(self, scene_id: str) -> None:
-        """Delete a posted scene; raise `Conflict` if a study, of the queue or not, names it."""
+        """Delete a posted scene, also one that this version does not allow.
+
+        Raises
+        ------
+        NotFound
+            If there is none of this id.
+        Conflict
+            If a study, of the queue or of the command line, names it.
+        """
+        if not (self.store.directory / "scenes" / scene_id).is_dir():
+            raise NotFound(f"no posted scene has the id {scene_id}")
         for path in (self.store.directory / "studies").glob("*/study.json"):
             study_id = path.parent.name
             with suppress(FileDamaged):

@@ -87,8 +87,6 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
 
 @router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)
-def delete_scene(name: ContentId, keeper: TheKeeper, store: TheStore) -> None:
+def delete_scene(name: ContentId, keeper: TheKeeper) -> None:
     """Delete a posted scene that no study names; `name` is its id."""
-    if store.scene(name, whole=False) is None:
-        raise NotFound(f"no posted scene has the id {name}")
     keeper.delete_scene(name)

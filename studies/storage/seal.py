@@ -138,17 +138,17 @@ def bytes_of(path: Path, name: str, largest: int = LARGEST) -> tuple[bytes, Stat
 def _looked(path: Path, name: str) -> tuple[str, str, str]:
     """Return the name in the seal of a file, what is wrong, and the digest of the whole file."""
     state = _state_of_file(path, name)
-    with _missing_is_damage(path, name, state):
+    with _missing_is_damage(path, name, state, errno.EIO):  # a sector of the disk is damaged
         return _read(path, state)
 
 
 @contextmanager
-def _missing_is_damage(path: Path, name: str, state: State) -> Iterator[None]:
-    """Raise `FileDamaged` if a file is gone; other errors of the system may pass."""
+def _missing_is_damage(path: Path, name: str, state: State, *also: int) -> Iterator[None]:
+    """Raise `FileDamaged` if a file is gone; other errors of the system, but `also`, may pass."""
     try:
         yield
     except OSError as error:
-        if error.errno not in _NO_FILE:
+        if error.errno not in {*_NO_FILE, *also}:
             raise
         raise FileDamaged(path, name, str(error.strerror), state) from None
 

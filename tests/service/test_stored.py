@@ -316,6 +316,10 @@ def test_a_scene_that_a_later_version_refuses_stays_and_is_not_listed(
     assert len(warned(caplog, f"scenes/{pin.id} is not allowed in this version: ")) == 1
     assert not (tmp_path / "unreadable").exists()
     assert [each.id for each in store.scenes(9)] == [pin.id]
+    monkeypatch.setattr(shelf, "file_scene", lambda description: raised(wrong))
+    ask = asking(create_app(Settings(data=tmp_path)))
+    assert ask("DELETE", f"/scenes/{pin.id}").status_code == 204
+    assert not (tmp_path / "scenes" / pin.id).exists()
 
 
 def raised(error: Exception) -> None:

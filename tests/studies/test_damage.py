@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -159,6 +160,24 @@ def test_a_run_damaged_in_mid_study_is_missing_and_computed_by_the_next_repeat(
     assert combined.missing == [first(study)]
     assert combined.failed == []
     assert repeat(study, store, monkeypatch) == [first(study)]
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EACCES, errno.ENOMEM, errno.EIO])
+def test_a_run_that_the_system_cannot_read_now_stays_unless_the_disk_is_damaged(
+    damaged: ComputedStudy, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    study, store = damaged
+
+    def refuse(*given: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("studies.storage.seal._read", refuse)
+    if number == errno.EIO:
+        assert store.found(first(study)) is None
+    else:
+        with pytest.raises(OSError, match=os.strerror(number)):
+            store.found(first(study))
+    assert store.run_path(first(study)).exists() == (number != errno.EIO)
 
 
 def test_a_damaged_run_that_cannot_be_moved_is_missing(
