@@ -9,6 +9,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -299,9 +300,10 @@ def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
 
     def killer() -> None:
         while not spared.wait(0.005):  # a fork computes 50 ms after its start
-            for worker in workers():
-                if worker.pid not in others:
-                    worker.kill()
+            with suppress(psutil.NoSuchProcess):  # it has ended between two looks
+                for worker in workers():
+                    if worker.pid not in others:
+                        worker.kill()
 
     others = {worker.pid for worker in workers()}
     with own_workers(1) as access, Grid(access) as grid:
