@@ -42,7 +42,7 @@ def open_queue(
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)
     jobs = Jobs(part)
-    for study_id in _ids(store):
+    for study_id in store.study_ids():
         _add(study_id, jobs, store)
     jobs.resume(computed)
     # A journal of the lost file would be applied to the new one.
@@ -51,13 +51,9 @@ def open_queue(
     return Jobs(path, longest)
 
 
-def _ids(store: Store) -> list[str]:
-    return [path.parent.name for path in sorted(store.directory.glob("studies/*/study.json"))]
-
-
 def _adopt(jobs: Jobs, store: Store) -> None:
     """Add the studies to the queue that ``residua run`` has computed in this directory."""
-    for study_id in _ids(store):
+    for study_id in store.study_ids():
         try:
             jobs.get(study_id)
         except NotFound:

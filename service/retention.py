@@ -207,10 +207,9 @@ class Keeper:
         with self.jobs.transaction("BEGIN") as queue:
             known = {row["id"] for row in queue.execute("SELECT id FROM job")}
         needed: set[str] = set()
-        for path in (self.store.directory / "studies").glob("*/study.json"):
+        for study_id in set(self.store.study_ids()) - known:
             with suppress(FileDamaged, ValueError):
-                if path.parent.name not in known:
-                    needed.update(self.store.study(path.parent.name).run_ids())
+                needed.update(self.store.study(study_id).run_ids())
         return needed
 
 

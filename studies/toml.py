@@ -13,7 +13,7 @@ from solver.errors import ModelError
 from studies.errors import StudyError
 
 LARGEST = 50_000_000
-"""Largest size of a file that a user names [bytes]."""
+"""Largest size of a file that a user names, or that is stored and read whole [bytes]."""
 
 DEEPEST = 50
 """Largest number of tables and lists inside one another."""

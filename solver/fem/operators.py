@@ -135,13 +135,12 @@ class Operators:
         self._part = part
         self._contact = contact
         self._name = linear_solver
-        self._known = elastic
+        if elastic is not None:
+            self.elastic = elastic
 
     @cached_property
     def elastic(self) -> Operator:
         """The elastic operator."""
-        if self._known is not None:
-            return self._known
         return Factored(Analysed(self._part, self._contact, self._name), self._part.elastic_data)
 
     @cached_property

@@ -23,6 +23,7 @@ from solver.loading.outcome import IncrementFailed
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.contact.candidates import Candidates
     from solver.contact.state import Converged, State
     from solver.contact.system import System
     from solver.fem.part import Part
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from solver.loading.increment import Balanced
     from solver.materials import Response
 
-    Windows = tuple[Region | None, ...]
+    Yields = list[NDArray[np.bool_] | None]
 
 _LAYERS = 3
 """Number of layers of elements around those that yield, in a new window."""
@@ -66,10 +67,15 @@ def narrowed(
     longer = replace(tolerances, iterations=int(_PATIENCE * tolerances.iterations))
     begin, count = system.moved(start, time), np.zeros(3, dtype=int)
     at, elastic_first = system.moved(guess or start, time), guess is None
-    needed = _needed(system, at, start, time, before.responses)
-    stiffness: dict[bytes, NDArray[np.float64]] = {}
-    if not before.windows and not any(need and need.elements.any() for need in needed):
+    each = zip(system.parts, at.u, start.plastic, strict=True)
+    responses = tuple(part.respond(u, plastic, time) for part, u, plastic in each)
+    both = zip(_yields(system, responses), _yields(system, before.responses), strict=True)
+    yields: Yields = [now if now is None or was is None else now | was for now, was in both]
+    if not before.windows and not any(own is not None and own.any() for own in yields):
         return None
+    candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
+    needed = _needed(system, candidates, yields)
+    stiffness: dict[bytes, NDArray[np.float64]] = {}
     for _ in range(_ROUNDS):
         windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
         if not any(windows):
@@ -99,14 +105,14 @@ def narrowed(
         found = _expanded(system, start, time, parts, found)
         at, elastic_first = replace(at, u=found.u, contacts=found.contacts), False
         yields = _yields(system, found.responses)
-        each = list(zip(windows, yields, strict=True))
-        if all(w is None or y is None or not (y & ~w.elements).any() for w, y in each):
+        inside = zip(windows, yields, strict=True)
+        if all(w is None or y is None or not (y & ~w.elements).any() for w, y in inside):
             iterations, pivoted, blended = count.tolist()
             found = replace(found, iterations=iterations, pivoted=pivoted, blended=blended)
             whole = Increment(system, start, time, tolerances=tolerances, stiffness=stiffness)
             converged = whole.closed(found)
             return converged and replace(converged, windows=windows)
-        needed = _needed(system, at, start, time, found.responses)
+        needed = _needed(system, found.candidates, yields)
     return None
 
 
@@ -134,7 +140,7 @@ def _expanded(
     )
 
 
-def _yields(system: System, responses: tuple[Response, ...]) -> list[NDArray[np.bool_] | None]:
+def _yields(system: System, responses: tuple[Response, ...]) -> Yields:
     """Return the elements (n_elements,) of each meshed part that yield, None of the others."""
     each = zip(system.parts, responses, strict=True)
     return [
@@ -145,28 +151,16 @@ def _yields(system: System, responses: tuple[Response, ...]) -> list[NDArray[np.
     ]
 
 
-def _needed(
-    system: System,
-    at: State,
-    start: State,
-    time: float,
-    before: tuple[Response, ...],
-) -> list[Region | None]:
-    """Return where each meshed part yields and touches at displacements of the whole bodies.
-
-    Where it yields in the responses ``before`` counts too.
-    """
-    candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
-    parts = zip(system.parts, at.u, start.plastic, strict=True)
-    now = _yields(system, tuple(part.respond(u, plastic, time) for part, u, plastic in parts))
+def _needed(system: System, candidates: Candidates, yields: Yields) -> list[Region | None]:
+    """Return where each meshed part yields and touches."""
     needed: list[Region | None] = []
-    for number, (after, old) in enumerate(zip(now, _yields(system, before), strict=True)):
-        if after is None or old is None:
+    for number, elements in enumerate(yields):
+        if elements is None:
             needed.append(None)
             continue
         contact = np.zeros(system.parts[number].n, dtype=bool)
         contact[candidates.touched(number)] = True
-        needed.append(Region(after | old, contact))
+        needed.append(Region(elements, contact))
     return needed
 
 

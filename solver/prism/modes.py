@@ -397,9 +397,8 @@ def _factorised(
         data[dense_slot] -= elimination.taken(outside.at(k))[first, second]
         factors.factorise(data, wave)
         if wave == 0:
-            sprung = section.sprung(section.loose)
-            reactions = sprung[zone]
-            condensed = elimination.forward(sprung[np.concatenate([rest, rim])])
+            reactions = section.sprung[zone]
+            condensed = elimination.forward(section.sprung[np.concatenate([rest, rim])])
             reactions[place] = condensed[len(rest) :]
             carried = Carried(section.loose[zone], reactions)
     return factors, carried

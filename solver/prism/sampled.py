@@ -57,7 +57,7 @@ def sampled_answers(section: Section, forces: Array, wavenumbers: Array) -> Samp
     free, f = section.free, forces[section.free]
     stiffness = section.stiffness(free)
     solver = linear.analyse(stiffness.pattern)
-    carried = Carried(section.loose[free], section.sprung(section.loose)[free])
+    carried = Carried(section.loose[free], section.sprung[free])
     terms = stiffness.terms
     stiffest = np.abs(terms[0].data).max()
     answers: dict[int, Array] = {}

@@ -167,13 +167,14 @@ class Section:
         held = np.setdiff1d(np.arange(self.n), self.free)
         return np.asarray(motions @ null_space(np.vstack([motions[held], np.zeros(4)])))
 
-    def sprung(self, u: Array) -> Array:
-        """Return the forces (n, q) of the springs under displacements (n, q), per length [N/mm]."""
+    @cached_property
+    def sprung(self) -> Array:
+        """Forces (n, q) of the springs under the motions `loose`, per length [N/mm]."""
         each = np.zeros((*self.dofs.shape, self.dofs.shape[1]))
         for boundary, along in self.springs.items():
             self._add_springs(each, boundary, along)
-        forces = np.zeros_like(u)
-        np.add.at(forces, self.dofs, each @ u[self.dofs])
+        forces = np.zeros_like(self.loose)
+        np.add.at(forces, self.dofs, each @ self.loose[self.dofs])
         return forces
 
     @cached_property

@@ -268,9 +268,8 @@ class PrismField:
     def loaded(self, traction: Array) -> PrismField:
         """Return the field with tractions; what is known of the eigenstress is not made again."""
         other = replace(self, traction=traction)
-        vars(other).update(
-            {name: value for name, value in vars(self).items() if name != "traction"}
-        )
+        for name in {"nodal", "displacement"} & vars(self).keys():
+            vars(other)[name] = vars(self)[name]
         return other
 
 

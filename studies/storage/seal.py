@@ -25,13 +25,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from studies.errors import FileDamaged
-from studies.toml import DEEPEST, depth
+from studies.toml import DEEPEST, LARGEST, depth
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of netCDF files that have the line."""
-
-LARGEST = 50_000_000
-"""Largest size of a JSON file or a mesh that is read [bytes]."""
 
 NO_SEAL = "it has no seal"
 

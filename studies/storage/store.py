@@ -81,6 +81,10 @@ class Store:
         """Return the directory of a study."""
         return self.directory / "studies" / _checked(study_id)
 
+    def study_ids(self) -> list[str]:
+        """Return the names of the folders that have the definition of a study, in order."""
+        return sorted(path.parent.name for path in self.directory.glob(f"studies/*/{_STUDY}"))
+
     def dataset_path(self, study_id: str) -> Path:
         """Return the path of the combined data set of a study."""
         return self.study_directory(study_id) / "dataset.nc"
