@@ -36,8 +36,9 @@ FORK_SERVER = "_RESIDUA_FORK_SERVER"
 def prepare(settings: Mapping[str, object]) -> str:
     """Start to load the modules, and return the method of `multiprocessing` for the workers.
 
-    It is ``spawn`` where a process that has loaded libraries cannot be forked safely, and where the
-    user's own files add parts: a worker must load these itself.
+    It is ``spawn`` where a process that has loaded libraries cannot be forked safely, where the
+    user's own files add parts (a worker must load these itself), and where the name of the folder
+    for temporary files is too long for a socket.
 
     Parameters
     ----------
@@ -55,7 +56,10 @@ def prepare(settings: Mapping[str, object]) -> str:
         FORK_SERVER: "1",
     }
     with variables({**settings, **found}):
-        ensure_running()
+        try:
+            ensure_running()
+        except OSError:  # the name of a socket has at most 107 bytes
+            return "spawn"
     return "forkserver"
 
 
