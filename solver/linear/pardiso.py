@@ -64,6 +64,7 @@ class Pardiso:
     kind : `POSITIVE_DEFINITE` or `INDEFINITE`
     ordering : `DISSECTION` (nested) or `MINIMUM_DEGREE`
     count : number of matrices whose factors are held at the same time, none kept of more than one
+    single : whether factors, right-hand sides and solutions are in single precision
     """
 
     def __init__(
@@ -73,8 +74,9 @@ class Pardiso:
         kind: int = POSITIVE_DEFINITE,
         ordering: int = DISSECTION,
         count: int = 1,
+        single: bool = False,
     ) -> None:
-        self.kind = kind
+        self.kind, self._precision = kind, np.dtype(np.float32 if single else float)
         self.n = upper.shape[0]
         self._count = count
         self._kept = np.zeros(0, dtype=np.int64) if kept is None else kept
@@ -82,15 +84,16 @@ class Pardiso:
         self._last[self._kept] = 1
         self._indptr = upper.indptr.astype(np.int32)
         self._indices = upper.indices.astype(np.int32)
-        self._data = upper.data.astype(float)
+        self._data = upper.data.astype(self._precision)
         self._handle = np.zeros(64, dtype=np.int64)
         self._iparm = np.zeros(64, dtype=np.int32)
         self._iparm[0] = 1  # values below, not defaults
         self._iparm[1] = ordering
         self._iparm[9] = 8 if kind == INDEFINITE else 0  # pivot perturbation 1e-8
+        self._iparm[27] = int(single)
         self._iparm[34] = 1  # zero-based
         self._iparm[35] = 2 if len(self._kept) else 0  # Schur complement, and factors to solve with
-        nothing = np.zeros(1)
+        nothing = np.zeros(1, self._precision)
         self._call(_ANALYSE, nothing, nothing)
         weakref.finalize(self, _release, self._handle, kind, self._iparm, count)
 
@@ -105,16 +108,16 @@ class Pardiso:
 
     def eliminate(self, data: NDArray[np.float64], which: int = 0) -> NDArray[np.float64]:
         """Eliminate all unknowns but those kept; return the Schur complement (m, m) on these."""
-        self._data = np.ascontiguousarray(data, dtype=float)
+        self._data = np.ascontiguousarray(data, dtype=self._precision)
         m = len(self._kept)
-        schur = np.zeros((m, m)) if m else np.zeros(1)
-        self._call(_FACTORISE, np.zeros(1), schur, which)
+        schur = np.zeros((m, m) if m else 1, self._precision)
+        self._call(_FACTORISE, np.zeros(1, self._precision), schur, which)
         return schur
 
     def solve(self, b: NDArray[np.float64], which: int = 0) -> NDArray[np.float64]:
         """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``."""
         # PARDISO reads right-hand sides column by column
-        b = np.asfortranarray(b, dtype=float)
+        b = np.asfortranarray(b, dtype=self._precision)
         x = np.zeros_like(b)
         if b.size == 0:
             return x
@@ -163,7 +166,7 @@ class Pardiso:
 
 
 def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:
-    return ctypes.c_void_p(array.ctypes.data)
+    return ctypes.c_void_p(array.__array_interface__["data"][0])  # array.ctypes is slow
 
 
 def _pardiso(

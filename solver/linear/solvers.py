@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from scipy import sparse
@@ -155,8 +155,11 @@ class Factors(Protocol):
         Raises `Singular` if that fails.
         """
 
-    def solve(self, b: NDArray[np.float64], which: int) -> NDArray[np.float64]:
-        """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``."""
+    def solve(self, b: NDArray[Any], which: int) -> NDArray[Any]:
+        """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``.
+
+        It has the precision of ``b``, single or double.
+        """
 
 
 class _SuperLUFactors:
@@ -169,27 +172,41 @@ class _SuperLUFactors:
         """See `Factors`."""
         self._each[which].factorise(data)
 
-    def solve(self, b: NDArray[np.float64], which: int) -> NDArray[np.float64]:
+    def solve(self, b: NDArray[Any], which: int) -> NDArray[Any]:
         """See `Factors`."""
-        return self._each[which].solve(b)
+        return self._each[which].solve(b.astype(float)).astype(b.dtype)
 
 
 class _PardisoFactors:
-    """See `Factors`: one analysis for all, by minimum degree."""
+    """See `Factors`: one analysis for all of a precision, by minimum degree.
+
+    A matrix that is not positive definite in single precision has factors in double alone.
+    """
 
     def __init__(self, upper: sparse.csr_array, count: int) -> None:
-        self._all = pardiso.Pardiso(upper, ordering=pardiso.MINIMUM_DEGREE, count=count)
+        self._double, self._single = (
+            pardiso.Pardiso(upper, ordering=pardiso.MINIMUM_DEGREE, count=count, single=single)
+            for single in (False, True)
+        )
+        self._in_single = np.zeros(count, dtype=bool)
 
     def factorise(self, data: NDArray[np.float64], which: int) -> None:
         """See `Factors`."""
         try:
-            self._all.factorise(data, which)
+            self._double.factorise(data, which)
         except pardiso.PardisoError as failure:
             raise Singular(str(failure)) from failure
+        self._in_single[which] = True
+        try:
+            self._single.factorise(data, which)
+        except pardiso.PardisoError:
+            self._in_single[which] = False
 
-    def solve(self, b: NDArray[np.float64], which: int) -> NDArray[np.float64]:
+    def solve(self, b: NDArray[Any], which: int) -> NDArray[Any]:
         """See `Factors`."""
-        return self._all.solve(b, which)
+        if b.dtype == np.float32 and self._in_single[which]:
+            return self._single.solve(b, which)
+        return self._double.solve(b, which).astype(b.dtype, copy=False)
 
 
 def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]) -> Begun:

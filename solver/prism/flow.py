@@ -130,6 +130,11 @@ class _Release:
         self.weights = modes.weights[:, None]
         self.at_rest = np.zeros((len(self.weights), 1, 6))
 
+    @property
+    def rough(self) -> _Release:
+        """The section itself: see `PassedBody`."""
+        return self
+
     def solve(self, eigenstress: Array) -> Array:
         """Return the eigenstress (n_points, 1, 6)."""
         return eigenstress

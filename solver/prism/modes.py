@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -78,6 +78,7 @@ class Modes:
     wavenumbers : (n / 2 + 1,) k_m [1/mm]
     x : (window,) positions of the stations [mm]
     behind : the factors behind the window, as given
+    precision : type of fields
     unknowns : (m,) unknowns of the section that the zone has, without supported ones
     points : (n_points,) numbers of the points of the zone in the section, element by element
     weights : (n_points,) area of the points [mm2]
@@ -107,6 +108,7 @@ class Modes:
         window = stations if window is None else window
         _check(section, zone, length, stations, window, behind)
         self.section, self.length, self.stations = section, length, stations
+        self.precision: np.dtype[Any] = np.dtype(float)
         self.wavenumbers = -2 * np.pi / length * np.arange(stations // 2 + 1)
         self.x = -length / stations * np.arange(window)
         inside = np.flatnonzero(zone)
@@ -134,6 +136,17 @@ class Modes:
         other = copy(self)
         other.x, other.behind = -self.length / self.stations * np.arange(self.stations), np.zeros(0)
         other._set_transforms(self.stations, other.behind)
+        return other
+
+    @cached_property
+    def single(self) -> Modes:
+        """The same waves, in single precision."""
+        other, kind = copy(self), np.dtype(np.float32)
+        other.precision = kind
+        for name in ("B0", "B1", "_force0", "_force1", "rows", "columns", "_twice_k"):
+            setattr(other, name, getattr(self, name).astype(kind))
+        for name in ("_into", "_into_behind", "_back"):
+            setattr(other, name, tuple(each.astype(kind) for each in getattr(self, name)))
         return other
 
     def _set_rows(self, surface: sparse.csr_array | None, zone: NDArray[np.bool_]) -> None:
@@ -218,9 +231,14 @@ class Modes:
         amplitudes = np.matmul(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
-    def at_station(self, station: int, eigenstress: Array | None, forces: Array | None) -> Array:
-        """Return the displacement (m,) of the zone's unknowns at a station [mm]; see `solve`."""
-        flat = self.solved(self._nodal(eigenstress, forces)).reshape(-1, len(self.unknowns)).T
+    def moved_by(self, forces: Array) -> Array:
+        """Return the amplitudes (waves, 2, m) of the zone for forces (n_rows, window) alone."""
+        each = self._by_wave(self._of_rows(forces))  # (waves, 2, n_rows)
+        return np.matmul(each, self.columns.swapaxes(1, 2))
+
+    def at_station(self, station: int, u: Array) -> Array:
+        """Return the displacement (m,) of the zone's unknowns at a station by amplitudes [mm]."""
+        flat = u.reshape(-1, len(self.unknowns)).T
         plain, carrying = (back[:, station] for back in self._back)
         return np.where(self.unknowns % 3 == I_AXIS, flat @ carrying, flat @ plain)
 
@@ -291,7 +309,7 @@ class Modes:
         by_component = np.ascontiguousarray(np.moveaxis(stress, 2, 0)[list(_ORDER)])
         flat = by_component.reshape(-1, stress.shape[1])
         split = _PLAIN * len(self.points)
-        out = np.empty((len(flat), len(self._twice_k)))
+        out = np.empty((len(flat), len(self._twice_k)), self.precision)
         np.matmul(flat[:split], self._into_behind[0], out=out[:split])
         np.matmul(flat[split:], self._into_behind[1], out=out[split:])
         return out
@@ -300,7 +318,7 @@ class Modes:
         """Return the strain (n_points, window, 6) of amplitudes (6 n_points, 2 waves)."""
         split = _PLAIN * len(self.points)
         plain, carrying = self._back
-        strain = np.empty((len(amplitudes), len(self.x)))
+        strain = np.empty((len(amplitudes), len(self.x)), self.precision)
         np.matmul(amplitudes[:split], plain, out=strain[:split])
         np.matmul(amplitudes[split:], carrying, out=strain[split:])
         return self.by_point(strain)
@@ -308,7 +326,7 @@ class Modes:
     def by_point(self, strain: Array) -> Array:
         """Return strain (n_points, window, 6, ...) from rows (6 n_points, window, ...) of B0."""
         by_component = strain.reshape(6, -1, *strain.shape[1:])
-        out = np.empty((*by_component.shape[1:3], 6, *strain.shape[2:]))
+        out = np.empty((*by_component.shape[1:3], 6, *strain.shape[2:]), strain.dtype)
         for values, component in zip(by_component, _ORDER, strict=True):
             out[:, :, component] = values
         return out

@@ -161,30 +161,33 @@ class PrismTrack:
             self.modes, self.rim, law, partial(self._virgin, law), before, added, parts
         )
 
+    @cached_property
+    def rough(self) -> PrismTrack:
+        """The same prism, in single precision."""
+        other = copy(self)
+        other.modes = self.modes.single
+        return other
+
     def solve(self, eigenstress: Array) -> PrismField:
         """Return the field of an eigenstress (n_points, window, 6), Mandel [MPa]."""
+        eigenstress = eigenstress.astype(self.modes.precision, copy=False)
         return PrismField(self, eigenstress if eigenstress.any() else None)
 
     def strain(self, field: PrismField) -> Array:
         """Return the strain (n_points, window, 6) of a field, Mandel."""
         if field.eigenstress is None and field.traction is None:
             return np.zeros((*self.weights.shape, 6))
-        nodal = field.nodal
-        if field.traction is None:
-            return self.modes.strain(self.modes.solved(nodal))
-        forces = self.on_rows(field.traction)
-        strain = self.modes.strain(self.modes.solved(nodal + self.modes.pushed(forces)))
-        if self.far is not None:
-            far = self.far.strain.reshape(-1, 4) @ self.far.resultants(forces)
+        strain = self.modes.strain(field.amplitudes)
+        if self.far is not None and field.traction is not None:
+            far = self.far.strain.reshape(-1, 4) @ field.resultants
             strain += far.reshape(strain.shape)
         return strain
 
     def beneath(self, field: PrismField) -> Array:
         """Return the displacement (m,) of the zone's unknowns by a field, at x = 0 [mm]."""
-        forces = None if field.traction is None else self.on_rows(field.traction)
-        moved = self.modes.at_station(self.before, field.eigenstress, forces)
-        if self.far is not None and forces is not None:
-            moved += self.far.beneath @ self.far.resultants(forces)
+        moved = self.modes.at_station(self.before, field.amplitudes)
+        if self.far is not None and field.traction is not None:
+            moved += self.far.beneath @ field.resultants
         return moved
 
     @cached_property
@@ -216,7 +219,8 @@ class PrismTrack:
 
     def on_rows(self, traction: Array) -> Array:
         """Return the forces (n_rows, window) of tractions (n, m, 3), per length [N/mm]."""
-        forces = np.zeros((len(self._width), self.weights.shape[1]))
+        shape = len(self._width), self.weights.shape[1]
+        forces = np.zeros(shape, self.modes.precision)
         each = traction.transpose(2, 1, 0).reshape(len(forces), -1)
         forces[:, self.near] = self._width[:, None] * each
         return forces
@@ -257,6 +261,24 @@ class PrismField:
         if self.eigenstress is None:
             return np.zeros((len(modes.wavenumbers), 2, len(modes.unknowns)))
         return modes.nodal(self.eigenstress)
+
+    @cached_property
+    def amplitudes(self) -> Array:
+        """Amplitudes (waves, 2, m) of the zone, as of `Modes.solved` [mm]."""
+        modes = self.prism.modes
+        if self.traction is None:
+            return modes.solved(self.nodal)
+        forces = self.prism.on_rows(self.traction)
+        if self.eigenstress is None:
+            return modes.moved_by(forces)
+        return modes.solved(self.nodal + modes.pushed(forces))
+
+    @property
+    def resultants(self) -> Array:
+        """Resultants (4,) of the tractions, as of `FarField.resultants`."""
+        assert self.prism.far is not None
+        assert self.traction is not None
+        return self.prism.far.resultants(self.prism.on_rows(self.traction))
 
     @cached_property
     def displacement(self) -> Array:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _AHEAD, _BEHIND, _LENGTH = 2.2, 2.6, 7.0
 """The window ahead and behind, and the length after which waves repeat, over half the length where
-the load may act."""
+the load is expected to act."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _UPPER = 0.35
@@ -74,7 +74,8 @@ class PrismWindow:
     ----------
     zone : where elements are small and may yield
     spacing : distance of stations [mm]
-    reach : half the length where the load may act [mm]
+    reach : half the length where the load is expected to act [mm]; it may act as far as the window
+        allows, since yielding makes a contact longer ahead
     """
 
     zone: Zone
@@ -120,7 +121,7 @@ class PrismWindow:
             spacing=self.spacing,
             ahead=self._stations(_AHEAD) * self.spacing,
             behind=self._stations(_BEHIND) * self.spacing,
-            reach=self.reach,
+            reach=self._stations(_AHEAD) // 2 * self.spacing,
             levels=levels,
             span=span,
         )

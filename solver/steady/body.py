@@ -71,6 +71,10 @@ class PassedBody(Protocol[S]):
     def at_rest(self) -> Any:
         """The field without plastic strain and load."""
 
+    @property
+    def rough(self) -> Self:
+        """The same body with fewer digits, for Newton's equation, which is solved to one."""
+
     def solve(self, force: Array) -> Any:
         """Return the field of a ``force`` of `FlowPast`, without the load."""
 

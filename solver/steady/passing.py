@@ -147,7 +147,7 @@ def passing(
         if Newton's method does not converge
     """
     parts = parts or usual_parts(material)
-    scale = np.sqrt(track.weights)[..., None]
+    scale, rough = np.sqrt(track.weights)[..., None], track.rough
     double_shear = 2 * material.elasticity.shear_modulus
     solves, krylov = 0, _KRYLOV
 
@@ -193,7 +193,7 @@ def passing(
             nonlocal solves
             solves += 1
             change = scaled.reshape(shape) / scale
-            made = track.strain(here.loading.along(track.solve(here.flow.along(change))))
+            made = rough.strain(here.loading.along(rough.solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())
 
         right = (scale * here.residual).ravel()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -122,6 +122,11 @@ class Track:
     def weights(self) -> Array:
         """Volume of the points (n_rows, n_columns) of the window [mm3]."""
         return self.rows.weights
+
+    @property
+    def rough(self) -> Self:
+        """The track itself: see `PassedBody`."""
+        return self
 
     def solve(self, force: Array) -> Array:
         """Return displacements (m,) for the condensed forces of plastic strain (m,) [mm]."""
