@@ -68,9 +68,12 @@ def checked_points(points: Array, field: str = "points") -> Array:
     They must be at least four finite points, the first coordinate increasing.
     """
     X = np.asarray(points, dtype=float)
-    if X.ndim != 2 or len(X) != 2 or X.shape[1] < _FEWEST or not np.isfinite(X).all():
-        allowed = f"must have at least {_FEWEST} points of finite numbers"
-        raise ModelError(field, X.T.tolist(), allowed)
+    if X.ndim != 2 or len(X) != 2:
+        raise ModelError(field, f"an array {X.shape}", "must have two numbers z, y for each point")
+    if X.shape[1] < _FEWEST:
+        raise ModelError(field, X.T.tolist(), f"must have at least {_FEWEST} points")
+    for k in np.flatnonzero(~np.isfinite(X).all(axis=0))[:1]:
+        raise ModelError(field, X[:, k].tolist(), f"must be finite numbers; this is point {k + 1}")
     for k in np.flatnonzero(np.diff(X[0]) <= 0)[:1]:
         allowed = f"must be points whose z increases; these are number {k} and {k + 1}"
         raise ModelError(field, X[:, k : k + 2].T.tolist(), allowed)

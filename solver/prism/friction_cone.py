@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lapack
 
 from solver.errors import NoContact
+from solver.linear.dense import RefinedLU
 from solver.model.friction import PatchStatus
 from solver.steady.passing import searched
 
@@ -49,6 +49,7 @@ found by its moment may overshoot a hundredfold."""
 _LOST = 1e6
 """Ratio of the largest |q - d w| to the first resultant on one point, a pressure that no contact
 reaches; above it motions grow without bound."""
+_LOOSE = "the contact forces are not determined: nothing holds the wheel"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,9 +202,10 @@ class _Tangent:
         S[slipping, slipping] += (1 - held) / here.grip
         S[:size, size:] = np.einsum("knb,nb->nk", motions, rows) * self._unit
         S[size:, :size] = np.einsum("knb,nb->kn", weights, columns) * self._scale[:, None]
-        self._factors, self._pivots, singular = lapack.dgetrf(S, overwrite_a=True)
-        if singular:
-            raise NoContact("the contact forces are not determined: nothing holds the wheel")
+        try:
+            self._factors = RefinedLU(S)
+        except ZeroDivisionError:
+            raise NoContact(_LOOSE) from None
 
     def holds(self, other: _Iterate) -> bool:
         """Whether points have the same status at another iterate."""
@@ -241,9 +243,12 @@ class _Tangent:
     def _solve(self, wanted: Array, missing: Array) -> tuple[Array, Array]:
         size = len(self._at)
         rhs = np.concatenate([wanted, self._scale * missing])
-        found, _ = lapack.dgetrs(self._factors, self._pivots, rhs)
+        try:
+            found = self._factors.solve(rhs)
+        except ZeroDivisionError:
+            raise NoContact(_LOOSE) from None
         if not np.isfinite(found).all():
-            raise NoContact("the contact forces are not determined: nothing holds the wheel")
+            raise NoContact(_LOOSE)
         values = np.zeros((self._here.status.size, 3))
         np.add.at(values, self._at, found[:size, None] * self._columns)
         return values.reshape(self._here.values.shape), found[size:] * self._unit

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Required, Self, TypedDict, Unpack
 
 import numpy as np
 
@@ -50,6 +50,18 @@ UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of the slip at a station, at the one before and at the second before."""
 _SLIDES = 1.0
 """Creepage at which all of a contact slips."""
+
+
+class RollingLoad(TypedDict, total=False):
+    """Friction and load of a `RollingPatch`, with its units; creepages that are not given are 0."""
+
+    friction: Required[float]
+    force: Required[float]
+    drive: float | None
+    lateral_force: float | None
+    creepage: float
+    lateral_creepage: float
+    spin: float
 
 
 class RollingPatch:
@@ -82,7 +94,7 @@ class RollingPatch:
         grid: PatchGrid,
         compliance: Array,
         wheel: ProfiledWheel,
-        **load: Any,
+        **load: Unpack[RollingLoad],
     ) -> None:
         n, m = grid.stations, len(grid.z)
         if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
@@ -140,7 +152,7 @@ class RollingPatch:
         other._set_wheel(wheel)
         return other
 
-    def with_load(self, **load: Any) -> Self:
+    def with_load(self, **load: Unpack[RollingLoad]) -> Self:
         """Return the same wheel with another load and friction, parameters as of the class."""
         other = copy(self)
         other._set_load(**load)
@@ -349,10 +361,10 @@ class RollingPatch:
             return
         if self.lateral_force is not None:
             lateral = float(np.tensordot(self._sums[2], found.values, 3))
+            wanted_force = self.lateral_force
+            told = f"{wanted_force:.0f}" if abs(wanted_force) >= 1 else f"{wanted_force:.2g}"
             much = f"with all of its contact slipping the lateral force is {lateral:.0f} N"
-            much += (
-                f", not {self.lateral_force:.0f}: give one that a wheel at this position can have"
-            )
+            much += f", not {told}: give one that a wheel at this position can have"
             raise LimitLoad(f"the wheel slides off: {much}", carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
         raise Spins(much, carried, 1.0)
