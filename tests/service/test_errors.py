@@ -105,8 +105,8 @@ def test_a_sweep_of_a_thousand_million_points_is_refused_before_it_is_expanded(
 
 @pytest.mark.parametrize(
     "body",
-    [b"{", b'{"name": "a",}', b"\xff\xfe", b"[" * 100_000, b"9" * 10_000, b"\x1f\x8b"],
-    ids=["open", "comma", "bytes", "deep", "digits", "packed"],
+    [b"{", b'{"name": "a",}', b"\xff\xfe", b"9" * 10_000, b"\x1f\x8b"],
+    ids=["open", "comma", "bytes", "digits", "packed"],
 )
 def test_a_body_that_is_not_json_is_refused(service: Server, body: bytes) -> None:
     answer = service.client.post("/studies", content=body, headers=JSON)
@@ -114,7 +114,7 @@ def test_a_body_that_is_not_json_is_refused(service: Server, body: bytes) -> Non
     assert error["field"] == "body" and "JSON" in error["allowed"]
 
 
-@pytest.mark.parametrize("levels", [50, 51, 80])
+@pytest.mark.parametrize("levels", [50, 51, 100_000])
 def test_the_depth_of_a_body_is_limited_and_told(levels: int) -> None:
     async def receive() -> dict[str, object]:
         body = b'{"a": ' + b"[" * (levels - 1) + b"1" + b"]" * (levels - 1) + b"}"
@@ -124,7 +124,7 @@ def test_the_depth_of_a_body_is_limited_and_told(levels: int) -> None:
     if levels == 50:
         assert list(asyncio.run(read)) == ["a"]
     else:
-        with pytest.raises(StudyError, match=f"{levels} deep.* at most 50 deep"):
+        with pytest.raises(StudyError, match=f"{levels} deep; at most 50 are allowed"):
             asyncio.run(read)
 
 
