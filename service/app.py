@@ -107,7 +107,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.jobs = jobs
     app.state.runner = runner
     app.state.examiner = examiner
-    app.state.inspector = Inspector()
+    app.state.inspector = Inspector(settings.reader_seconds)
     app.state.details = Details(jobs, store)
     app.state.keeper = keeper
     app.state.metrics = metrics

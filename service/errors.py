@@ -30,8 +30,12 @@ from studies.errors import (
     cut,
     worded,
 )
+from studies.storage.room import FULL
 
 log = logging.getLogger(__name__)
+
+LATER = {"retry-after": "10"}
+"""Header with the time after which a repeated request may succeed [s]."""
 
 
 class NotFound(LookupError):
@@ -43,7 +47,21 @@ class Conflict(RuntimeError):
 
 
 class Busy(RuntimeError):
-    """Not now: too many requests of this kind wait, or what is asked for is being made again."""
+    """Not now: too many requests of this kind wait, or what is asked for is being made again.
+
+    Parameters
+    ----------
+    reason : why
+    seconds : time after which a repeated request may succeed [s]
+    """
+
+    def __init__(self, reason: str, seconds: int = 10) -> None:
+        super().__init__(reason)
+        self.later = {"retry-after": str(seconds)}
+
+
+class NoRoom(RuntimeError):
+    """What is asked for takes more room than the disk has."""
 
 
 class QueueLost(RuntimeError):
@@ -57,6 +75,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     Conflict: HTTPStatus.CONFLICT,
     Busy: HTTPStatus.SERVICE_UNAVAILABLE,
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
+    NoRoom: HTTPStatus.INSUFFICIENT_STORAGE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
     FileDamaged: HTTPStatus.NOT_FOUND,
@@ -66,9 +85,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
 }
 
 NO_ROOM = "no room is left on the disk of the data directory"
-
-LATER = {"retry-after": "10"}
-"""Header with the time after which a repeated request may succeed [s]."""
+NO_ROOM_NOW = "no room is left for temporary files"
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -194,7 +211,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer with an error of one sentence."""
     status = status_of(exc)
-    later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
+    later = getattr(exc, "later", LATER) if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
     texts = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
     said = texts.get(type(exc), str(exc))
     return problem(request, status, said, headers=later)
@@ -209,6 +226,8 @@ def on_unusable(request: Request, exc: Unusable) -> Problem:
 def on_system_error(request: Request, exc: OSError) -> Problem:
     """Answer an error of the operating system, without the path."""
     log.error("%s", exc)
+    if exc.errno in FULL:  # of the data directory `StoreFull` is raised
+        return problem(request, STATUS[StoreFull], NO_ROOM_NOW, headers=LATER)
     detail = f"the data directory cannot be used: {exc.strerror or 'see the log of the service'}"
     return problem(request, status_of(exc), detail, headers=LATER)
 
@@ -217,6 +236,8 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
     """Answer errors of the framework: unknown paths, methods, large bodies."""
     if isinstance(exc.__cause__, StudyError):  # raised while the framework reads the body
         return on_field_error(request, exc.__cause__)
+    if isinstance(exc.__cause__, OSError):
+        return on_system_error(request, exc.__cause__)
     headers = dict(exc.headers or {})
     status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
@@ -244,7 +265,7 @@ HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     SceneError: on_scene_error,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
-        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
+        (NotFound, Conflict, Busy, NoRoom, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
         on_plain_error,
     ),
     OSError: on_system_error,
