@@ -67,6 +67,9 @@ class Settings(BaseSettings):
         ge=0,
         description="size of all posted scenes above which none is kept",
     )
+    max_key_scenes_bytes: int = Field(
+        default=2_000_000_000, ge=0, description="the same for the scenes of a key"
+    )
     reader_seconds: float = Field(
         default=10.0,
         gt=0,

@@ -65,7 +65,7 @@ async def post_scene(
         files[each.filename] = await each.read()
     found, content = await inspector.inspect(await scene.read(), files, caller)
     known = await asyncio.to_thread(store.scene, found.id, whole=False)
-    if not await asyncio.to_thread(keeper.keep_scene, found.id, content):
+    if not await asyncio.to_thread(keeper.keep_scene, found.id, content, caller):
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
     if not isinstance(known, FileScene) or known.description.content == content.content:
