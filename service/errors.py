@@ -20,6 +20,7 @@ from service.methods import offered
 from studies import StudyError
 from studies.errors import (
     LONGEST_FIELD,
+    LONGEST_TEXT,
     MOST_MISTAKES,
     CatalogueDamaged,
     FileDamaged,
@@ -87,6 +88,9 @@ STATUS: dict[type[Exception], HTTPStatus] = {
 NO_ROOM = "no room is left on the disk of the data directory"
 NO_ROOM_NOW = "no room is left for temporary files"
 
+LONGEST_DETAIL = 20_000
+"""Number of characters of a detail; with the mistakes an answer has less than 1 MB."""
+
 MEDIA_TYPE = "application/problem+json"
 
 
@@ -138,7 +142,7 @@ def problem(
     document = ProblemDocument(
         title=status.phrase,
         status=status.value,
-        detail=detail,
+        detail=cut(detail, LONGEST_DETAIL),
         instance=request.url.path if request else "",
         errors=list(errors),
     )
@@ -160,6 +164,11 @@ def shown(value: object) -> str | int | float | bool | None:
     return cut(text, LONGEST_FIELD)
 
 
+def mistake(field: str, value: object, allowed: str) -> dict[str, Any]:
+    """Return one of the ``errors`` of a problem document."""
+    return {"field": shown(field), "value": shown(value), "allowed": cut(allowed, LONGEST_TEXT)}
+
+
 def dotted(location: Sequence[str | int]) -> str:
     """Return a pydantic location as ``sweep.friction[2]``, without ``body`` or ``query``."""
     path = location[1:] if len(location) > 1 else location
@@ -171,22 +180,19 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     """Return field, value and what is allowed for each error FastAPI found."""
     errors = []
     for error in exc.errors()[:MOST_MISTAKES]:
-        field, value, allowed = dotted(error["loc"]), shown(error.get("input")), worded(error)
+        field, value, allowed = dotted(error["loc"]), error.get("input"), worded(error)
         if error["type"] == "json_invalid":
             reason = f"{error['ctx']['error']} at character {error['loc'][-1]}"
             field, value, allowed = "body", None, f"valid JSON ({reason})"
         elif field == "body":
             allowed = "a JSON object, sent with the header content-type: application/json"
-        errors.append({"field": field, "value": value, "allowed": allowed})
+        errors.append(mistake(field, value, allowed))
     return errors
 
 
 def on_scene_error(request: Request, exc: SceneError) -> Problem:
     """Answer a scene file with all its mistakes."""
-    errors = [
-        {"field": shown(each.field), "value": shown(each.value), "allowed": each.allowed}
-        for each in exc.mistakes
-    ]
+    errors = [mistake(each.field, each.value, each.allowed) for each in exc.mistakes]
     texts = [f"{each['field']}: {each['allowed']}" for each in errors]
     texts += exc.listed[len(errors) :]
     return problem(request, status_of(exc), "; ".join(texts), errors)
@@ -194,9 +200,8 @@ def on_scene_error(request: Request, exc: SceneError) -> Problem:
 
 def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field."""
-    error = {"field": shown(exc.field), "value": shown(exc.value), "allowed": exc.allowed}
-    detail = f"{error['field']}: {exc.allowed}"
-    return problem(request, status_of(exc), detail, [error])
+    error = mistake(exc.field, exc.value, exc.allowed)
+    return problem(request, status_of(exc), f"{error['field']}: {exc.allowed}", [error])
 
 
 def on_validation_error(request: Request, exc: RequestValidationError) -> Problem:
@@ -248,7 +253,7 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
         form = request.headers.get("content-type", "").lower().startswith("multipart")
         kind = "a form of files" if form else "JSON"
         allowed = f"{kind} that can be read ({exc.__cause__ or exc.detail})"
-        detail, errors = f"body: {allowed}", [{"field": "body", "value": None, "allowed": allowed}]
+        detail, errors = f"body: {allowed}", [mistake("body", None, allowed)]
     return problem(request, status, detail, errors, headers)
 
 
