@@ -21,8 +21,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from service.errors import Conflict, NotFound
-from service.job import Job
-from service.jobs import Jobs
+from service.job import Job, StudyState
+from service.jobs import Jobs, put
 from studies import FileDamaged, Store, Study
 from studies.scenes.description import Description
 from studies.storage.seal import content_of
@@ -143,10 +143,9 @@ class Keeper:
         Conflict
             If it is waiting or running, or its process has not ended yet.
         """
-        with self._ended(study_id) as queue:
-            queue.execute(
-                "UPDATE job SET state = 'dismissed', message = ? WHERE id = ?", (DELETED, study_id)
-            )
+        with self._ended(study_id) as queue, suppress(NotFound):  # its row cannot be read
+            job = self.jobs.read(queue, study_id)
+            put(queue, job, state=StudyState.DISMISSED, message=DELETED)
         elsewhere = self._needed_elsewhere()
         directory = self.store.study_directory(study_id)
         with self._ended(study_id) as queue:
@@ -172,11 +171,6 @@ class Keeper:
         """
         if self.days is None and self.size is None:
             return
-        with self.jobs.transaction("BEGIN") as queue:
-            ended = queue.execute(
-                "SELECT id, finished FROM job WHERE state NOT IN ('accepted', 'running')"
-                " AND finished IS NOT NULL ORDER BY finished, turn"
-            ).fetchall()
         oldest = datetime.now(UTC) - timedelta(days=self.days) if self.days else None
         excess = 0
         if self.size is not None:
@@ -184,14 +178,14 @@ class Keeper:
             excess = used + sum(self.store.scene_sizes().values()) - self.size
         if excess > 0:
             excess -= self._sweep_scenes(excess)
-        for job in ended:
-            old = oldest is not None and datetime.fromisoformat(job["finished"]) < oldest
+        for job in self.jobs.ended():
+            old = oldest is not None and datetime.fromisoformat(str(job.finished)) < oldest
             if not (old or excess > 0):
                 return
             with suppress(Conflict, NotFound):
-                excess -= self.purge(job["id"])
+                excess -= self.purge(job.id)
                 reason = f"older than {self.days} days" if old else f"above {self.size} bytes"
-                log.info("deleted a study: %s", reason, extra={"study": job["id"]})
+                log.info("deleted a study: %s", reason, extra={"study": job.id})
 
     def _sweep_scenes(self, excess: int) -> int:
         """Delete scenes that no study needs, the oldest first; return the bytes freed."""
