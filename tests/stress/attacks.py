@@ -8,6 +8,7 @@ import shutil
 import signal
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +186,7 @@ def attacks(server: Server, count: int = ATTACKS, seed: int = 7) -> list[Figure]
     attacked.go_on()
     left = ended(server, attacked.studies)
     for study_id in attacked.studies:  # a worker that dies with it three times fails a run
-        content = wait_until(lambda each=study_id: fetched(server, each), 120.0)
+        content = wait_until(partial(fetched, server, study_id), 120.0)
         attacked.untrue += not attacked.true(content)
     return [
         Figure("attacks", count),
@@ -201,13 +202,22 @@ def attacks(server: Server, count: int = ATTACKS, seed: int = 7) -> list[Figure]
 def ended(server: Server, studies: list[str]) -> int:
     """Wait for the end of all studies, with retries of those that failed; count the others."""
     for _ in range(5):
-        states = [server.finished(each, 300.0)["status"] for each in studies]
+        states = [wait_until(partial(end, server, each), 300.0) for each in studies]
         failed = [each for each, state in zip(studies, states, strict=True) if state == "failed"]
         for each in failed:
             server.client.post(f"/studies/{each}/retry")
         if not failed:
             break
     return sum(state != "successful" for state in states)
+
+
+def end(server: Server, study_id: str) -> str:
+    """Return the last state of a study; empty while it is computed, or the queue is made again."""
+    answer = server.client.get(f"/studies/{study_id}")
+    state = "lost" if answer.status_code == 404 else ""
+    if answer.status_code == 200:
+        state = answer.json()["status"]
+    return state if state not in ("accepted", "running") else ""
 
 
 def fetched(server: Server, study_id: str) -> bytes | None:
