@@ -268,6 +268,7 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     StudyError: on_field_error,
     SceneError: on_scene_error,
+    Unusable: on_unusable,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
         (NotFound, Conflict, Busy, NoRoom, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),

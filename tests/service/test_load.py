@@ -33,6 +33,7 @@ from service.maps import Pictures
 from service.schemas import MapQuery
 from service.settings import Settings
 from studies import Store, StoreFull, Study, StudyError
+from studies.errors import Unusable
 from tests.service.servers import COARSE_PUNCH, Server, fake_study
 from tests.service.test_errors import problem
 
@@ -297,9 +298,19 @@ def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.Monkey
     assert len(asked) == 1
 
 
-def test_a_full_disk_has_a_status_of_its_own(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Store, study: Study) -> Path:
-        raise StoreFull(str(self.directory))
+@pytest.mark.parametrize(
+    ("failed", "status", "detail"),
+    [
+        (StoreFull("/home/anna"), 507, "no room is left on the disk of the data directory"),
+        (Unusable("directory", "/home/anna", "must be one"), 503, "directory: must be one"),
+    ],
+    ids=["full", "read-only"],
+)
+def test_a_directory_that_cannot_be_written_in_is_told_without_its_path(
+    app: FastAPI, monkeypatch: pytest.MonkeyPatch, failed: Exception, status: int, detail: str
+) -> None:
+    def save(self: Store, study: Study) -> Path:
+        raise failed
 
     async def post() -> httpx.Response:
         study = {"name": "a", "scene": "punch", "sweep": {"friction": [0.0]}}
@@ -307,10 +318,10 @@ def test_a_full_disk_has_a_status_of_its_own(app: FastAPI, monkeypatch: pytest.M
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.post("/studies", json=study)
 
-    monkeypatch.setattr(Store, "save_study", full)
+    monkeypatch.setattr(Store, "save_study", save)
     answer = asyncio.run(post())
-    assert answer.status_code == 507
-    assert answer.json()["detail"] == "no room is left on the disk of the data directory"
+    assert (answer.status_code, answer.json()["detail"]) == (status, detail)
+    assert "anna" not in answer.text and int(answer.headers["retry-after"]) > 0
 
 
 def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
