@@ -53,7 +53,7 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
     return min(found)
 
 
-BYTES = min(memory() // 3, 8 * 2**30)
+BYTES = min(max(memory() // 3, 2**30), 8 * 2**30)
 """Address space of a process [bytes]: the service and two of them share the memory."""
 
 
