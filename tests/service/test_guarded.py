@@ -24,6 +24,7 @@ from service.app import create_app
 from service.errors import Busy
 from service.guarded import BYTES, Budget, Guarded, memory
 from service.inspector import Inspector
+from service.keys import Keys, Scope
 from service.settings import Settings
 from studies import StudyError
 from studies.scenes.meshfile import MeshFile
@@ -230,6 +231,30 @@ def test_a_scene_that_takes_too_long_is_told_and_charged(tmp_path: Path) -> None
                 await inspector.inspect(b"", {}, "anna")
 
     asyncio.run(post(Inspector(1.0)))
+
+
+def test_each_key_has_a_budget_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def read(*_: object, **__: object) -> None:
+        raise StudyError("scene", "a.toml", "was read")
+
+    keys = Keys(tmp_path)
+    texts = {name: keys.add(name, Scope.SUBMIT) for name in ("anna", "bert")}
+    app = create_app(Settings(data=tmp_path, require_keys=True, reader_seconds=20.0))
+    monkeypatch.setattr(app.state.inspector.process, "call", read)
+    app.state.inspector.budget.charge("anna", 30.0)
+    answers = {
+        name: asking(app)(
+            "POST",
+            "/scenes",
+            files=[("scene", ("a.toml", b""))],
+            headers={"authorization": f"Bearer {text}"},
+        )
+        for name, text in texts.items()
+    }
+    found = problem(answers["anna"], 503)
+    assert found["detail"] == "20 s of processor time in a minute are used: ask later"
+    assert 25 <= int(answers["anna"].headers["retry-after"]) <= 30, "10 s too many"
+    assert problem(answers["bert"], 422)["detail"] == "scene: was read"
 
 
 def test_a_full_folder_for_temporary_files_is_507(
