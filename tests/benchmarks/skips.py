@@ -1,6 +1,7 @@
 """What is left out where a scene does not need it: the same problem with and without.
 
-Each pair gives the same numbers, which `tests/solver/test_skips.py` proves; here it is timed.
+Each pair of `SKIPS` gives the same numbers, which `tests/solver/test_skips.py` proves; here it is
+timed.
 """
 
 from __future__ import annotations
@@ -120,7 +121,8 @@ SKIPS = (
     Skip("kept factor", _passed, _passed_anew, 0.0),
 )
 STEADY = Skip("steady pass", lambda: _rolled("endless"), lambda: _rolled(64.0), 0.1)
-"""Not the same numbers: steps have ends, and errors by increments."""
+"""Not the same numbers: steps have ends, and errors by increments, which
+`tests/verification/test_track_ends.py` proves to vanish."""
 
 
 def measure(repeats: int) -> list[tuple[str, float, float, float]]:

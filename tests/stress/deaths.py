@@ -67,6 +67,7 @@ def full_disk(server: Server) -> list[Figure]:
         return [Figure("not allowed to mount a small disk here: seen by the tests only", 1)]
     try:
         server.start()
+        server.finished(server.post(fake_study("small")))  # so that the size of a run is known
         study = fake_study("full", seconds=0.1)
         study["sweep"] = {"friction": [i / 200 for i in range(60)]}
         study_id = server.post(study)
