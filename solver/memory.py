@@ -63,6 +63,8 @@ def most_kept() -> int:
 
 _KEPT: OrderedDict[Hashable, Any] = OrderedDict()
 """Values by key, the last used one at the end."""
+_PATH = object()
+"""Key in between: values that were used since the last `release` stand behind it."""
 _IN_USE: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
 """Values that something holds."""
 _LOCK = threading.RLock()
@@ -108,9 +110,13 @@ def release(most: int | None = None) -> None:
 
     Parameters
     ----------
-    most : number of bytes; `most_kept` by default
+    most : number of bytes; by default `most_kept`, or more if the path that has ended used more:
+        the next path of a study most often has the same set-up
     """
-    _evict(most_kept() if most is None else most)
+    _evict(most_kept() if most is None else most, spare=most is None)
+    with _LOCK:
+        _KEPT[_PATH] = None
+        _KEPT.move_to_end(_PATH)
     _HEAP.tidy()
 
 
@@ -120,13 +126,15 @@ def bytes_of(*values: object) -> list[int]:
     return [_measured(value, seen) for value in values]
 
 
-def _evict(most: int) -> None:
-    """Drop values that do not fit beside those that were used later."""
+def _evict(most: int, *, spare: bool = False) -> None:
+    """Drop values that do not fit beside those used later; spare those used since `release`."""
     with _LOCK:
         keys, total = list(reversed(_KEPT)), 0
         sizes = bytes_of(*((key, _KEPT[key]) for key in keys))
         for key, size in zip(keys, sizes, strict=True):
-            if total + size > most:
+            if key is _PATH:
+                spare = False
+            elif total + size > most and not spare:
                 del _KEPT[key]
             else:
                 total += size
