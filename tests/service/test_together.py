@@ -43,8 +43,9 @@ def test_what_two_studies_share_is_computed_once(lively: Server) -> None:
     assert len([line for line in lively.computed() if '"seconds": 0.4' in line]) == 6
 
 
-def test_the_greater_priority_goes_first(mortal: Server) -> None:
-    mortal.settings = {"RESIDUA_STUDIES_AT_ONCE": "1"}
+def test_the_greater_priority_goes_first(mortal: Server, service: Server) -> None:
+    """Both services have one worker, which tells what it computes where the first one has it."""
+    mortal.settings = service.settings | {"RESIDUA_STUDIES_AT_ONCE": "1"}
     mortal.start()
     first = mortal.post(large_study("first", paths=3))
     wait_until(lambda: mortal.study(first)["status"] == "running")
@@ -56,7 +57,7 @@ def test_the_greater_priority_goes_first(mortal: Server) -> None:
         assert mortal.study(ids[priority])["priority"] == priority
     for study_id in ids.values():
         mortal.finished(study_id)
-    assert ["0.92" in line for line in mortal.computed()[-2:]] == [True, False]
+    assert ["0.92" in line for line in service.computed()[-2:]] == [True, False]
     for route in ("/studies", "/estimate"):
         refused = mortal.client.post(route, json=study | {"priority": 1000})
         assert refused.status_code == 422
