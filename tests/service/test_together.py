@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Any
 
 import psutil
 
-from tests.service.servers import Server, fake_study, free_port, wait_until
+from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 
 
 def large_study(name: str, paths: int = 60, seconds: float = 0.5, **more: Any) -> dict[str, Any]:
@@ -96,16 +95,12 @@ def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
     assert len(lively.computed()) <= before + 4 + 4 + 30 + 2
 
 
-def test_studies_that_nobody_computes_say_so(mortal: Server, tmp_path: Path) -> None:
-    """A scheduler that nobody answers for, then patience."""
-    mortal.settings = {
-        "RESIDUA_SCHEDULER": f"tcp://127.0.0.1:{free_port()}",
-        "RESIDUA_PATIENCE_SECONDS": "20",
-    }
+def test_a_study_that_nobody_computes_says_so(mortal: Server) -> None:
+    """A scheduler that nobody answers for. `test_runner` shows that patience has an end."""
+    mortal.settings = NOWHERE | {"RESIDUA_GRACE_SECONDS": "1"}
     mortal.start()
     study_id = mortal.post(fake_study("alone"))
     waiting = wait_until(lambda: mortal.client.get("/health").json()["waiting"], 30.0)
     assert "no scheduler answers" in waiting[study_id]
     assert mortal.client.get("/health").json()["status"] == "waiting"
-    end = mortal.finished(study_id)
-    assert end["status"] == "failed" and "no scheduler answers" in end["message"]
+    assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
