@@ -22,12 +22,14 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import build, parameters_of
+from studies.definition.points import ENTRIES, POINT, described, with_points
 from studies.definition.sweep import (
     Axes,
     checked_axes,
     checked_table,
     checked_text,
+    labels,
     linked_values,
     owners,
 )
@@ -47,15 +49,16 @@ class Study(BaseModel):
     name : 1 to 80 of ``A-Z a-z 0-9 . _ -``, not beginning with a dot
     scene : name of the scene; of a scene from a file its content id
     parameters : fixed parameters; the rest are the scene's defaults
-    sweep : axes: lists of values by parameter, and linked axes, which have names of their own
-        and set several parameters by label; see `checked_axes` for their order
+    sweep : axes: lists of values by parameter; and axes with names of their own, which set several
+        parameters: tables of labels, and lists of points, such as ``point``, which has what the
+        entries ``points`` and ``sample`` of a study say. See `checked_axes` for their order
     note, tags : the user's own text and labels, shown with the study; a tag finds studies
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
 
     name: str
     scene: str
@@ -129,17 +132,24 @@ class Study(BaseModel):
     @classmethod
     def _check(cls, content: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         for key in content:
-            if key not in cls.model_fields:
-                raise StudyError(str(key), content[key], one_of(key, cls.model_fields))
+            if key not in cls.model_fields and key not in ENTRIES:
+                raise StudyError(str(key), content[key], one_of(key, [*cls.model_fields, *ENTRIES]))
         context = info.context if info.context is not None else {}
         scene = scene_named(content.get("scene"), context.get("scenes", nothing))
         context["found"] = scene
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
-        axes = checked_axes(content.get("sweep", {}), known)
+        axes = checked_axes(with_points(content), known)
+        if POINT in axes and scene.places and scene.places(build(scene, {})).points:
+            allowed = (
+                "the runs of this scene have a dimension of this name, the points of the scene "
+                "file: give the points of the study another one, [sweep.NAME]"
+            )
+            raise StudyError(f"sweep.{POINT}", f"{len(axes[POINT])} points", allowed)
         for parameter, axis in owners(axes).items():
             if parameter in fixed:
-                allowed = f"is swept too, by sweep.{axis}: keep one"
+                by = "the points" if axis == POINT else f"sweep.{axis}"
+                allowed = f"is swept too, by {by}: keep one"
                 raise StudyError(f"parameters.{parameter}", fixed[parameter], allowed)
         name = checked_text("name", content.get("name"))
         parameters = {
@@ -190,12 +200,12 @@ class Study(BaseModel):
 
     @cached_property
     def axes(self) -> dict[str, list[Any]]:
-        """Values on each axis, labels on a linked one, in the order of `Case.index`."""
-        return {name: list(axis) for name, axis in self.sweep.items()}
+        """Values on each axis, labels or numbers of points, in the order of `Case.index`."""
+        return {name: labels(name, axis) for name, axis in self.sweep.items()}
 
     @property
     def linked(self) -> dict[str, tuple[str, list[Any]]]:
-        """Parameter set by a linked axis -> the axis, and the values over its labels."""
+        """Parameter set by a linked axis or by points -> the axis, and the values over it."""
         return linked_values(self.sweep)
 
     @property

@@ -22,6 +22,8 @@ SAME = 1e-9
 """Relative difference below which two grids are the same."""
 FRACTION = "_fraction"
 """Suffix of the index of grids that differ from run to run only in scale."""
+SETS = "sets"
+"""Attribute of an axis of labels or points: the coordinates that it sets."""
 _PIECE = 32
 """Least number of values along a dimension in a compressed chunk, if lengths differ."""
 _NO_COORDINATE = "_nc4_non_coord_"
@@ -35,7 +37,7 @@ class Frame:
     Attributes
     ----------
     scene, axes, usual : the scene; all sweep dimensions with their values; those of a run's file
-    linked : parameter set by a linked axis -> the axis, the values over it
+    linked : parameter set by a linked axis or by points -> the axis, the values over it
     labels : labelled dimension -> union of the labels
     grids, sizes, shortest : numeric dimension -> the grid, the longest of several that agree; the
         greatest length; the smallest
@@ -133,6 +135,8 @@ class Frame:
         own = {name: (name, values) for name, values in self.axes.items()}
         for name, (axis, values) in (own | self.linked).items():
             attributes = _axis_attributes(self.scene, name)
+            if sets := [parameter for parameter, (by, _) in self.linked.items() if by == name]:
+                attributes |= {SETS: " ".join(sets)}
             _write(file, name, (axis,), _axis_array(values), attributes, complete=True)
         for name, labels in self.labels.items():
             texts = np.array(labels, dtype=object)
@@ -198,7 +202,7 @@ class Frame:
 
 
 def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:
-    """Return the attributes of a parameter of the scene, or of a linked axis."""
+    """Return the attributes of a parameter of the scene, or of an axis of labels or points."""
     known = name in parameters_of(scene)
     return layout.axis_attributes(scene, name) if known else layout.attributes_of(name)
 
