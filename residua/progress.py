@@ -60,7 +60,8 @@ class Progress:
             self._failed += event.status != OK
             if not self._bar:
                 reason = f": {event.message}" if event.status != OK else ""
-                line = f"{100 * event.progress:3.0f} %  {event.status}  {self._names[event.run]}"
+                place = event.place or self._names[event.run]
+                line = f"{100 * event.progress:3.0f} %  {event.status}  {place}"
                 print(line + reason, file=self._stream, flush=True)
         now = time.monotonic()
         self._progress = event.progress

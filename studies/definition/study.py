@@ -20,6 +20,7 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
+from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
 from studies.definition.parameters import build, parameters_of
@@ -56,6 +57,8 @@ class Study(BaseModel):
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
+    goal : parameter, threshold and bracket of a value that is searched at each place of the axes
+        (`studies.definition.goal`); empty if the runs are those of the axes
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
@@ -68,6 +71,7 @@ class Study(BaseModel):
     tags: list[str] = Field(default_factory=list)
     keep: Literal["", "fields"] = ""
     allow: list[Literal["large_strain"]] = Field(default_factory=list)
+    goal: dict[str, Any] = Field(default_factory=dict)
     _problem: Scene = PrivateAttr()
 
     @classmethod
@@ -125,7 +129,15 @@ class Study(BaseModel):
         StudyError
             for the first combination that the scene refuses
         """
-        self.expansion.check()
+        if self.asks is None:
+            self.expansion.check()
+            return self
+        ends: Axes = {self.asks.parameter: list(self.asks.between)}
+        try:
+            Expansion(self.problem, self.parameters, self.sweep | ends).check()
+        except StudyError as error:
+            field = error.field.replace(f"sweep.{self.asks.parameter}", "goal.between")
+            raise StudyError(field, error.value, error.allowed) from None
         return self
 
     @model_validator(mode="before")
@@ -157,6 +169,14 @@ class Study(BaseModel):
         }
         labels = checked_labels(content) | ({"allow": [*scene.allow]} if scene.allow else {})
         own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
+        if content.get("goal"):
+            goal = checked_goal(content["goal"], scene)
+            other = "parameters" if goal.parameter in fixed else owners(axes).get(goal.parameter)
+            if other is not None:
+                where = "parameters" if goal.parameter in fixed else f"sweep.{other}"
+                allowed = f"is what the goal searches: take it out of {where}"
+                raise StudyError("goal.parameter", goal.parameter, allowed)
+            own["goal"] = goal.content
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
@@ -169,8 +189,13 @@ class Study(BaseModel):
         return self._problem
 
     @cached_property
+    def asks(self) -> Goal | None:
+        """What is searched at each place of the axes, if the study has a goal."""
+        return checked_goal(self.goal, self.problem) if self.goal else None
+
+    @cached_property
     def expansion(self) -> Expansion:
-        """The runs, built when they are requested."""
+        """The runs, built when they are requested; of a goal the places of the axes."""
         return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property
@@ -187,14 +212,14 @@ class Study(BaseModel):
         }
         source = self.expansion.source
         labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
-        beside = [labels] if labels else []
+        beside = [each for each in (labels, self.goal) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
         known = parameters_of(self.problem)
-        swept = owners(self.sweep)
+        swept = owners(self.sweep) | ({self.asks.parameter: ""} if self.asks else {})
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
 
@@ -210,15 +235,21 @@ class Study(BaseModel):
 
     @property
     def size(self) -> int:
-        """Number of runs."""
-        return self.expansion.size
+        """Number of runs; of a study with a goal the largest possible one."""
+        return self.expansion.size * (self.asks.most[1] if self.asks else 1)
 
     def run_ids(self) -> Iterator[str]:
-        """Yield the ids of the runs, in the order of `cases`, without building the cases."""
-        return self.expansion.run_ids()
+        """Yield the ids of the runs, in the order of `cases`, without building the cases.
+
+        Those of a study with a goal are not known: there are none.
+        """
+        return iter(()) if self.asks else self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
-        """Yield the runs of the study, the last axis fastest; none is kept in memory."""
+        """Yield the runs of the study, the last axis fastest; none is kept in memory.
+
+        Those of a study with a goal have the default of its parameter: they tell the places.
+        """
         return self.expansion.cases()
 
     def place(self, case: Case) -> dict[str, Any]:

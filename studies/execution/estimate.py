@@ -12,6 +12,8 @@ import numpy as np
 
 from solver.errors import ModelError
 from studies.definition.cases import LoadingPath
+from studies.definition.goal import Goal
+from studies.definition.parameters import build
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
@@ -34,6 +36,9 @@ _BATCH = 500
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
+
+    Of a study with a goal they are the most that it may cost: the longest possible searches, with
+    every run as expensive as the one of the largest value.
 
     Attributes
     ----------
@@ -198,6 +203,9 @@ def _shared(each: list[list[float]]) -> float:
 def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:
     """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
     branch = study.problem.branch
+    if study.asks:
+        yield from _longest(study, study.asks)
+        return
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
         ids = (case.id for path in batch for case in path.cases)
@@ -205,6 +213,21 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing
+
+
+def _longest(study: Study, goal: Goal) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of the longest possible searches, and their values."""
+    rounds, runs = goal.most
+    low, high = goal.between
+    for place in study.cases():
+        values = {**place.values, goal.parameter: high}
+        path = LoadingPath(place.id, build(study.problem, values), (place,))
+        if goal.branch:
+            each = (runs - 2) // rounds
+            yield path, [low, *goal.split(low, high, each + 1), high]
+            yield from itertools.repeat((path, [high] * each), rounds - 1)
+        else:
+            yield from itertools.repeat((path, [high]), runs)
 
 
 def _file_size(study: Study, store: Store, unknowns: int) -> float:

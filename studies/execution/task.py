@@ -12,6 +12,7 @@ from typing import Any
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
+from studies.definition.goal import Limit
 from studies.definition.identity import solver_hash
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
@@ -42,6 +43,7 @@ class PathTask:
     proof : proof that the worker sees the directory; None if this is certain
     stale : by id, the time of change [ns] of files that the study replaces; a file with another
         time was written by a worker that died on this task, and is kept
+    limit : tells the run behind which no other of its path is needed; None if all are
     """
 
     scene: Scene
@@ -51,6 +53,7 @@ class PathTask:
     keep: str = ""
     proof: Proof | None = None
     stale: Mapping[str, int] = field(default_factory=dict)
+    limit: Limit | None = None
 
     def __dask_tokenize__(self) -> tuple[Any, ...]:
         """Return an identity of this task, so that dask need not hash its content."""
@@ -149,6 +152,8 @@ def _walk(
                 row = _written(store, task, owed[value], record)
                 del owed[value]
                 keep(row)
+                if task.limit is not None and task.limit(row):
+                    return
     except (StopAsked, StoreFull, StudyError):
         raise
     except Exception as error:

@@ -132,12 +132,10 @@ class Frame:
         """Create the dimensions and their coordinates."""
         lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
         file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
-        own = {name: (name, values) for name, values in self.axes.items()}
-        for name, (axis, values) in (own | self.linked).items():
-            attributes = _axis_attributes(self.scene, name)
-            if sets := [parameter for parameter, (by, _) in self.linked.items() if by == name]:
-                attributes |= {SETS: " ".join(sets)}
-            _write(file, name, (axis,), _axis_array(values), attributes, complete=True)
+        for name, (dims, values, attributes) in axis_variables(
+            self.scene, self.axes, self.linked
+        ).items():
+            _write(file, name, dims, values, attributes, complete=True)
         for name, labels in self.labels.items():
             texts = np.array(labels, dtype=object)
             _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
@@ -199,6 +197,20 @@ class Frame:
         if dimension in self.labels:
             return [self.labels[dimension].index(label) for label in _values(run[dimension])]
         return list(range(len(run[dimension])))
+
+
+def axis_variables(
+    scene: Scene, axes: Mapping[str, Sequence[Any]], linked: Mapping[str, tuple[str, list[Any]]]
+) -> dict[str, layout.Variable]:
+    """Return the coordinates of a sweep: its axes, and what axes of labels or points set."""
+    own = {name: (name, values) for name, values in axes.items()}
+    found = {}
+    for name, (axis, values) in (own | dict(linked)).items():
+        attributes = _axis_attributes(scene, name)
+        if sets := [parameter for parameter, (by, _) in linked.items() if by == name]:
+            attributes |= {SETS: " ".join(sets)}
+        found[name] = layout.Variable((axis,), _axis_array(values), attributes)
+    return found
 
 
 def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:

@@ -278,6 +278,15 @@ def test_a_sample_is_answered_by_its_points_and_is_what_a_list_of_them_is(servic
     assert refused.json()["errors"][0]["field"] == "points[0].friction"
 
 
+def test_a_study_with_a_goal_is_refused(service: Server) -> None:
+    goal = {"find": "limit_load", "between": [0.25, 1.0]}
+    study = {"name": "goal", "scene": fake_study("goal")["scene"], "goal": goal}
+    for path in ("/studies", "/estimate"):
+        answer = service.client.post(path, json=study)
+        assert answer.status_code == 422
+        assert "is searched by `residua run`" in answer.json()["errors"][0]["allowed"]
+
+
 def test_studies_are_found_by_a_tag(service: Server) -> None:
     own = {"note": "of the day", "tags": ["today", "rail"]}
     told = service.post(fake_study("tagged") | own)
