@@ -5,10 +5,11 @@ the goal: a run is beyond if its number has passed the threshold, or if it found
 search brackets this value and narrows the bracket. What it asks for next depends only on the runs
 that it has asked for: a search that begins anew asks for the same runs, which are in the store.
 
-Where the parameter is the branch of its scene, one loading path serves several values: each round
-takes a few between the ends of the bracket, in increasing order, and the path ends with the first
-run beyond. Otherwise a round is one run: the middle of the bracket, or, for ``at``, the point of
-the method ITP (interpolate, truncate, project), which needs at most one run more than bisection.
+A round is one run: the middle of the bracket, or, for ``at``, the point of the method ITP
+(interpolate, truncate, project), which needs at most one run more than bisection. Where the
+parameter is the branch of its scene, one loading path serves several values: it rises through a few
+values to the first one beyond. Where the path can go on from any of its states, it is one path to
+the end of the search; otherwise each round is a path through a few values in the bracket.
 
 References
 ----------
@@ -25,9 +26,11 @@ from typing import Any, NamedTuple
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
+from studies.definition.expansion import Expansion
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.spaced import rounded
-from studies.definition.vocabulary import SOLVED
+from studies.definition.sweep import Axes
+from studies.definition.vocabulary import KEEP, SOLVED
 from studies.errors import StudyError, nearest, one_of
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
@@ -69,6 +72,7 @@ class Goal:
     between : the ends of the first bracket
     whole : whether the parameter is an integer
     branch : whether the parameter is the branch of its scene
+    goes_on : whether a path of the scene goes on from any of its states (`Scene.goes_on`)
     """
 
     parameter: str
@@ -79,6 +83,12 @@ class Goal:
     between: tuple[float, float]
     whole: bool = False
     branch: bool = False
+    goes_on: bool = False
+
+    @property
+    def parts(self) -> int:
+        """Parts into which a round divides the bracket."""
+        return _PARTS if self.branch and not self.goes_on else 2
 
     def seen(self, row: Mapping[str, Any], rising: bool | None) -> Look:
         """Return what a run says.
@@ -108,13 +118,11 @@ class Goal:
     def most(self) -> tuple[int, int]:
         """Largest number of rounds of a search, and of its runs."""
         low, high = self.between
-        width = self.scaled(high) - self.scaled(low)
-        if self.branch:
-            more = math.ceil(max(0.0, math.log(width / self.tolerance, _PARTS) - 1.0 - 1e-9))
-            return 1 + more, _PARTS + 1 + more * (_PARTS - 1)
-        more = math.ceil(max(0.0, math.log2(width / self.tolerance) - 1e-9))
-        more += _SLACK if self.kind == "at" else 0
-        return 1 + more, 2 + more
+        first = _PARTS if self.branch else 1
+        width = (self.scaled(high) - self.scaled(low)) / first
+        more = math.ceil(max(0.0, math.log(width / self.tolerance, self.parts) - 1e-9))
+        more += _SLACK if self.kind == "at" and self.parts == 2 else 0
+        return 1 + more, first + 1 + more * (self.parts - 1)
 
     @property
     def content(self) -> dict[str, Any]:
@@ -174,7 +182,7 @@ class Look(NamedTuple):
 
 
 @dataclass(slots=True)
-class Limit:
+class PathLimit:
     """Tells, on a loading path, the run behind which no other is needed.
 
     Attributes
@@ -258,9 +266,9 @@ class Search:
         return 1.0 if self.reason else self.rounds / self.goal.most[0]
 
     @property
-    def limit(self) -> Limit:
+    def limit(self) -> PathLimit:
         """What ends a loading path of this round."""
-        return Limit(self.goal, self._rising)
+        return PathLimit(self.goal, self._rising)
 
     def look(self, value: float) -> Look:
         """Return what the run of a value says."""
@@ -290,8 +298,8 @@ class Search:
             status = self.look(self.high).status
             self.reason = status if status in NO_EQUILIBRIUM else PASSED
         else:
-            parts = _PARTS if self.goal.branch else 2
-            self._round = self._interpolated() or self.goal.split(self.low, self.high, parts)
+            split = self.goal.split(self.low, self.high, self.goal.parts)
+            self._round = self._interpolated() or split
         return True
 
     def _over(self, value: float) -> float | None:
@@ -304,7 +312,7 @@ class Search:
 
     def _interpolated(self) -> list[float]:
         """Return the next value by ITP, with the reference's names; none where it is not used."""
-        if self.goal.branch or self.goal.kind != "at":
+        if self.goal.parts > 2 or self.goal.kind != "at":
             return []
         fa, fb = self._over(self.low), self._over(self.high)
         if fa is None or fb is None or fb == fa:
@@ -318,6 +326,46 @@ class Search:
         xt = xf + sigma * min(0.2 / (last - first) * (b - a) ** 2, abs(middle - xf))
         x = xt if abs(xt - middle) <= radius else middle - sigma * max(radius, 0.0)
         return self.goal.inside(self.low, self.high, [x])
+
+
+@dataclass(slots=True, kw_only=True)
+class Place:
+    """One place of the axes of a study: its search, and the runs that this asks for.
+
+    Attributes
+    ----------
+    scene, fixed : the scene, and the parameters of all runs here, as JSON values
+    search : the search
+    keep : what is kept in addition to the results of the scene
+    resume, since : as in `studies.run_study`: which failed runs are taken as they are
+    """
+
+    scene: Scene
+    fixed: Mapping[str, Any]
+    search: Search
+    keep: str = ""
+    resume: bool = False
+    since: int = 0
+
+    def runs(self, values: list[float]) -> Expansion:
+        """Return the runs of values of the parameter."""
+        axes: Axes = {self.search.goal.parameter: list(values)}
+        return Expansion(self.scene, self.fixed, axes)
+
+    def stands(self, row: Mapping[str, Any]) -> bool:
+        """Whether a run in the store is taken as it is."""
+        if row["status"] in SOLVED:
+            return self.keep in ("", row[KEEP])
+        failed = self.resume and row["modified"] >= self.since
+        return row["status"] in NO_EQUILIBRIUM or failed
+
+    def hear(self, row: Mapping[str, Any]) -> bool:
+        """Tell the search of a run; return whether it had asked for it."""
+        value = row["parameters"][self.search.goal.parameter]
+        asked = value in self.search.wants
+        if asked:
+            self.search.tell(value, row)
+        return asked
 
 
 def checked_goal(content: Any, scene: Scene) -> Goal:
@@ -363,6 +411,7 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
         between=(low, high),
         whole=isinstance(low, int) and isinstance(high, int) and _is_whole(known[name]),
         branch=name == scene.branch,
+        goes_on=name == scene.branch and scene.goes_on,
     )
 
 

@@ -222,7 +222,10 @@ def _longest(study: Study, goal: Goal) -> Iterator[tuple[LoadingPath, list[Any]]
     for place in study.cases():
         values = {**place.values, goal.parameter: high}
         path = LoadingPath(place.id, build(study.problem, values), (place,))
-        if goal.branch:
+        if goal.branch and goal.goes_on:
+            yield path, [low, *goal.split(low, high, runs - rounds), high]
+            yield from itertools.repeat((path, [high]), rounds - 1)
+        elif goal.branch:
             each = (runs - 2) // rounds
             yield path, [low, *goal.split(low, high, each + 1), high]
             yield from itertools.repeat((path, [high] * each), rounds - 1)

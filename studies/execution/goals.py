@@ -1,30 +1,39 @@
 """The runs that a study with a goal asks for, and what it finds.
 
 The searches at the places of the axes go on each by itself: as soon as the runs of one round are
-known, those of the next one are handed to the workers.
+known, those of the next one are handed to the workers. A search along a path that goes on is the
+task of one worker, which asks for its runs itself.
 """
 
 from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from studies.appearing import appearing
 from studies.definition.cases import Case, LoadingPath
-from studies.definition.expansion import Expansion
-from studies.definition.goal import ALREADY, FAILED, NEVER, NO_EQUILIBRIUM, PASSED, Limit, Search
+from studies.definition.goal import (
+    ALREADY,
+    FAILED,
+    NEVER,
+    NO_EQUILIBRIUM,
+    PASSED,
+    PathLimit,
+    Place,
+    Search,
+)
 from studies.definition.identity import canonical
 from studies.definition.study import Study
-from studies.definition.sweep import Axes, owners
-from studies.definition.vocabulary import ERROR, KEEP, MISSING, OK, SOLVED, SYMMETRIC
+from studies.definition.sweep import owners
+from studies.definition.vocabulary import ERROR, MISSING, OK, SYMMETRIC
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal
 from studies.storage.dataset import RunContent, Variable
-from studies.storage.frame import axis_variables
 from studies.storage.held import Combined
 from studies.storage.made import Made
 from studies.storage.provenance import provenance
@@ -46,15 +55,30 @@ class Goals:
 
     def __init__(self, study: Study, store: Store, resume: bool = False, since: int = 0) -> None:
         assert study.asks is not None
-        self._study, self._store, self._resume, self._since = study, store, resume, since
-        self.places = list(study.cases())
-        self.searches = [Search(study.asks) for _ in self.places]
-        self._swept = owners(study.sweep)
-        self._asked: dict[str, tuple[int, float]] = {}
+        self._study, self._store = study, store
+        self.cases = list(study.cases())
+        swept = owners(study.sweep)
+        self.places = [
+            Place(
+                scene=study.problem,
+                fixed=study.parameters | {name: case.values[name] for name in swept},
+                search=Search(study.asks),
+                keep=study.keep,
+                resume=resume,
+                since=since,
+            )
+            for case in self.cases
+        ]
+        self._numbers: dict[str, int] = {}
         self._waits: list[set[float]] = [set() for _ in self.places]
-        self._ready: deque[tuple[LoadingPath, Limit]] = deque()
-        for number in range(len(self.searches)):
+        self._ready: deque[Asked] = deque()
+        for number in range(len(self.places)):
             self._go_on(number)
+
+    @property
+    def searches(self) -> list[Search]:
+        """The searches, in the order of the cases of the study."""
+        return [place.search for place in self.places]
 
     @property
     def ended(self) -> bool:
@@ -66,69 +90,73 @@ class Goals:
         """Share of all searches that is done, 0 to 1."""
         return float(np.mean([search.progress for search in self.searches]))
 
-    def paths(self) -> Iterator[tuple[LoadingPath, Limit] | None]:
-        """Yield loading paths and what ends them; None while all wait for runs."""
+    def paths(self) -> Iterator[Asked | None]:
+        """Yield the loading paths that are asked for; None while all searches wait for runs."""
         while not self.ended:
             yield self._ready.popleft() if self._ready else None
 
-    def heard(self, row: Mapping[str, Any]) -> None:
-        """Tell the search that asked for a run of its row."""
-        if row["id"] in self._asked:
-            number, value = self._asked.pop(row["id"])
-            self._waits[number].discard(value)
-            if value in self.searches[number].wants:
-                self.searches[number].tell(value, row)
-                self._go_on(number)
+    def heard(self, path: str, row: Mapping[str, Any]) -> None:
+        """Tell the search of a loading path of the row of a run."""
+        number = self._numbers[path]
+        place = self.places[number]
+        self._waits[number].discard(row["parameters"][place.search.goal.parameter])
+        if place.hear(row) and not place.search.goal.goes_on:
+            self._go_on(number)
 
-    def place(self, run_id: str) -> str:
-        """Return where a run is that was asked for, and the round of its search, as text."""
-        assert self._study.asks is not None
-        number, value = self._asked[run_id]
-        at = [f"{name} = {each}" for name, each in self._study.place(self.places[number]).items()]
-        search = self.searches[number]
+    def owed(self, path: str) -> Case | None:
+        """Return the run that a path which goes on has to compute next; None if it owes none."""
+        place = self.places[self._numbers[path]]
+        wanted = place.search.wants if place.search.goal.goes_on else []
+        return next(place.runs(wanted[:1]).cases()) if wanted else None
+
+    def closed(self, path: str) -> None:
+        """Ask again for runs of which a path that has ended told nothing."""
+        number = self._numbers[path]
+        if self.places[number].search.goal.goes_on:
+            self._waits[number].clear()
+        self._go_on(number)
+
+    def about(self, path: str, row: Mapping[str, Any]) -> str:
+        """Return where a run is, and the round of its search, as text."""
+        number = self._numbers[path]
+        search = self.places[number].search
+        name, value = search.goal.parameter, row["parameters"][search.goal.parameter]
+        at = [f"{axis} = {each}" for axis, each in self._study.place(self.cases[number]).items()]
         rounds = f"round {search.rounds + 1} of at most {search.goal.most[0]}"
-        return ", ".join([*at, f"{search.goal.parameter} = {value:.6g}"]) + f" ({rounds})"
+        return ", ".join([*at, f"{name} = {value:.6g}"]) + f" ({rounds})"
 
     def _go_on(self, number: int) -> None:
         """Take the runs of a search that are in the store, and ask for those that are not."""
-        search = self.searches[number]
-        while wanted := [each for each in search.wants if each not in self._waits[number]]:
-            expansion = self._expansion(number, wanted)
-            cases = {case.id: case for case in expansion.cases()}
-            rows = self._store.sound(cases)
-            told = False
-            for run_id, case in cases.items():
-                value = case.values[search.goal.parameter]
-                if run_id in rows and self._stands(rows[run_id]) and value in search.wants:
-                    search.tell(value, rows[run_id])
-                    told = True
-            if not told:
-                for path in expansion.paths():
-                    self._ask(number, path)
+        place, waits = self.places[number], self._waits[number]
+        while wanted := [value for value in place.search.wants if value not in waits]:
+            runs = place.runs(wanted)
+            rows = self._store.sound([case.id for case in runs.cases()])
+            stand = [rows[case.id] for case in runs.cases() if case.id in rows]
+            if not sum(place.hear(row) for row in stand if place.stands(row)):
+                waits.update(wanted)
+                for path in runs.paths():
+                    # rounds share the id of a path, and one may begin before the last has ended
+                    own = replace(path, id=path.cases[0].id)
+                    self._numbers[own.id] = number
+                    self._ready.append(_asked(own, place))
                 return
 
-    def _ask(self, number: int, path: LoadingPath) -> None:
-        search = self.searches[number]
-        # rounds share the id of a path, and a new one may begin before the last has ended
-        path = replace(path, id=path.cases[0].id)
-        for case in path.cases:
-            value = case.values[search.goal.parameter]
-            self._asked[case.id] = number, value
-            self._waits[number].add(value)
-        self._ready.append((path, search.limit))
 
-    def _expansion(self, number: int, values: list[float]) -> Expansion:
-        place = self.places[number].values
-        fixed = self._study.parameters | {name: place[name] for name in self._swept}
-        axes: Axes = {self.searches[number].goal.parameter: list(values)}
-        return Expansion(self._study.problem, fixed, axes)
+class Asked(NamedTuple):
+    """A loading path that a search asks for.
 
-    def _stands(self, row: Mapping[str, Any]) -> bool:
-        """Whether a run in the store is taken as it is."""
-        if row["status"] in SOLVED:
-            return self._study.keep in ("", row[KEEP])
-        failed = self._resume and row["modified"] >= self._since
-        return row["status"] in NO_EQUILIBRIUM or failed
+    Either ``limit`` tells its last run, or it goes on, for as long as ``place`` asks for runs.
+    """
+
+    path: LoadingPath
+    limit: PathLimit | None
+    place: Place | None
+
+
+def _asked(path: LoadingPath, place: Place) -> Asked:
+    if place.search.goal.goes_on:
+        return Asked(replace(path, cases=()), None, deepcopy(place))
+    return Asked(path, place.search.limit, None)
 
 
 def answers(study: Study, store: Store, goals: Goals) -> Combined:
@@ -191,16 +219,18 @@ def _content(study: Study, goals: Goals, outcomes: list[tuple[str, str]]) -> Run
     Its dimensions are those that a data set of the runs would have, without the parameter that was
     searched; and ``tried``, the runs of each search in increasing order of the parameter.
     """
+    from studies.storage.frame import axis_variables  # h5netcdf: a complete study needs it not
+
     scene, goal = study.problem, goals.searches[0].goal
     name, linked = goal.parameter, study.linked
     usual = [each for each in layout.usual_dimensions(scene) if each not in {name, *linked}]
-    place = goals.places[0].values
-    axes = {each: [place[each]] for each in usual} | study.axes
+    first = goals.cases[0].values
+    axes = {each: [first[each]] for each in usual} | study.axes
     shape = tuple(map(len, axes.values()))
     beside = {"coordinates": " ".join(linked)} if linked else {}
     attributes = layout.axis_attributes(scene, name)
     unit = {key: attributes[key] for key in attributes.keys() & {"units"}}
-    order = _order(study, goals.places, list(axes), shape)
+    order = _order(study, goals.cases, list(axes), shape)
     searches = [goals.searches[k] for k in order]
     variables: dict[str, Variable] = axis_variables(scene, axes, linked)
 
@@ -254,9 +284,9 @@ def _tried(
     return found
 
 
-def _order(study: Study, places: list[Case], dims: list[str], shape: tuple[int, ...]) -> list[int]:
+def _order(study: Study, cases: list[Case], dims: list[str], shape: tuple[int, ...]) -> list[int]:
     """Return the numbers of the places in the order of the data set."""
-    at = [dict(zip(study.axes, place.index, strict=True)) for place in places]
+    at = [dict(zip(study.axes, case.index, strict=True)) for case in cases]
     flat = [
         int(np.ravel_multi_index([each.get(name, 0) for name in dims], shape)) if dims else 0
         for each in at

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
-from studies.definition.goal import Limit
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import KEEP, OK, SOLVED
@@ -262,12 +261,14 @@ class _Work:
                 yield self._task(proof, paths)
             return
         for asked in self.goals.paths():
-            yield self._task(proof, (asked[0],), asked[1]) if asked else None
+            yield asked and replace(
+                self._task(proof, (asked.path,)), limit=asked.limit, place=asked.place
+            )
 
-    def _task(self, proof: Proof, paths: Bundle, limit: Limit | None = None) -> PathTask:
+    def _task(self, proof: Proof, paths: Bundle) -> PathTask:
         scene, directory = self.study.problem, self.store.directory.resolve()
         self._walking.update({path.id: (len(path.cases), 0.0) for path in paths})
-        task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof, limit=limit)
+        task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof)
         return replace(task, stale=self.store.modified(case.id for case in task.cases))
 
     def _with_left(self, tasks: Iterator[PathTask | None]) -> Iterator[PathTask | None]:
@@ -296,9 +297,9 @@ class _Work:
             self.store.catalogue.put(fresh)
         for row in fresh:
             self.computed.add(row["id"])
-            place = self.goals.place(row["id"]) if self.goals else ""
+            place = self.goals.about(path, row) if self.goals else ""
             if self.goals:
-                self.goals.heard(row)
+                self.goals.heard(path, row)
             self._tell(
                 "run", path=path, run=row["id"], status=self.study.taken(row["status"]),
                 message=row["message"], place=place,
@@ -328,6 +329,11 @@ class _Work:
                     self._left.append(replace(task, paths=rest))
                 return
             self._walked += self._walking.pop(path.id)[0]
+            if self.goals:
+                owed = self.goals.owed(path.id) if error else None
+                if owed is not None:
+                    self._keep(path.id, [self.store.write_run(owed, str(error))])
+                self.goals.closed(path.id)
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""

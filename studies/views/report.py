@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
@@ -19,7 +19,6 @@ from studies.storage.store import Store
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
 SHOWN = 100
 """Largest number of runs that a report lists; `residua show` prints all."""
@@ -114,7 +113,7 @@ def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
         return {}
 
 
-def _png(drawn: Figure) -> bytes:
+def _png(drawn: Any) -> bytes:
     picture = io.BytesIO()
     drawn.savefig(picture, format="png")
     return picture.getvalue()

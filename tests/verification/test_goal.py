@@ -1,4 +1,4 @@
-"""A goal on a model: first yield under a line contact, against the elastic stress of Hertz."""
+"""Goals on models: first yield of a line contact, and a loading path that goes on."""
 
 from __future__ import annotations
 
@@ -37,3 +37,34 @@ def test_first_yield_of_a_line_contact_within_1_percent_in_twelve_runs(tmp_path:
         low, high = (np.sqrt(3.0) * dataset[f"load_ratio_{end}"].item() for end in ("low", "high"))
     assert found == pytest.approx(exact, rel=0.01)
     assert low <= exact <= high
+
+
+def test_a_path_that_goes_on_gives_each_run_as_if_it_were_alone(tmp_path: Path) -> None:
+    """A coarse punch: loading continues from the bracket, in a few runs instead of a sweep."""
+    goal = {"of": "max_plastic_strain", "at": 2e-3, "between": [0.3, 1.5], "within": 0.005}
+    mesh = {"smallest_element": 0.05, "growth": 1.8, "friction": 0.3}
+    content = {"name": "punch", "scene": "punch", "parameters": mesh, "goal": goal}
+    study, store = Study.from_dict(content), Store(tmp_path / "out")
+    assert study.asks is not None
+    assert study.asks.goes_on
+    computed = search_here(study, store)
+    assert len(computed) <= 6
+    with open_study(tmp_path / "out") as dataset:
+        assert dataset["status"].item() == "ok"
+        numbers = dataset["tried_max_plastic_strain"].to_numpy().ravel()
+        assert (np.diff(numbers) > 0.0).all()
+        tried = dataset["tried_load_ratio"].to_numpy().ravel()
+        load = dataset["load_ratio"].item()
+        last = dataset["load_ratio_high"].item()
+        stored = store.run(dataset["run_high"].item())
+    assert np.interp(2e-3, numbers, tried) == (pytest.approx(load, rel=1e-9))
+    alone = Study.from_dict(
+        {"name": "one", "scene": "punch", "parameters": mesh | {"load_ratio": last}}
+    )
+    (case,) = alone.cases()
+    (record,) = study.problem.path(case.parameters, [last], lambda done: None)
+    assert stored is not None
+    assert stored["id"] == case.id
+    scalars = {k: v for k, v in stored["scalars"].items() if v is not None and k != "cpu_seconds"}
+    assert len(scalars) > 20
+    assert {name: record.scalars[name] for name in scalars} == scalars
