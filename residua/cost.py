@@ -26,6 +26,7 @@ def dry_run(study: Study, store: Store) -> str:
         if found.increments is None
         else f"{found.increments} in all, at most {found.longest} on a path",
         "processor time": _time(found) or unknown,
+        "memory": unknown if found.memory is None else f"about {_size(found.memory)} a worker",
         "disk": f"about {_size(found.bytes)}",
         "estimated from": found.basis,
     }

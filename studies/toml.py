@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import stat
 import tomllib
 from contextlib import suppress
-from itertools import chain
+from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,14 @@ LARGEST = 50_000_000
 
 DEEPEST = 50
 """Largest number of tables and lists inside one another."""
+
+_TEXT = re.compile(
+    r""""{3}(?:\\.|[^\\])*?(?:"{3,5}|\Z)|'{3}.*?(?:'{3,5}|\Z)"""
+    r"""|"(?:\\.|[^"\\\n])*+"?|'[^'\n]*+'?|\#[^\n]*+""",
+    re.DOTALL,
+)
+_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+_STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def read_bytes(path: Path | str, field: str) -> bytes:
@@ -38,6 +47,19 @@ def read_bytes(path: Path | str, field: str) -> bytes:
         return Path(path).read_bytes()
     except OSError as error:
         raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
+
+
+def check_depth(text: str) -> None:
+    """Raise `ValueError` for a text of TOML or JSON that nests more than `DEEPEST` lists or tables.
+
+    The time of a parser may grow with the square of the parts of a dotted key, and one that calls
+    itself for each bracket may end the process. So this is found before anything is parsed.
+    """
+    bare = _TEXT.sub("s", text)
+    levels = max(accumulate(map(_STEP.__getitem__, re.findall(r"[][{}]", bare))), default=0)
+    if levels > DEEPEST or _KEY.search(bare):
+        found = f"lists or tables {levels}" if levels > DEEPEST else f"keys over {DEEPEST} tables"
+        raise ValueError(f"it has {found} deep; at most {DEEPEST} are allowed")
 
 
 def depth(content: Any) -> int:
@@ -171,10 +193,12 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
         for ``field`` with the value ``name``, if the text is not TOML
     """
     try:
-        tables = tomllib.loads(data.decode("utf-8-sig"))
+        text = data.decode("utf-8-sig")
+        check_depth(text)
+        tables = tomllib.loads(text)
         if (levels := depth(tables)) > DEEPEST:
-            raise ValueError(f"it has tables or lists {levels} deep; at most {DEEPEST} are allowed")
+            raise ValueError(f"it has lists or tables {levels} deep; at most {DEEPEST} are allowed")
         plain: dict[str, Any] = json.loads(json.dumps(tables, default=str))
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise StudyError(field, name, f"must be valid TOML: {error}") from None
     return plain

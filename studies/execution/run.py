@@ -21,6 +21,7 @@ from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.bundles import Bundle, bundles
 from studies.execution.cluster import Access, connect, own_workers
+from studies.execution.estimate import memory_needed
 from studies.execution.goals import Goals, answers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
@@ -121,7 +122,8 @@ def run_study(
     study : a study, or the content of a study file
     store : the store of runs, shared by all studies
     scene : for the content of a study file, the user's own scene in place of a scene's name
-    workers : number of worker processes on this machine; by default one per core
+    workers : number of worker processes on this machine; by default one per core, or fewer if they
+        need more memory than the machine has
     scheduler : a running dask scheduler to use instead; its workers must see the store under the
         same path
     resume : compute only runs without a stored status; by default failed runs are computed again
@@ -178,7 +180,7 @@ def run_study(
         if wanted or (goals and not goals.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
-            work.compute(workers or os.cpu_count() or 1, access, stop)
+            work.compute(workers, access, stop)
         if goals:
             stopped, combined = not goals.ended, answers(study, store, goals)
         else:
@@ -218,10 +220,11 @@ class _Work:
     _walked: int = 0
     _walking: dict[str, tuple[int, float]] = field(default_factory=dict)
 
-    def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
+    def compute(self, wanted: int | None, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run a task for each bundle of paths that lack runs."""
         from studies.execution.grid import Finished, Grid, Message  # dask takes a second to import
 
+        workers = wanted or os.cpu_count() or 1
         grid: Grid | None = None
         unwritable: list[StoreFull | StudyError] = []
         with ExitStack() as opening:
@@ -229,8 +232,10 @@ class _Work:
             tasks = self._tasks(proof, lambda: grid.workers if grid else workers)
             if access is None:
                 first = list(islice(tasks, workers))
+                need = 0 if wanted else memory_needed(self.study)
                 count = sum(task is not None for task in first)
-                access = opening.enter_context(own_workers(count, self.limits.memory))
+                own = own_workers(count, self.limits.memory, need)
+                access = opening.enter_context(own)
                 tasks = chain(first, tasks)
             grid = opening.enter_context(Grid(access))
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from solver.memory import release
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
@@ -88,7 +89,8 @@ def walk(
     died. If the scene raises an error, the runs without a record are written with the status
     ``error`` and the error as their message. A record that cannot be written, or whose file would
     differ, gives only its own run this status. The next path follows when all runs of a path are
-    stored: of a task that ends early, the first path that lacks one was being computed.
+    stored: of a task that ends early, the first path that lacks one was being computed. Between two
+    paths the process keeps no more than `solver.memory.most_kept`.
 
     Raises
     ------
@@ -109,7 +111,10 @@ def walk(
     stored = task.stored(store)
     with contextlib.suppress(StopAsked):
         for path in task.paths:
-            _walk(task, path, store, stored, report, should_stop)
+            try:
+                _walk(task, path, store, stored, report, should_stop)
+            finally:
+                release()
 
 
 def _walk(

@@ -161,7 +161,7 @@ def test_the_command_makes_lists_and_removes_keys(
     data = ["--data", str(tmp_path / "new")]
     assert main(["keys", "add", "me", "--scope", "submit", *data]) == 0
     text = capsys.readouterr().out.strip()
-    assert Keys(tmp_path / "new").scope_of(text) is Scope.SUBMIT
+    assert Keys(tmp_path / "new").owner(text) == ("me", Scope.SUBMIT)
     assert main(["keys", "list", *data]) == 0
     listed = capsys.readouterr().out
     assert listed.split()[:2] == ["me", "submit"] and text not in listed

@@ -16,6 +16,7 @@ from typing import Any
 import dask
 import psutil
 import pytest
+from distributed.system import MEMORY_LIMIT
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
 from studies.execution.cluster import connect
@@ -103,6 +104,12 @@ def test_workers_of_our_own_get_the_memory_that_is_set() -> None:
     with own_workers(1, "700MB") as access, connect(access) as client:
         (worker,) = client.scheduler_info()["workers"].values()
     assert worker["memory_limit"] == 700_000_000
+
+
+def test_no_more_workers_are_started_than_memory_bears() -> None:
+    with own_workers(3, need=MEMORY_LIMIT * 2 // 3) as access, connect(access) as client:
+        (worker,) = client.scheduler_info()["workers"].values()
+    assert worker["memory_limit"] == MEMORY_LIMIT
 
 
 def test_workers_are_forks_of_one_process_and_have_the_environment_of_their_own_time(
