@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from solver import SCENES, Body, ContactPair, Material, Model, PathControl, solve
 from solver.contact import candidates
+from solver.memory import release
 from solver.mesh import grid
 from solver.scenes.punch import PunchParameters, model
 from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import _rim, steady_passes
-from solver.steady import track_of
+from solver.scenes.rolling_steady import steady_passes
 from tests.benchmarks.measure import timed
 
 Array = NDArray[np.float64]
@@ -93,8 +93,7 @@ def _passed() -> Array:
 
 
 def _passed_anew() -> Array:
-    track_of.cache_clear()
-    _rim.cache_clear()
+    release(0)
     return _passed()
 
 
