@@ -17,7 +17,9 @@ def dry_run(study: Study, store: Store) -> str:
     found = estimate(study, store)
     unknown = "not known"
     lines = {
-        "runs": f"{found.runs} in all, {found.to_compute} to compute",
+        "runs": f"at most {found.runs}, of which some may be there"
+        if study.asks
+        else f"{found.runs} in all, {found.to_compute} to compute",
         "loading paths": f"{found.paths} to walk",
         "unknowns": unknown if found.unknowns is None else f"at most {found.unknowns} a run",
         "increments": unknown

@@ -7,10 +7,11 @@ import time
 from typing import TextIO
 
 from studies.definition.cases import Case
+from studies.definition.points import CASE, is_points
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.execution.run import StudyEvent
-from studies.views.columns import counted
+from studies.views.columns import counted, value_text
 
 _WIDTH = 28
 _REDRAW = 0.1
@@ -59,7 +60,8 @@ class Progress:
             self._failed += event.status != OK
             if not self._bar:
                 reason = f": {event.message}" if event.status != OK else ""
-                line = f"{100 * event.progress:3.0f} %  {event.status}  {self._names[event.run]}"
+                place = event.place or self._names[event.run]
+                line = f"{100 * event.progress:3.0f} %  {event.status}  {place}"
                 print(line + reason, file=self._stream, flush=True)
         now = time.monotonic()
         self._progress = event.progress
@@ -94,5 +96,14 @@ class Progress:
 
 
 def _place(study: Study, case: Case) -> str:
-    place = study.place(case).items()
-    return ", ".join(f"{name} = {counted(value)}" for name, value in place) or study.name
+    """Return the values of a run on the axes, and of a point its name and what it sets."""
+    parts = []
+    for (name, value), index in zip(study.place(case).items(), case.index, strict=True):
+        axis = study.sweep[name]
+        text = f"{name} = {counted(value)}"
+        if is_points(axis):
+            sets = axis[index].items()
+            own = (each if key == CASE else f"{key} = {value_text(each)}" for key, each in sets)
+            text += ": " + ", ".join(own)
+        parts.append(text)
+    return ", ".join(parts) or study.name

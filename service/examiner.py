@@ -77,6 +77,9 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
     study = Study.known(content, partial(_posted, store))
+    if study.asks:
+        allowed = "is searched by `residua run`, not by a service: submit the runs themselves"
+        raise StudyError("goal", study.goal, allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

@@ -16,6 +16,7 @@ import threading
 import weakref
 from collections import OrderedDict
 from collections.abc import Hashable
+from contextlib import suppress
 from functools import wraps
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -63,16 +64,18 @@ def most_kept() -> int:
 
 _KEPT: OrderedDict[Hashable, Any] = OrderedDict()
 """Values by key, the last used one at the end."""
+_PATH = object()
+"""Key in between: values that were used since the last `release` stand behind it."""
 _IN_USE: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
-"""Values that something holds."""
+"""Values that something holds, if weak references to them are possible."""
 _LOCK = threading.RLock()
 
 
 def remembered(key: Hashable, make: Callable[[], R]) -> R:
     """Return the value of a key, made anew if it is not kept.
 
-    All values together have at most the bytes of `most_kept` when another one is made. Weak
-    references to them must be possible; None is not kept.
+    All values together have at most the bytes of `most_kept` when another one is made. None is not
+    kept.
     """
     with _LOCK:
         value: R | None = _KEPT.get(key, _IN_USE.get(key))
@@ -81,8 +84,10 @@ def remembered(key: Hashable, make: Callable[[], R]) -> R:
         value = make()
     if value is not None:
         with _LOCK:
-            _IN_USE[key] = _KEPT[key] = value
+            _KEPT[key] = value
             _KEPT.move_to_end(key)
+            with suppress(TypeError):  # nothing refers weakly to some kinds of objects
+                _IN_USE[key] = value
     return value
 
 
@@ -108,9 +113,13 @@ def release(most: int | None = None) -> None:
 
     Parameters
     ----------
-    most : number of bytes; `most_kept` by default
+    most : number of bytes; by default `most_kept`, or more if the path that has ended used more:
+        the next path of a study most often has the same set-up
     """
-    _evict(most_kept() if most is None else most)
+    _evict(most_kept() if most is None else most, spare=most is None)
+    with _LOCK:
+        _KEPT[_PATH] = None
+        _KEPT.move_to_end(_PATH)
     _HEAP.tidy()
 
 
@@ -120,13 +129,15 @@ def bytes_of(*values: object) -> list[int]:
     return [_measured(value, seen) for value in values]
 
 
-def _evict(most: int) -> None:
-    """Drop values that do not fit beside those that were used later."""
+def _evict(most: int, *, spare: bool = False) -> None:
+    """Drop values that do not fit beside those used later; spare those used since `release`."""
     with _LOCK:
         keys, total = list(reversed(_KEPT)), 0
         sizes = bytes_of(*((key, _KEPT[key]) for key in keys))
         for key, size in zip(keys, sizes, strict=True):
-            if total + size > most:
+            if key is _PATH:
+                spare = False
+            elif total + size > most and not spare:
                 del _KEPT[key]
             else:
                 total += size

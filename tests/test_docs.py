@@ -185,7 +185,7 @@ def test_blocks_of_a_page_run(
     monkeypatch.chdir(tmp_path)
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
-    for study in (tmp_path / "data" / "studies").iterdir():
+    for study in (tmp_path / "data" / "studies").glob("*.toml"):
         study.write_text(coarse(study.read_text()))
     for name, axes in FEWER.items():
         study = tmp_path / "data" / "studies" / name

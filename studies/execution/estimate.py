@@ -15,6 +15,8 @@ from solver.errors import ModelError
 from solver.memory import most_kept
 from solver.scenes import Effort
 from studies.definition.cases import LoadingPath
+from studies.definition.goal import Goal
+from studies.definition.parameters import build
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
@@ -39,6 +41,9 @@ _BATCH = 500
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
+
+    Of a study with a goal they are the most that it may cost: the longest possible searches, with
+    every run as expensive as the one of the largest value.
 
     Attributes
     ----------
@@ -202,9 +207,8 @@ def memory_needed(study: Study) -> int:
     scene, most, kept = study.problem, 0, most_kept()
     if scene.effort is None:
         return most
-    for path in itertools.islice(study.paths(), _BATCH):
+    for path, values in itertools.islice(_asked(study), _BATCH):
         with contextlib.suppress(ModelError):  # its runs will end at once
-            values: list[Any] = [case.values.get(scene.branch) for case in path.cases]
             most = max(most, _of_a_worker(scene.effort(path.parameters, values), kept))
     return most
 
@@ -227,6 +231,9 @@ def _shared(each: list[list[float]]) -> float:
 def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:
     """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
     branch = study.problem.branch
+    if study.asks:
+        yield from _longest(study, study.asks)
+        return
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
         ids = (case.id for path in batch for case in path.cases)
@@ -234,6 +241,33 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing
+
+
+def _asked(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of a study, and the values of its branch parameter on each."""
+    if study.asks:
+        yield from _longest(study, study.asks)
+        return
+    for path in study.paths():
+        yield path, [case.values.get(study.problem.branch) for case in path.cases]
+
+
+def _longest(study: Study, goal: Goal) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of the longest possible searches, and their values."""
+    rounds, runs = goal.most
+    low, high = goal.between
+    for place in study.cases():
+        values = {**place.values, goal.parameter: high}
+        path = LoadingPath(place.id, build(study.problem, values), (place,))
+        if goal.branch and goal.goes_on:
+            yield path, [low, *goal.split(low, high, runs - rounds), high]
+            yield from itertools.repeat((path, [high]), rounds - 1)
+        elif goal.branch:
+            each = (runs - 2) // rounds
+            yield path, [low, *goal.split(low, high, each + 1), high]
+            yield from itertools.repeat((path, [high] * each), rounds - 1)
+        else:
+            yield from itertools.repeat((path, [high]), runs)
 
 
 def _file_size(study: Study, store: Store, unknowns: int) -> float:

@@ -67,31 +67,51 @@ def test_what_was_used_longest_ago_goes_first() -> None:
 
 @pytest.mark.usefixtures("ten")
 def test_a_smaller_value_is_kept_beside_one_that_does_not_fit() -> None:
-    for name, size in (("small", 1), ("large", 20)):
+    for name, size in (("small", 1), ("large", 20), ("other", 1), ("small", 1), ("large", 20)):
         hold(name, size)
+    assert made == {"small": 1, "large": 2, "other": 1}
+
+
+@pytest.mark.usefixtures("ten")
+def test_what_a_path_used_is_there_for_the_next_path_even_if_it_does_not_fit() -> None:
+    for _ in range(2):
+        hold("small", 1)
+        hold("large", 20)
+        release()
+    assert made == {"large": 1, "small": 1}
+    hold("other", 1)
     release()
-    for name, size in (("small", 1), ("large", 20)):
-        hold(name, size)
-    assert made == {"small": 1, "large": 2}
+    hold("large", 20)
+    assert made["large"] == 2
 
 
 @pytest.mark.usefixtures("ten")
 def test_a_value_in_use_is_found_even_if_it_does_not_fit() -> None:
     own = hold("large", 20)
-    release()
+    release(0)
     assert hold("large", 20) is own
     gone = weakref.ref(own)
     del own
-    release()
+    release(0)
     assert gone() is None
 
 
 @pytest.mark.usefixtures("ten")
 def test_a_value_that_grows_is_measured_again() -> None:
     hold("a", 1).more = np.ones(2 * MB)  # type: ignore[attr-defined]
-    release()
+    hold("b", 1)
     hold("a", 1)
     assert made["a"] == 2
+
+
+def test_a_value_without_weak_references_is_kept() -> None:
+    @kept
+    def numbers() -> tuple[int, ...]:
+        made["numbers"] += 1
+        return (1, 2)
+
+    assert [numbers(), numbers()] == [(1, 2), (1, 2)]
+    assert made["numbers"] == 1
 
 
 def test_a_failure_is_not_kept() -> None:
