@@ -12,7 +12,5 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 def complain(reason: object, status: int) -> int:
     """Print why a command ends, and return its exit status."""
-    from studies.errors import cut
-
-    print(f"residua: {cut(str(reason), LONGEST)}", file=sys.stderr)
+    print(f"residua: {str(reason)[:LONGEST]}", file=sys.stderr)  # without imports, see neighbours
     return status

@@ -302,8 +302,8 @@ def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("failed", "status", "detail"),
     [
-        (StoreFull("/data/anna"), 507, "no room is left on the disk of the data directory"),
-        (Unusable("directory", "/data/anna", "must be one"), 503, "directory: must be one"),
+        (StoreFull("/srv/anna"), 507, "no room is left on the disk of the data directory"),
+        (Unusable("directory", "/srv/anna", "must be one"), 503, "directory: must be one"),
     ],
     ids=["full", "read-only"],
 )
