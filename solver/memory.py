@@ -16,6 +16,7 @@ import threading
 import weakref
 from collections import OrderedDict
 from collections.abc import Hashable
+from contextlib import suppress
 from functools import wraps
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -66,15 +67,15 @@ _KEPT: OrderedDict[Hashable, Any] = OrderedDict()
 _PATH = object()
 """Key in between: values that were used since the last `release` stand behind it."""
 _IN_USE: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
-"""Values that something holds."""
+"""Values that something holds, if weak references to them are possible."""
 _LOCK = threading.RLock()
 
 
 def remembered(key: Hashable, make: Callable[[], R]) -> R:
     """Return the value of a key, made anew if it is not kept.
 
-    All values together have at most the bytes of `most_kept` when another one is made. Weak
-    references to them must be possible; None is not kept.
+    All values together have at most the bytes of `most_kept` when another one is made. None is not
+    kept.
     """
     with _LOCK:
         value: R | None = _KEPT.get(key, _IN_USE.get(key))
@@ -83,8 +84,10 @@ def remembered(key: Hashable, make: Callable[[], R]) -> R:
         value = make()
     if value is not None:
         with _LOCK:
-            _IN_USE[key] = _KEPT[key] = value
+            _KEPT[key] = value
             _KEPT.move_to_end(key)
+            with suppress(TypeError):  # nothing refers weakly to some kinds of objects
+                _IN_USE[key] = value
     return value
 
 

@@ -29,6 +29,7 @@ from service.app import create_app
 from service.connections import limited
 from service.errors import Busy, NoRoom, status_of
 from service.examiner import examined
+from service.jobs import Jobs
 from service.maps import Pictures
 from service.schemas import MapQuery
 from service.settings import Settings
@@ -322,6 +323,14 @@ def test_a_directory_that_cannot_be_written_in_is_told_without_its_path(
     answer = asyncio.run(post())
     assert (answer.status_code, answer.json()["detail"]) == (status, detail)
     assert "anna" not in answer.text and int(answer.headers["retry-after"]) > 0
+
+
+def test_a_full_disk_is_not_writable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, jobs = Store(tmp_path), Jobs(tmp_path / "jobs.sqlite")
+    assert probe.look(store, jobs)["data_writable"]
+    full = Path("/dev/full")
+    monkeypatch.setattr(probe.tempfile, "TemporaryFile", lambda dir: full.open("r+b"))
+    assert "data_writable" not in probe.look(store, jobs)
 
 
 def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(

@@ -35,7 +35,7 @@ from studies.errors import CatalogueDamaged, SceneError
 from studies.scenes.scene import FileScene, read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
-from tests.service.servers import Server, fake_study, wait_until
+from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 from tests.service.test_access import Ask, asking
 from tests.service.test_errors import UNKNOWN, problem
 from tests.studies.conftest import compute_here
@@ -481,10 +481,10 @@ def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
     headers = {
         name: {"authorization": f"Bearer {keys.add(name, Scope.SUBMIT)}"} for name in ("a", "b")
     }
-    mortal.settings = {"RESIDUA_REQUIRE_KEYS": "true", "RESIDUA_GRACE_SECONDS": "1"}
+    mortal.settings = NOWHERE | {"RESIDUA_REQUIRE_KEYS": "true", "RESIDUA_GRACE_SECONDS": "1"}
     mortal.start()
     mortal.client.headers.update(headers["a"])
-    study_id = mortal.post(fake_study("watched", behaviour="hang"))
+    study_id = mortal.post(fake_study("watched"))
 
     async def watched() -> list[bool]:
         """Return whether the streams of two keys have ended after the first key is removed."""

@@ -104,6 +104,16 @@ def test_a_value_that_grows_is_measured_again() -> None:
     assert made["a"] == 2
 
 
+def test_a_value_without_weak_references_is_kept() -> None:
+    @kept
+    def numbers() -> tuple[int, ...]:
+        made["numbers"] += 1
+        return (1, 2)
+
+    assert [numbers(), numbers()] == [(1, 2), (1, 2)]
+    assert made["numbers"] == 1
+
+
 def test_a_failure_is_not_kept() -> None:
     @kept
     def fails() -> Held:
