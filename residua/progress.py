@@ -31,7 +31,7 @@ class Progress:
         self._stream = stream or sys.stderr
         self._bar = self._stream.isatty()
         cases = () if self._bar else study.cases()  # a bar names no runs
-        self._size = study.size
+        self._size, self._asks = study.size, study.asks is not None
         self._names = {case.id: _place(study, case) for case in cases}
         self._started = time.monotonic()
         self._begun: float | None = None
@@ -46,7 +46,8 @@ class Progress:
         """Process an event."""
         if self._begun is None:
             self._begun = event.progress
-            if event.kind == "path" and event.fraction == 0.0:  # nothing is done yet
+            first = event.kind == "path" and event.fraction == 0.0  # nothing is done yet
+            if first and not self._asks:
                 self._reused = round(event.progress * self._size)
             if self._reused and not self._bar:
                 text = f"{self._reused} of {self._size} runs exist already"
@@ -81,7 +82,8 @@ class Progress:
         failed = f", {self._failed} failed" if self._failed else ""
         bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
         reused = f" ({self._reused} were there)" if self._reused else ""
-        runs = f"{self._reused + self._seen} of {self._size} runs{reused}{failed}"
+        most = "at most " if self._asks else ""
+        runs = f"{self._reused + self._seen} of {most}{self._size} runs{reused}{failed}"
         left = "  combining the data set" if progress >= 1.0 else self._remaining(progress)
         text = f"{bar} {100 * progress:3.0f} %  {runs}{left}"
         print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)

@@ -300,6 +300,8 @@ def test_the_command_searches_prints_draws_and_keeps(
     assert main(["show", str(out)]) == 0
     plot = ["plot", str(out), "--field", "load_ratio", "--out", str(tmp_path / "a.png")]
     assert main(plot) == 0
+    assert main(["export", str(out), "--vtu", str(tmp_path / "vtu")]) == 2
+    assert "give the file of a run, such as that of run_high" in capsys.readouterr().err
 
 
 def test_a_new_round_begins_while_other_searches_wait(store: Store) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from solver.results.record import Record, Status
 from studies.scenes.registry import scene_named
+from tests.records import kept
 from tests.reference.flattening import HertzBall, PlasticBall, first_yield
 
 BALL = scene_named("ball")
@@ -23,7 +24,7 @@ def pressed(**own: Any) -> Record:
     parameters = BALL.parameters(**({"accuracy": "draft"} | own))
     (record,) = BALL.path(parameters, [parameters.cycles], lambda fraction: None)
     assert record.status is Status.OK, record.message
-    return record
+    return kept(record)
 
 
 @pytest.mark.parametrize("yielding", ["half_space", "ball"])

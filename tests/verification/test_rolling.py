@@ -13,6 +13,7 @@ from solver.loading import walker
 from solver.loading.outcome import PathEnded
 from solver.loading.stepper import Stepper
 from solver.scenes.rolling_parameters import RollingParameters
+from tests.records import kept
 
 COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0}
 COARSER = {"element_size": 3.0, "advance_step": 3.0, "track": 24.0}
@@ -27,7 +28,7 @@ def roll(**fields):
     parameters = RollingParameters(**(FEW | fields))
     (record,) = SCENES["rolling"].path(parameters, [parameters.passes], lambda share: None)
     assert record.status is Status.OK, record.message
-    return record
+    return kept(record)
 
 
 def mid_track(record, name):
