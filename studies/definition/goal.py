@@ -43,6 +43,9 @@ FOUND: Mapping[str, Mapping[str, Any]] = {
 NO_EQUILIBRIUM = ("limit_load", "not_converged")
 """Statuses of runs that are beyond every goal."""
 
+_EQUILIBRIUM = (*SOLVED, "audit_failed")
+"""Statuses of runs that are before the limit load, also where their numbers are not good enough."""
+
 PASSED, NEVER, ALREADY, FAILED = "passed", "never", "already", "failed"
 """Reasons for the end of a search, besides `NO_EQUILIBRIUM`: the number passed the threshold; not
 even the last value is beyond; the first value is beyond; a run has no number."""
@@ -101,11 +104,11 @@ class Goal:
         status = str(row["status"])
         if status in NO_EQUILIBRIUM:
             return Look(True, None, status, row["id"])
-        value = row["scalars"].get(self.of) if self.of else 0.0
+        if not self.of:
+            return Look(False if status in _EQUILIBRIUM else None, None, status, row["id"])
+        value = row["scalars"].get(self.of)
         if status not in SOLVED or value is None:
             return Look(None, None, status, row["id"])
-        if not self.of:
-            return Look(False, None, status, row["id"])
         over = value - self.threshold
         if self.kind == "at":
             over = 0.0 if rising is None else (over if rising else -over)
@@ -356,8 +359,9 @@ class Place:
         """Whether a run in the store is taken as it is."""
         if row["status"] in SOLVED:
             return self.keep in ("", row[KEEP])
+        decided = NO_EQUILIBRIUM if self.search.goal.of else (*NO_EQUILIBRIUM, *_EQUILIBRIUM)
         failed = self.resume and row["modified"] >= self.since
-        return row["status"] in NO_EQUILIBRIUM or failed
+        return row["status"] in decided or failed
 
     def hear(self, row: Mapping[str, Any]) -> bool:
         """Tell the search of a run; return whether it had asked for it."""

@@ -241,7 +241,7 @@ def _content(study: Study, goals: Goals, outcomes: list[tuple[str, str]]) -> Run
     for k, key in enumerate(("status", "message")):
         texts = [outcomes[each][k] for each in order]
         add(key, texts, object, layout.attributes_of(key))
-    meaning = f"{attributes.get('long_name', name)} at which the goal is reached"
+    meaning = f"{name.replace('_', ' ')} at which the goal is reached"
     add(name, [each.found for each in searches], float, {**unit, "long_name": meaning})
     for end in ("low", "high"):
         words = {"long_name": f"{end} end of the bracket of {name}"}

@@ -127,6 +127,14 @@ def test_no_equilibrium_is_beyond_and_told_apart() -> None:
     assert searched(goal, lambda value: None).reason == "already"
 
 
+def test_a_run_that_fails_its_audit_is_before_the_limit_load_and_has_no_number() -> None:
+    limit = checked_goal({"find": "limit_load", "between": [0.1, 4.0]}, FAKE)
+    row = {"id": "a", "status": "audit_failed", "scalars": {"peak_contact_pressure": 1.0}}
+    assert limit.seen(row, None).beyond is False
+    assert checked_goal(PRESSURE, FAKE).seen(row, True).beyond is None
+    assert limit.seen(row | {"status": "error"}, None).beyond is None
+
+
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_data_set_has_what_was_found_over_the_axes(store: Store, scene: str) -> None:
     asked = study(PRESSURE, scene=scene, trouble="limit")
