@@ -52,20 +52,28 @@ class Region:
 
     @classmethod
     def around(
-        cls, whole: Discretisation, surfaces: Sequence[Surface], inner: Region, layers: int
+        cls,
+        whole: Discretisation,
+        surfaces: Sequence[Surface],
+        inner: Region,
+        layers: int,
+        way: float = 0.0,
+        times: int = 0,
     ) -> Region:
         """Return a region of a body and its surfaces with layers of elements around another.
 
-        Where nothing yields it has the elements that touch.
+        Where nothing yields it has the elements that touch. It includes the places that it comes to
+        by moving a number of times by ``way`` along x [mm].
         """
+        sources = [whole.sources(way)] * times
         touched = inner.contact[whole.dofs].any(axis=1)
         near = np.zeros(whole.n, dtype=bool)
-        near[whole.dofs[_layered(whole, touched, layers)]] = True
+        near[whole.dofs[_swept(whole, _layered(whole, touched, layers), sources)]] = True
         contact = np.zeros(whole.n, dtype=bool)
         for surface in surfaces:
             contact[surface.dofs] = near[whole.copied[surface.dofs]]
         yields = inner.elements if inner.elements.any() else touched
-        return cls(_layered(whole, yields, layers), contact)
+        return cls(_swept(whole, _layered(whole, yields, layers), sources), contact)
 
     def has(self, other: Region) -> bool:
         """Whether it has all of another region."""
@@ -84,6 +92,21 @@ def _layered(whole: Discretisation, elements: NDArray[np.bool_], layers: int) ->
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True
         elements = within[whole.dofs].any(axis=1)
+    return elements
+
+
+def _swept(
+    whole: Discretisation, elements: NDArray[np.bool_], sources: Sequence[NDArray[np.int64]]
+) -> NDArray[np.bool_]:
+    """Return some elements (n_elements,) and those in whose places they come to lie by motions.
+
+    ``sources`` has for each motion the `Discretisation.sources`.
+    """
+    for source in sources:
+        within = np.zeros(whole.n, dtype=bool)
+        within[whole.dofs[elements]] = True
+        within |= within[source] & (source >= 0)
+        elements = within[whole.dofs].all(axis=1)
     return elements
 
 
