@@ -57,15 +57,13 @@ class Region:
         surfaces: Sequence[Surface],
         inner: Region,
         layers: int,
-        way: float = 0.0,
-        times: int = 0,
+        sources: Sequence[NDArray[np.int64]] = (),
     ) -> Region:
         """Return a region of a body and its surfaces with layers of elements around another.
 
-        Where nothing yields it has the elements that touch. It includes the places that it comes to
-        by moving a number of times by ``way`` along x [mm].
+        Where nothing yields it has the elements that touch. It includes the places to which motions
+        take it one after the other, given by the `Discretisation.sources` of each.
         """
-        sources = [whole.sources(way)] * times
         touched = inner.contact[whole.dofs].any(axis=1)
         near = np.zeros(whole.n, dtype=bool)
         near[whole.dofs[_swept(whole, _layered(whole, touched, layers), sources)]] = True
@@ -98,10 +96,7 @@ def _layered(whole: Discretisation, elements: NDArray[np.bool_], layers: int) ->
 def _swept(
     whole: Discretisation, elements: NDArray[np.bool_], sources: Sequence[NDArray[np.int64]]
 ) -> NDArray[np.bool_]:
-    """Return some elements (n_elements,) and those in whose places they come to lie by motions.
-
-    ``sources`` has for each motion the `Discretisation.sources`.
-    """
+    """Return some elements (n_elements,) and those in whose places motions take them."""
     for source in sources:
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True

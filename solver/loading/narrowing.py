@@ -179,9 +179,10 @@ def _around(
     if need is None or not isinstance(part, Discretisation):
         return None
     if window is None or not window.has(need):
-        layers, ahead = _MOVING if way else (_LAYERS, 0)
-        side = math.copysign(system.sides[number], way)
-        window = Region.around(part, system.surfaces[number], need, layers, side, ahead)
+        side = system.sides[number]
+        layers, ahead = _MOVING if way and math.isfinite(side) else (_LAYERS, 0)
+        sources = [part.sources(math.copysign(side, way))] * ahead if ahead else []
+        window = Region.around(part, system.surfaces[number], need, layers, sources)
     return window if 0 < window.elements.mean() < _LARGE else None
 
 
