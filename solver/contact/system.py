@@ -212,19 +212,6 @@ class System:
         """Whether a load moves along a body."""
         return any(part.moves for part in self.parts)
 
-    def way(self, before: float, after: float) -> float:
-        """Return how far the loads move between two times [mm]; 0 if their motions differ."""
-        ways = {part.way(before, after) for part in self.parts if part.moves}
-        return ways.pop() if len(ways) == 1 else 0.0
-
-    @cached_property
-    def sides(self) -> tuple[float, ...]:
-        """Shortest element side of each part under a moving load or on a contact surface [mm]."""
-        return tuple(
-            min([part.side, *(surface.shortest_edge for surface in surfaces)])
-            for part, surfaces in zip(self.parts, self.surfaces, strict=True)
-        )
-
     @property
     def _loads(self) -> list[Load]:
         return [load for part in self.parts for load in part.body.every_load]

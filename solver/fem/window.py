@@ -52,26 +52,20 @@ class Region:
 
     @classmethod
     def around(
-        cls,
-        whole: Discretisation,
-        surfaces: Sequence[Surface],
-        inner: Region,
-        layers: int,
-        sources: Sequence[NDArray[np.int64]] = (),
+        cls, whole: Discretisation, surfaces: Sequence[Surface], inner: Region, layers: int
     ) -> Region:
         """Return a region of a body and its surfaces with layers of elements around another.
 
-        Where nothing yields it has the elements that touch. It includes the places to which motions
-        take it one after the other, given by the `Discretisation.sources` of each.
+        Where nothing yields it has the elements that touch.
         """
         touched = inner.contact[whole.dofs].any(axis=1)
         near = np.zeros(whole.n, dtype=bool)
-        near[whole.dofs[_swept(whole, _layered(whole, touched, layers), sources)]] = True
+        near[whole.dofs[_layered(whole, touched, layers)]] = True
         contact = np.zeros(whole.n, dtype=bool)
         for surface in surfaces:
             contact[surface.dofs] = near[whole.copied[surface.dofs]]
         yields = inner.elements if inner.elements.any() else touched
-        return cls(_swept(whole, _layered(whole, yields, layers), sources), contact)
+        return cls(_layered(whole, yields, layers), contact)
 
     def has(self, other: Region) -> bool:
         """Whether it has all of another region."""
@@ -90,18 +84,6 @@ def _layered(whole: Discretisation, elements: NDArray[np.bool_], layers: int) ->
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True
         elements = within[whole.dofs].any(axis=1)
-    return elements
-
-
-def _swept(
-    whole: Discretisation, elements: NDArray[np.bool_], sources: Sequence[NDArray[np.int64]]
-) -> NDArray[np.bool_]:
-    """Return some elements (n_elements,) and those in whose places motions take them."""
-    for source in sources:
-        within = np.zeros(whole.n, dtype=bool)
-        within[whole.dofs[elements]] = True
-        within |= within[source] & (source >= 0)
-        elements = within[whole.dofs].all(axis=1)
     return elements
 
 

@@ -8,7 +8,6 @@ windows grow. A window is kept from increment to increment until elements outsid
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -36,8 +35,6 @@ if TYPE_CHECKING:
 
 _LAYERS = 3
 """Number of layers of elements around those that yield, in a new window."""
-_MOVING = 2, 8
-"""The same under a load that moves, and by how many element sides a new window reaches ahead."""
 _LARGE = 0.5
 """Ratio of the elements of a window to those of the body; above it a window saves too little."""
 _PATIENCE = 1.5
@@ -79,9 +76,8 @@ def narrowed(
     candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
     needed = _needed(system, candidates, yields)
     stiffness: dict[bytes, NDArray[np.float64]] = {}
-    way = system.way(start.time, time)
     for _ in range(_ROUNDS):
-        windows = tuple(_around(system, k, windows[k], need, way) for k, need in enumerate(needed))
+        windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
         if not any(windows):
             return None
         parts = tuple(
@@ -169,20 +165,14 @@ def _needed(system: System, candidates: Candidates, yields: Yields) -> list[Regi
 
 
 def _around(
-    system: System, number: int, window: Region | None, need: Region | None, way: float
+    system: System, number: int, window: Region | None, need: Region | None
 ) -> Region | None:
-    """Return the window so far if it has all that is needed, else a new one, if small.
-
-    ``way`` is how far the loads move in the increment [mm].
-    """
+    """Return the window so far if it has all that is needed, else a new one, if small."""
     part = system.parts[number]
     if need is None or not isinstance(part, Discretisation):
         return None
     if window is None or not window.has(need):
-        side = system.sides[number]
-        layers, ahead = _MOVING if way and math.isfinite(side) else (_LAYERS, 0)
-        sources = [part.sources(math.copysign(side, way))] * ahead if ahead else []
-        window = Region.around(part, system.surfaces[number], need, layers, sources)
+        window = Region.around(part, system.surfaces[number], need, _LAYERS)
     return window if 0 < window.elements.mean() < _LARGE else None
 
 

@@ -38,6 +38,9 @@ class Predictor:
 
     def __init__(self, system: System) -> None:
         self._system = system
+        self._sides = [part.side for part in system.parts]
+        for number, _, surface in (side for i in system.interfaces for side in i.sides):
+            self._sides[number] = min(self._sides[number], surface.shortest_edge)
         self._known: dict[tuple[int, int], Following] = {}
 
     def predicted(self, past: Sequence[State], now: State, time: float) -> State | None:
@@ -47,18 +50,23 @@ class Predictor:
         predicted state are those at ``time``.
         """
         for before, after in reversed(list(pairwise([*past, now]))):
-            way = self._system.way(before.time, now.time)
-            if way and np.isclose(self._system.way(after.time, time), way):
+            way = self._way(before.time, now.time)
+            if way and np.isclose(self._way(after.time, time), way):
                 steps = self._steps(before, now, way)
                 if steps is not None:
                     return self._system.moved(self._moved(before, after, now, steps), time)
         return None
 
+    def _way(self, before: float, after: float) -> float:
+        """Return how far the loads move between two times [mm]; 0 if their motions differ."""
+        ways = {part.way(before, after) for part in self._system.parts if part.moves}
+        return ways.pop() if len(ways) == 1 else 0.0
+
     def _steps(self, before: State, now: State, way: float) -> list[int] | None:
         """Return how many sides of each part a load has passed; None if not a whole number."""
         steps = []
         for part, side, u0, u1 in zip(
-            self._system.parts, self._system.sides, before.u, now.u, strict=True
+            self._system.parts, self._sides, before.u, now.u, strict=True
         ):
             passed = part.passed(u0, u1, way) / side
             if abs(passed - round(passed)) > _OFF:
@@ -82,7 +90,7 @@ class Predictor:
     def _following(self, number: int, steps: int) -> Following:
         """Return the shift of a part's changes by a number of element sides."""
         if (number, steps) not in self._known:
-            way = steps * self._system.sides[number] if steps else 0.0
+            way = steps * self._sides[number] if steps else 0.0
             self._known[number, steps] = Following(self._system.parts[number], way)
         return self._known[number, steps]
 
