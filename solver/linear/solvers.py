@@ -68,6 +68,11 @@ class SuperLU:
         self._upper = upper.copy()
         self._kept = kept
 
+    def __sizeof__(self) -> int:
+        """Return the bytes of the factor, which is not on Python's heap."""
+        entries = self._factor.nnz if hasattr(self, "_factor") else 0
+        return object.__sizeof__(self) + 12 * entries
+
     def factorise(self, data: NDArray[np.float64]) -> None:
         """See `LinearSolver`."""
         self._upper.data = np.asarray(data, dtype=float)
