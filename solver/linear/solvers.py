@@ -198,14 +198,17 @@ class _PardisoFactors:
 
 
 def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]) -> Begun:
-    """Return a solution that a second full solve finishes."""
+    """Return a solution that a second full solve finishes, if the right-hand side changes."""
+    first = solver.solve(b)
 
     def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not change.any():
+            return first
         changed = b.copy()
         changed[kept] += change
         return solver.solve(changed)
 
-    return Begun(solver.solve(b)[kept], finish)
+    return Begun(first[kept], finish)
 
 
 def _compliance(
