@@ -155,7 +155,8 @@ class Asked(NamedTuple):
 
 def _asked(path: LoadingPath, place: Place) -> Asked:
     if place.search.goal.goes_on:
-        return Asked(replace(path, cases=()), None, deepcopy(place))
+        own = replace(place, search=deepcopy(place.search))
+        return Asked(replace(path, cases=()), None, own)
     return Asked(path, place.search.limit, None)
 
 
